@@ -1,0 +1,56 @@
+# Every target sets up what it needs: a virtual environment in .venv, once, until pyproject.toml changes.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check
+USER_STAMP := $(VENV)/.installed-viz
+DEV_STAMP := $(VENV)/.installed-dev
+DEMO_DIR := build/demo
+DOCS_DIR := build/docs
+
+.PHONY: help demo test check docs clean
+.DELETE_ON_ERROR:
+
+help: ## show this list
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null || \
+		sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1  \2/p' $(MAKEFILE_LIST)
+
+demo: $(USER_STAMP) ## learn a wiping movement end to end and write a report to look at
+	@$(BIN)/unconstrain demo --out $(DEMO_DIR)
+	@echo "The report is in $(CURDIR)/$(DEMO_DIR); open its .html file in a browser."
+
+test: $(DEV_STAMP) ## run all tests, in parallel, with coverage
+	@scripts/install-browser || echo "make test: going on; tests that need a browser are skipped." >&2
+	@$(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --cov --cov-report=term-missing:skip-covered
+
+check: $(DEV_STAMP) ## lint, formatting, types, import order
+	@failed=0; for tool in "ruff check ." "ruff format --check ." mypy "lint-imports --no-logo"; do \
+		echo "==> $$tool"; $(BIN)/$$tool || failed=1; \
+	done; exit $$failed
+
+docs: $(DEV_STAMP) ## build the documentation; warnings are errors
+	$(BIN)/sphinx-build -W --keep-going -q -b html docs $(DOCS_DIR)
+	@echo "The documentation is in $(CURDIR)/$(DOCS_DIR)/index.html"
+
+clean: ## remove everything built; .venv stays
+	rm -rf build dist htmlcov .coverage .coverage.* docs/_build docs/auto_examples docs/generated docs/sg_execution_times.rst
+	rm -rf .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	find src tests examples -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(BIN)/pip:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "This needs Python 3.11 or newer; name one with: make PYTHON=python3.12" >&2; exit 1; }
+	@echo "Creating the virtual environment $(VENV)"
+	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \
+		echo "Python could not create a virtual environment. On Debian: apt-get install python3-venv" >&2; exit 1; }
+
+$(USER_STAMP): pyproject.toml | $(BIN)/pip
+	@echo "Installing unconstrain and its plots into $(VENV)"
+	@$(PIP) --editable '.[viz]'
+	@touch $@
+
+$(DEV_STAMP): pyproject.toml | $(BIN)/pip
+	@echo "Installing unconstrain and everything for its development into $(VENV); this takes a minute or two"
+	@$(PIP) --editable '.[dev]'
+	@touch $(USER_STAMP) $@

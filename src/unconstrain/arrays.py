@@ -1,0 +1,153 @@
+"""Shapes, checks at the door, and optional imports.
+
+Letters used in shapes throughout: ``T`` samples of one demonstration, ``N``
+samples in all, ``n`` state dimensions, ``d`` action dimensions, ``p``
+features, ``P = d p`` weights, ``M`` models (receptive fields; 1 when global).
+"""
+
+from __future__ import annotations
+
+import importlib
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import InvalidDataError, MissingExtraError, SettingError
+
+__all__ = ["Array", "as_matrix", "as_vector", "as_weights", "check_at_least", "require_extra"]
+
+Array = NDArray[np.float64]
+
+
+def as_matrix(values: ArrayLike, what: str) -> Array:
+    """Check a table of finite numbers and return it as a float64 array.
+
+    Parameters
+    ----------
+    values : array_like, shape (N, k)
+        Any real numbers: lists, integers, float32, read-only, non-contiguous.
+    what : str
+        What the table is, for the error message, such as ``"states of 'demo_3'"``.
+
+    Returns
+    -------
+    ndarray, shape (N, k)
+        The same numbers; a view where no conversion was needed.
+
+    Raises
+    ------
+    InvalidDataError
+        If it is ragged, not two-dimensional, empty, or holds NaN or infinity;
+        the message names the row and the column.
+    """
+    matrix = _as_real(values, what)
+    if matrix.ndim != 2:
+        raise InvalidDataError(
+            f"{what}: got an array of shape {matrix.shape}, expected two dimensions (samples, columns). "
+            "Reshape your data: one row for each sample."
+        )
+    if matrix.size == 0:
+        raise InvalidDataError(
+            f"{what}: got an empty array of shape {matrix.shape}, expected at least one row and one column."
+        )
+    return _finite(matrix, what)
+
+
+def as_vector(values: ArrayLike, what: str, length: int | None = None) -> Array:
+    """Check a vector of finite numbers, of a given length if one is given.
+
+    Raises
+    ------
+    InvalidDataError
+        If it is ragged, not one-dimensional, of the wrong length, or holds NaN or infinity.
+    """
+    vector = _as_real(values, what)
+    if vector.ndim != 1:
+        raise InvalidDataError(f"{what}: got an array of shape {vector.shape}, expected one dimension.")
+    if length is not None and len(vector) != length:
+        raise InvalidDataError(f"{what}: got {len(vector)} values, expected {length}.")
+    return _finite(vector, what)
+
+
+def as_weights(values: ArrayLike | None, length: int) -> Array:
+    """Sample weights: ones if None, otherwise finite and not negative, shape (N,).
+
+    Raises
+    ------
+    InvalidDataError
+        If the number is wrong or one of them is negative.
+    """
+    if values is None:
+        return np.ones(length)
+    weights = as_vector(values, "sample_weight", length)
+    if (weights < 0).any():
+        row = int(np.argmax(weights < 0))
+        raise InvalidDataError(f"sample_weight: got {weights[row]} at row {row}, expected no negative weight.")
+    return weights
+
+
+def check_at_least(name: str, value: Any, least: float, *, strict: bool = False) -> None:
+    """Check that a numeric setting is finite and not below a bound.
+
+    Raises
+    ------
+    SettingError
+        If it is no number, not finite, or below ``least`` (at it, when ``strict``).
+    """
+    try:
+        good = np.isfinite(value) and (value > least if strict else value >= least)
+    except TypeError:
+        good = False
+    if not good:
+        raise SettingError(f"{name}: got {value!r}, expected a number {'above' if strict else 'of at least'} {least}.")
+
+
+def require_extra(module: str, extra: str) -> ModuleType:
+    """Import an optional dependency, or say which extra brings it.
+
+    Parameters
+    ----------
+    module : str
+        Dotted name of the module to import.
+    extra : str
+        The extra of this package that installs it.
+
+    Raises
+    ------
+    MissingExtraError
+        If the module is not installed.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise MissingExtraError(
+            f"this needs {module.partition('.')[0]!r}, which is not installed. "
+            f"Install it with: pip install 'unconstrain[{extra}]'"
+        ) from error
+
+
+def _as_real(values: ArrayLike, what: str) -> Array:
+    try:
+        raw = np.asarray(values)
+    except ValueError as error:  # NumPy's word for rows of different lengths
+        raise InvalidDataError(f"{what}: the rows have different lengths, expected a rectangular table.") from error
+    if raw.dtype.kind == "c":
+        raise InvalidDataError(f"{what}: complex data not supported, expected real numbers.")
+    try:
+        return raw.astype(np.float64, copy=False)
+    except (TypeError, ValueError) as error:
+        raise InvalidDataError(f"{what}: got values that are not numbers ({error}).") from error
+
+
+def _finite(values: Array, what: str) -> Array:
+    bad = ~np.isfinite(values)
+    if bad.any():
+        where = np.argwhere(bad)
+        place = ", ".join(f"{axis} {index}" for axis, index in zip(("row", "column"), where[0], strict=False))
+        raise InvalidDataError(
+            f"{what}: found {values[tuple(where[0])]} at {place} (NaN or infinity in {len(where)} places), "
+            "expected finite numbers. Remove or repair these rows first."
+        )
+    return values

@@ -1,0 +1,38 @@
+"""Everything that can go wrong, in one family.
+
+Each message says what was got, what was expected, and what to do about it.
+Catch :class:`UnconstrainError` to catch them all.
+"""
+
+__all__ = [
+    "InvalidDataError",
+    "MissingExtraError",
+    "ModelFileError",
+    "ReadError",
+    "SettingError",
+    "UnconstrainError",
+]
+
+
+class UnconstrainError(Exception):
+    """Root of all errors that this package raises on purpose."""
+
+
+class InvalidDataError(UnconstrainError, ValueError):
+    """An array that cannot be learnt from: NaN, ragged, empty, of the wrong shape."""
+
+
+class SettingError(UnconstrainError, ValueError):
+    """A parameter outside its range, or a name that does not exist."""
+
+
+class ReadError(UnconstrainError):
+    """A recording that cannot be read, with the file, the row and the column."""
+
+
+class ModelFileError(UnconstrainError):
+    """A model file that is damaged, of a newer version, or not ours."""
+
+
+class MissingExtraError(UnconstrainError, ImportError):
+    """A feature whose optional dependency is not installed."""

@@ -1,0 +1,26 @@
+"""The paper's experiments, each a module with ``Settings`` and ``run(settings)``."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+
+from ..errors import SettingError
+
+__all__ = ["NAMES", "find"]
+
+NAMES = ("table1", "figure4", "figure5", "washing")
+"""What can be reproduced."""
+
+
+def find(name: str) -> ModuleType:
+    """Import an experiment by name.
+
+    Raises
+    ------
+    SettingError
+        If there is none of that name; the message lists those there are.
+    """
+    if name not in NAMES:
+        raise SettingError(f"experiment: got {name!r}, expected one of {', '.join(NAMES)}.")
+    return import_module(f".{name}", __name__)

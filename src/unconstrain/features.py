@@ -1,0 +1,237 @@
+"""Feature maps: states (N, n) to features (N, p).
+
+A feature map is any callable on a table of states. One that has to look at
+the data before it is fixed also has ``place(states)``, which returns the map
+to use; a policy calls it once, on the first batch it sees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .arrays import Array, as_matrix, check_at_least
+from .errors import InvalidDataError, SettingError
+
+__all__ = ["Affine", "FeatureMap", "KMeansRBF", "NormalisedRBF", "Placeable", "shares", "squared_distances"]
+
+
+class FeatureMap(Protocol):
+    """What a policy needs of its features: to be called."""
+
+    def __call__(self, states: Array, /) -> Array:
+        """Compute features (N, p) of states (N, n)."""
+        ...
+
+
+@runtime_checkable
+class Placeable(Protocol):
+    """Features that are fixed only once the data has been seen."""
+
+    def place(self, states: Array, /) -> FeatureMap:
+        """Return the feature map to use from now on."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Affine:
+    """Globally linear features ``x̄ = (x, 1)`` (section III-C).
+
+    Parameters
+    ----------
+    centre, scale : float or array_like, shape (n,)
+        The features are ``((x − centre) / scale, 1)``. Which functions they
+        span does not depend on either; rounding does.
+    """
+
+    centre: Array | float = 0.0
+    scale: Array | float = 1.0
+
+    def __call__(self, states: Array) -> Array:
+        """Compute features (N, n + 1) of states (N, n)."""
+        return np.column_stack([(states - self.centre) / self.scale, np.ones(len(states))])
+
+    def place(self, states: Array) -> Affine:
+        """Centre and scale on the data, unless told where already."""
+        if np.any(self.centre != 0.0) or np.any(self.scale != 1.0):
+            return self
+        centre = states.mean(axis=0)
+        spread = np.sqrt(((states - centre) ** 2).mean(axis=0))
+        # A coordinate that does not move carries rounding only; dividing by that would amplify it.
+        still = spread <= 1e-12 * np.abs(states).max(axis=0, initial=0.0)
+        return replace(self, centre=centre, scale=np.where(still, 1.0, spread))
+
+
+@dataclass(frozen=True, eq=False)
+class NormalisedRBF:
+    """Gaussian kernels that share out one at each state (section III-C).
+
+    ``b_i(x) = K(x − c_i) / Σ_j K(x − c_j)`` with
+    ``K(δ) = exp(−‖δ‖² / 2σ²)``. Computed by log-sum-exp: far from all
+    centres the nearest one takes everything, and nothing overflows.
+
+    Parameters
+    ----------
+    centres : array_like, shape (p, n)
+    variance : float
+        The kernels' σ², in squared units of the state.
+
+    Raises
+    ------
+    InvalidDataError, SettingError
+        If the centres are no finite table or the variance is not positive.
+    """
+
+    centres: Array
+    variance: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centres", as_matrix(self.centres, "centres"))
+        check_at_least("variance", self.variance, 0.0, strict=True)
+
+    def __call__(self, states: Array) -> Array:
+        """Compute features (N, p) of states (N, n); each row sums to one."""
+        return shares(states, self.centres, self.variance)
+
+    def support(self, states: Array) -> Array:
+        """Weight of the nearest kernel, from 1 at its centre to 0 far from all, shape (N,)."""
+        return np.exp(-0.5 / self.variance * squared_distances(states, self.centres).min(axis=1))
+
+    @classmethod
+    def grid(
+        cls,
+        low: float | ArrayLike,
+        high: float | ArrayLike,
+        per_axis: int | Sequence[int],
+        *,
+        width: float = 1.0,
+        dimensions: int = 2,
+    ) -> NormalisedRBF:
+        """Lay the centres on a regular grid.
+
+        Parameters
+        ----------
+        low, high : float or array_like, shape (n,)
+            Corners of the grid. A number serves every axis.
+        per_axis : int or sequence of int
+            Centres along each axis, at least two.
+        width : float
+            The kernels' σ as a multiple of the (mean) grid spacing.
+        dimensions : int
+            Number of axes, where neither ``low`` nor ``high`` tells.
+
+        Raises
+        ------
+        SettingError
+            If there are fewer than two centres on an axis or ``low`` is not below ``high``.
+        """
+        told = max(np.size(low), np.size(high), np.size(per_axis))
+        axes = told if told > 1 else dimensions
+        try:
+            lows, highs, counts = (np.broadcast_to(np.asarray(v), (axes,)) for v in (low, high, per_axis))
+        except ValueError as error:
+            raise SettingError(
+                f"grid: low, high and per_axis have {np.size(low)}, {np.size(high)} and {np.size(per_axis)} values, "
+                "expected one number each or the same number for every axis."
+            ) from error
+        if (counts < 2).any() or not (lows < highs).all():
+            raise SettingError(
+                f"grid: got low={low}, high={high}, per_axis={per_axis}; expected low < high and at least two centres."
+            )
+        check_at_least("width", width, 0.0, strict=True)
+        ticks = [np.linspace(lo, hi, count) for lo, hi, count in zip(lows, highs, counts, strict=True)]
+        centres = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, axes)
+        spacing = np.mean([tick[1] - tick[0] for tick in ticks])
+        return cls(centres, float((width * spacing) ** 2))
+
+    @classmethod
+    def kmeans(cls, states: Array, count: int = 25, *, width: float = 1.0, seed: int = 0) -> NormalisedRBF:
+        """Lay the centres where the states are, by k-means.
+
+        Parameters
+        ----------
+        states : array_like, shape (N, n)
+        count : int
+            Number of centres; fewer where there are fewer different states.
+        width : float
+            The kernels' σ as a multiple of the mean distance from a centre to its nearest neighbour.
+        seed : int
+            Of k-means' starts.
+        """
+        from sklearn.cluster import KMeans
+
+        check_at_least("count", count, 1)
+        check_at_least("width", width, 0.0, strict=True)
+        table = as_matrix(states, "states")
+        middle, unit = table.mean(axis=0), float(np.abs(table - table.mean(axis=0)).max())
+        if unit == 0.0:
+            return cls(table[:1], 1.0)
+        different = np.unique((table - middle) / unit, axis=0)
+        count = min(count, len(different))
+        found = KMeans(count, n_init=4, random_state=seed).fit((table - middle) / unit).cluster_centers_
+        distances = squared_distances(found, found)
+        np.fill_diagonal(distances, np.inf)
+        spacing = np.mean(np.sqrt(distances.min(axis=1))) if count > 1 else 1.0
+        return cls(middle + unit * found, float((width * spacing * unit) ** 2))
+
+
+@dataclass(frozen=True)
+class KMeansRBF:
+    """Normalised RBFs whose centres k-means lays on the first data it is shown.
+
+    Parameters
+    ----------
+    count : int
+        Number of centres; never more than one for each four states.
+    width : float
+        See :meth:`NormalisedRBF.kmeans`.
+    seed : int
+        Of k-means' starts.
+    """
+
+    count: int = 25
+    width: float = 1.0
+    seed: int = field(default=0)
+
+    def place(self, states: Array) -> NormalisedRBF:
+        """Lay the centres on these states (N, n)."""
+        count = max(1, min(self.count, len(states) // 4))
+        return NormalisedRBF.kmeans(states, count, width=self.width, seed=self.seed)
+
+
+def squared_distances(states: Array, centres: Array) -> Array:
+    """Squared Euclidean distances, shape (N, M), without forming (N, M, n).
+
+    Both are taken relative to the centres' mean, so that a large common
+    offset costs no digits.
+    """
+    if states.shape[1] != centres.shape[1]:
+        raise InvalidDataError(
+            f"states: got {states.shape[1]} columns, expected {centres.shape[1]} as the centres have."
+        )
+    origin = centres.mean(axis=0)
+    near, far = states - origin, centres - origin
+    squared = (near**2).sum(axis=1)[:, None] + (far**2).sum(axis=1) - 2.0 * near @ far.T
+    return np.maximum(squared, 0.0)
+
+
+def shares(states: Array, centres: Array, variance: float) -> Array:
+    """Gaussian weights that sum to one at each state, by log-sum-exp, shape (N, M)."""
+    # ‖x‖² is common to all centres and cancels; leaving it out keeps far states exact.
+    if states.shape[1] != centres.shape[1]:
+        raise InvalidDataError(
+            f"states: got {states.shape[1]} columns, expected {centres.shape[1]} as the centres have."
+        )
+    origin = centres.mean(axis=0)
+    far = (centres - origin) / variance
+    exponents = (states - origin) @ far.T - 0.5 * (far * (centres - origin)).sum(axis=1)
+    exponents -= exponents.max(axis=1, keepdims=True)
+    weights = np.exp(exponents, out=exponents)
+    weights /= weights.sum(axis=1, keepdims=True)
+    return weights
+
+

@@ -1,0 +1,90 @@
+"""Orthogonal projections: what a constraint leaves, and what an action shows.
+
+Every projection here is symmetric and idempotent, ``P = Pᵀ = P²``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arrays import Array
+
+__all__ = ["RANK_TOLERANCE", "action_projection", "null_space_projection", "project", "unit_actions"]
+
+RANK_TOLERANCE = 1e-9
+"""Singular values below this share of the largest count as zero."""
+
+
+def null_space_projection(constraint_matrix: Array, tolerance: float = RANK_TOLERANCE) -> Array:
+    """Projection onto the null space of constraints, ``N = I − A⁺A`` (eq. 3).
+
+    Parameters
+    ----------
+    constraint_matrix : ndarray, shape (..., k, d)
+        One constraint in each row; rows may be zero or dependent.
+    tolerance : float
+        Singular values below ``tolerance`` times the largest count as zero,
+        so that a nearly dependent row constrains nothing new.
+
+    Returns
+    -------
+    ndarray, shape (..., d, d)
+        The projections, exactly symmetric.
+    """
+    # By rows of Vᵀ rather than by A⁺: the rank decision is explicit and N is symmetric by construction.
+    _, singular, rows = np.linalg.svd(constraint_matrix, full_matrices=False)
+    active = singular > tolerance * singular.max(axis=-1, initial=0.0, keepdims=True)
+    rows = rows * active[..., None]
+    return np.eye(constraint_matrix.shape[-1]) - np.swapaxes(rows, -1, -2) @ rows
+
+
+def unit_actions(actions: Array) -> tuple[Array, Array]:
+    """Directions and lengths of actions, ``û`` and ``r`` of eq. 4.
+
+    Parameters
+    ----------
+    actions : ndarray, shape (..., d)
+
+    Returns
+    -------
+    directions : ndarray, shape (..., d)
+        Unit vectors; zero where the action is zero, since that has no direction.
+    lengths : ndarray, shape (...)
+    """
+    # Scaled by the largest entry first: lengths of 1e-200 must not square to zero.
+    scale = np.abs(actions).max(axis=-1, keepdims=True, initial=0.0)
+    scaled = actions / np.where(scale > 0, scale, 1.0)
+    lengths = np.linalg.norm(scaled, axis=-1, keepdims=True)
+    directions = scaled / np.where(lengths > 0, lengths, 1.0)
+    return directions, (lengths * scale)[..., 0]
+
+
+def action_projection(actions: Array) -> Array:
+    """Projection onto each action's own direction, ``P = û ûᵀ`` (section III-A).
+
+    Parameters
+    ----------
+    actions : ndarray, shape (..., d)
+
+    Returns
+    -------
+    ndarray, shape (..., d, d)
+        Zero where the action is zero.
+    """
+    directions, _ = unit_actions(actions)
+    return directions[..., :, None] * directions[..., None, :]
+
+
+def project(projections: Array, vectors: Array) -> Array:
+    """Apply one projection to each vector.
+
+    Parameters
+    ----------
+    projections : ndarray, shape (..., d, d)
+    vectors : ndarray, shape (..., d)
+
+    Returns
+    -------
+    ndarray, shape (..., d)
+    """
+    return np.einsum("...ij,...j->...i", projections, vectors)

@@ -1,0 +1,137 @@
+"""Follow a policy under constraints: makes demonstrations, and reproduces what was learnt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .arrays import Array, as_matrix, check_at_least
+from .demonstration import Demonstration, Truth
+from .errors import InvalidDataError, SettingError
+from .projection import null_space_projection, project
+
+__all__ = ["rollout"]
+
+ConstraintLike = Callable[[Array, Array], Array]
+
+
+@overload
+def rollout(
+    policy: Callable[[Array], Array],
+    start: Sequence[float] | Array,
+    steps: int = ...,
+    dt: float = ...,
+    constraint: ConstraintLike | None = ...,
+    *,
+    name: str = ...,
+) -> Demonstration: ...
+
+
+@overload
+def rollout(
+    policy: Callable[[Array], Array],
+    start: Sequence[Sequence[float]] | Array,
+    steps: int = ...,
+    dt: float = ...,
+    constraint: ConstraintLike | Sequence[ConstraintLike] | None = ...,
+    *,
+    name: str = ...,
+) -> list[Demonstration]: ...
+
+
+def rollout(
+    policy: Callable[[Array], Array],
+    start: ArrayLike,
+    steps: int = 200,
+    dt: float = 0.02,
+    constraint: ConstraintLike | Sequence[ConstraintLike] | None = None,
+    *,
+    name: str = "rollout",
+) -> Demonstration | list[Demonstration]:
+    """Follow ``u = N(x, t) π(x)`` with Euler steps ``x ← x + dt u``.
+
+    Parameters
+    ----------
+    policy : callable
+        States (K, n) to actions (K, n); a fitted policy is one.
+    start : array_like, shape (n,) or (K, n)
+        Where to start; several starts run side by side.
+    steps : int
+        Number of samples.
+    dt : float
+        Seconds between samples.
+    constraint : callable or sequence of K callables, optional
+        A(x, t), for all or one for each start. None leaves the policy free.
+    name : str
+        Of the demonstrations; several are numbered.
+
+    Returns
+    -------
+    Demonstration or list of Demonstration
+        With their truth: the policy and the projections that were applied.
+
+    Raises
+    ------
+    SettingError
+        If the policy's actions do not fit the states, or a setting is out of range.
+    InvalidDataError
+        If the movement leaves the finite numbers.
+    """
+    check_at_least("steps", steps, 1)
+    check_at_least("dt", dt, 0.0, strict=True)
+    single = np.ndim(start) == 1
+    state = as_matrix(np.atleast_2d(np.asarray(start, dtype=np.float64)), "start").copy()
+    runs, n = state.shape
+    apart = None if constraint is None or callable(constraint) else list(constraint)
+    if apart is not None and len(apart) != runs:
+        raise SettingError(f"constraint: got {len(apart)} constraints for {runs} starts, expected one for each.")
+    shape = (runs, steps, n)
+    states, actions, wanted, projections = (np.empty(s) for s in (shape, shape, shape, (*shape, n)))
+    times = dt * np.arange(steps)
+    for step in range(steps):
+        states[:, step] = state
+        wanted[:, step] = _action(policy, state)
+        now = np.full(runs, times[step])
+        if constraint is None:
+            projections[:, step] = np.eye(n)
+        elif apart is None:
+            projections[:, step] = null_space_projection(_matrix(constraint, state, now))
+        else:
+            rows = [_matrix(one, state[k : k + 1], now[k : k + 1]) for k, one in enumerate(apart)]
+            projections[:, step] = null_space_projection(np.concatenate(rows))
+        actions[:, step] = project(projections[:, step], wanted[:, step])
+        state = state + dt * actions[:, step]
+        if not np.isfinite(state).all():
+            raise InvalidDataError(
+                f"the movement left the finite numbers at step {step}: start nearer to the data or take a smaller dt."
+            )
+    demos = [
+        Demonstration(
+            states[k], actions[k], times, Truth(wanted[k], projections[k]), name if single else f"{name} {k + 1}"
+        )
+        for k in range(runs)
+    ]
+    return demos[0] if single else demos
+
+
+def _action(policy: Callable[[Array], Array], state: Array) -> Array:
+    action = np.asarray(policy(state))
+    if action.shape != state.shape:
+        raise SettingError(
+            f"policy: got actions of shape {action.shape} for states of shape {state.shape}; a rollout expects "
+            "actions that are velocities of the state."
+        )
+    return action
+
+
+def _matrix(constraint: object, state: Array, time: Array) -> Array:
+    matrix = np.asarray(constraint(state, time))  # type: ignore[operator]
+    if matrix.ndim != 3 or matrix.shape[0] != len(state) or matrix.shape[2] != state.shape[1]:
+        raise SettingError(
+            f"constraint: got A of shape {matrix.shape} for {len(state)} states, "
+            f"expected ({len(state)}, k, {state.shape[1]})."
+        )
+    return matrix

@@ -1,0 +1,223 @@
+"""A policy, with its moments, in one file that runs nothing when it is opened.
+
+The file is a NumPy ``.npz`` of plain arrays and one JSON header. The header
+names classes from a fixed list; arrays are never unpickled; a digest over
+everything shows damage. Writing goes to a new file that takes the old one's
+place in one step.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import features, learners, moments, policies, receptive_fields, validation
+from .errors import ModelFileError, UnconstrainError
+from .policies import Policy
+
+__all__ = ["VERSION", "load", "load_notes", "register", "save"]
+
+VERSION = 1
+"""Of the file format. Older files stay readable; newer ones are refused."""
+
+_FORMAT = "unconstrain-policy"
+_HEADER = "header"
+
+_KNOWN: dict[str, type] = {
+    kind.__name__: kind
+    for kind in (
+        features.Affine,
+        features.NormalisedRBF,
+        features.KMeansRBF,
+        learners.Direct,
+        learners.Hybrid,
+        learners.Inconsistency,
+        learners.Solution,
+        moments.Moments,
+        policies.LocallyLinearPolicy,
+        policies.ParametricPolicy,
+        receptive_fields.ReceptiveFields,
+        validation.FoldedMoments,
+        validation.Folds,
+        validation.HeldOut,
+        validation.Splitter,
+    )
+}
+
+
+def register(kind: type) -> type:
+    """Let a dataclass of your own, such as a feature map, be stored; usable as a decorator.
+
+    It has to be registered before a file that holds it is loaded, too.
+
+    Raises
+    ------
+    ModelFileError
+        If it is no dataclass, or the name is taken by another class.
+    """
+    if not is_dataclass(kind) or _KNOWN.get(kind.__name__, kind) is not kind:
+        raise ModelFileError(f"{kind.__name__}: expected a dataclass whose name is not taken by another.")
+    _KNOWN[kind.__name__] = kind
+    return kind
+
+
+def save(policy: Policy, path: str | os.PathLike[str], notes: Mapping[str, Any] | None = None) -> None:
+    """Write a fitted policy to a file, whole or not at all.
+
+    Parameters
+    ----------
+    policy : Policy
+        Fitted or not. Its moments go along, so that it can learn on.
+    path : str or path-like
+        Usually ends in ``.npz``. An existing file is replaced in one step.
+    notes : mapping, optional
+        Anything that JSON can say, kept beside the policy.
+
+    Raises
+    ------
+    ModelFileError
+        If part of the policy is of a class that is not known here, or the
+        place cannot be written to.
+    """
+    arrays: dict[str, np.ndarray[Any, Any]] = {}
+    content = {"policy": _pack(policy, arrays), "notes": dict(notes or {})}
+    header = {"format": _FORMAT, "version": VERSION, "content": content}
+    header["digest"] = _digest(header, arrays)
+    target = Path(path)
+    try:
+        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".part")
+    except OSError as error:
+        raise ModelFileError(f"{target}: cannot be written ({error.strerror}).") from error
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            np.savez_compressed(stream, **{_HEADER: np.array(json.dumps(header))}, **arrays)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.chmod(temporary, 0o666 & ~_umask())
+        os.replace(temporary, target)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def load(path: str | os.PathLike[str]) -> Policy:
+    """Read a policy from a file.
+
+    Raises
+    ------
+    ModelFileError
+        If the file does not exist, is damaged, of a newer version, or not ours.
+    """
+    header, arrays = _read(path)
+    try:
+        policy = _unpack(header["content"]["policy"], arrays)
+    except (KeyError, TypeError, ValueError, AttributeError, UnconstrainError) as error:
+        raise ModelFileError(f"{path}: the policy in it is not complete ({error}).") from error
+    if not isinstance(policy, Policy):
+        raise ModelFileError(f"{path}: holds a {type(policy).__name__}, expected a policy.")
+    return policy
+
+
+def load_notes(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read the notes that were saved beside a policy; raises as :func:`load` does."""
+    header, _ = _read(path)
+    return dict(header["content"]["notes"])
+
+
+def _pack(value: Any, arrays: dict[str, np.ndarray[Any, Any]]) -> Any:
+    """Turn a value into JSON, laying arrays aside."""
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, np.generic):
+        return _pack(value.item(), arrays)
+    if isinstance(value, np.ndarray):
+        if value.dtype == object:
+            value = value.astype(str)
+        name = f"array{len(arrays)}"
+        arrays[name] = value
+        return {"array": name}
+    if isinstance(value, range):
+        return {"range": [value.start, value.stop, value.step]}
+    if isinstance(value, list | tuple):
+        return {"list": [_pack(item, arrays) for item in value]}
+    if isinstance(value, dict):
+        return {"pairs": [[_pack(key, arrays), _pack(item, arrays)] for key, item in value.items()]}
+    kind = type(value)
+    if _KNOWN.get(kind.__name__) is not kind:
+        raise ModelFileError(
+            f"cannot store a {kind.__name__}: only classes that are known by name can be read back without running "
+            f"code. Known are {', '.join(sorted(_KNOWN))}; add a dataclass of your own with storage.register."
+        )
+    parts = {field.name: getattr(value, field.name) for field in fields(value)} if is_dataclass(value) else vars(value)
+    return {"class": kind.__name__, "parts": {name: _pack(part, arrays) for name, part in parts.items()}}
+
+
+def _unpack(value: Any, arrays: Mapping[str, np.ndarray[Any, Any]]) -> Any:
+    """Undo :func:`_pack`."""
+    if not isinstance(value, dict):
+        return value
+    if "array" in value:
+        return arrays[value["array"]]
+    if "range" in value:
+        return range(*value["range"])
+    if "list" in value:
+        return tuple(_unpack(item, arrays) for item in value["list"])
+    if "pairs" in value:
+        return {_unpack(key, arrays): _unpack(item, arrays) for key, item in value["pairs"]}
+    kind = _KNOWN[value["class"]]
+    parts = {name: _unpack(part, arrays) for name, part in value["parts"].items()}
+    if is_dataclass(kind):
+        return kind(**parts)
+    made = kind.__new__(kind)
+    vars(made).update(parts)
+    return made
+
+
+def _read(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str, np.ndarray[Any, Any]]]:
+    """Header and arrays of a file, checked."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        header = json.loads(str(arrays.pop(_HEADER)))
+        ours = header["format"] == _FORMAT
+        version, digest = int(header["version"]), header.pop("digest")
+    except FileNotFoundError as error:
+        raise ModelFileError(f"{path}: no such file.") from error
+    except (OSError, EOFError, MemoryError, zipfile.BadZipFile, zlib.error, NotImplementedError) as error:
+        raise ModelFileError(f"{path}: is no policy file, or a damaged one ({error}).") from error
+    except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
+        raise ModelFileError(f"{path}: was not written by unconstrain ({error}).") from error
+    if not ours:
+        raise ModelFileError(f"{path}: was not written by unconstrain, or holds something else than a policy.")
+    if version > VERSION:
+        raise ModelFileError(
+            f"{path}: is of format version {version}, and this release reads up to {VERSION}. Upgrade unconstrain."
+        )
+    if digest != _digest(header, arrays):
+        raise ModelFileError(f"{path}: is damaged: its content does not match its digest. Save the policy anew.")
+    return header, arrays
+
+
+def _digest(header: Mapping[str, Any], arrays: Mapping[str, np.ndarray[Any, Any]]) -> str:
+    said = hashlib.sha256(json.dumps(header, sort_keys=True).encode())
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        said.update(f"{name}{array.dtype.str}{array.shape}".encode())
+        said.update(array.tobytes())
+    return said.hexdigest()
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

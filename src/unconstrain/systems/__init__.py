@@ -1,0 +1,1 @@
+"""What demonstrates: simulated demonstrators with a known policy."""

@@ -1,0 +1,516 @@
+"""Recordings become demonstrations; what was mended on the way is announced."""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from unconstrain.demonstration import Demonstration, Recording
+from unconstrain.errors import InvalidDataError, SettingError
+from unconstrain.preparation import (
+    Gap,
+    PreparationWarning,
+    Recipe,
+    differentiate,
+    find_gaps,
+    guess_recipe,
+    prepare,
+    resample,
+    survey,
+    trim,
+)
+from unconstrain.readers import read
+
+DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))
+needs_data = pytest.mark.skipif(
+    not DATA.is_dir(), reason=f"no real recordings in {DATA}; set UNCONSTRAIN_DATA to a folder that holds them"
+)
+
+TURN = 3.0  # rad/s
+RADIUS = 0.06  # m
+
+
+def circle(times: np.ndarray) -> np.ndarray:
+    return RADIUS * np.column_stack([np.cos(TURN * times), np.sin(TURN * times)])
+
+
+def circle_velocity(times: np.ndarray) -> np.ndarray:
+    return RADIUS * TURN * np.column_stack([-np.sin(TURN * times), np.cos(TURN * times)])
+
+
+def wiping(times: np.ndarray) -> Recording:
+    return Recording(("x", "y"), circle(times), times, "wipe")
+
+
+def only(demonstrations: list[Demonstration]) -> Demonstration:
+    [demonstration] = demonstrations
+    return demonstration
+
+
+STEADY = np.arange(0, 4, 0.01)
+JITTERED = STEADY + np.random.default_rng(0).uniform(-0.003, 0.003, len(STEADY))
+TORN = STEADY[(STEADY < 1.5) | (STEADY > 2.2)]
+
+
+# -------------------------------------------------------------------------------------------------- differentiation
+
+
+@pytest.mark.parametrize(("method", "worst"), [("savgol", 2e-3), ("central", 2e-4)])
+def test_the_velocity_of_a_circle_is_found(method: str, worst: float) -> None:
+    velocity = differentiate(STEADY, circle(STEADY), method, window_s=0.25, order=3)
+    inside = slice(13, -13)
+    assert np.abs(velocity - circle_velocity(STEADY))[inside].max() < worst * RADIUS * TURN
+    assert np.abs(velocity - circle_velocity(STEADY)).max() < 0.04 * RADIUS * TURN
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_a_polynomial_of_the_filters_degree_is_differentiated_exactly_up_to_the_ends(order: int) -> None:
+    times = np.arange(50) / 20
+    velocity = differentiate(times, times[:, None] ** order, order=order)
+    np.testing.assert_allclose(velocity[:, 0], order * times ** (order - 1), atol=1e-9)
+
+
+def test_central_differences_are_exact_for_parabolas_at_any_stamps() -> None:
+    times = np.sort(np.random.default_rng(1).uniform(0, 1, 30))
+    velocity = differentiate(times, np.column_stack([times**2, times]), "central")
+    np.testing.assert_allclose(velocity, np.column_stack([2 * times, np.ones(30)]), atol=1e-9)
+
+
+def test_smoothing_beats_differences_on_noise() -> None:
+    noisy = circle(STEADY) + np.random.default_rng(2).normal(0, 1e-3, (len(STEADY), 2))
+    errors = {
+        method: np.linalg.norm(differentiate(STEADY, noisy, method) - circle_velocity(STEADY))
+        for method in ("savgol", "central")
+    }
+    assert errors["savgol"] < errors["central"] / 5
+
+
+def test_a_window_shorter_than_the_polynomial_needs_is_widened() -> None:
+    times = np.arange(10.0)
+    np.testing.assert_allclose(differentiate(times, times[:, None], window_s=0.01), 1)
+
+
+@pytest.mark.parametrize(
+    ("times", "method", "sentence"),
+    [
+        ([0, 1, 1, 2, 3], "savgol", "times: got 1.0 after 1.0 at row 2, expected them to increase."),
+        ([0, 1], "central", "positions: got 2 samples, expected at least 3 to differentiate them."),
+        ([0, 1, 2, 3.5, 4, 5], "savgol", "times: got irregular stamps, expected uniform ones. Use resample() before"),
+    ],
+)
+def test_stamps_that_cannot_be_differentiated_are_refused(times: list[float], method: str, sentence: str) -> None:
+    with pytest.raises(InvalidDataError) as caught:
+        differentiate(np.array(times), np.ones((len(times), 1)), method)
+    assert sentence in str(caught.value)
+
+
+def test_an_unknown_method_lists_the_known_ones() -> None:
+    with pytest.raises(SettingError, match="differentiate: got 'kalman', expected one of savgol, central"):
+        differentiate(STEADY, circle(STEADY), "kalman")
+
+
+# ------------------------------------------------------------------------------------------------------- resampling
+
+
+@given(st.floats(0.5, 200), st.integers(2, 40), st.integers(0, 1000))
+def test_resampling_keeps_straight_lines_and_stays_inside(rate: float, count: int, seed: int) -> None:
+    times = np.cumsum(np.random.default_rng(seed).uniform(0.01, 0.2, count))
+    grid, values = resample(times, np.column_stack([3 * times - 1, -times]), rate)
+    np.testing.assert_allclose(values, np.column_stack([3 * grid - 1, -grid]), atol=1e-6)
+    np.testing.assert_allclose(np.diff(grid), 1 / rate)
+    assert grid[0] == times[0]
+    assert times[-1] - 1 / rate < grid[-1] < times[-1] + 1e-5 / rate
+
+
+def test_resampling_to_the_same_rate_changes_nothing() -> None:
+    times, values = resample(STEADY, circle(STEADY), 100)
+    assert times is STEADY
+    np.testing.assert_array_equal(values, circle(STEADY))
+
+
+def test_rates_that_make_no_sense_are_refused() -> None:
+    with pytest.raises(SettingError, match="rate: got 0, expected a number above 0"):
+        resample(STEADY, circle(STEADY), 0)
+    with pytest.raises(SettingError, match=r"rate: got 1e\+12 Hz for 3.99 s, that is 3.99e\+12 samples. Take less."):
+        resample(STEADY, circle(STEADY), 1e12)
+
+
+# --------------------------------------------------------------------------------------------------------- trimming
+
+
+def test_trimming_takes_seconds_from_both_ends() -> None:
+    demonstration = Demonstration(circle(STEADY), circle_velocity(STEADY), STEADY)
+    trimmed = trim(demonstration, 0.5, 1.0)
+    assert trimmed.times is not None
+    np.testing.assert_allclose(trimmed.times[[0, -1]], [0.5, 2.99])
+
+
+def test_trimming_what_is_still_leaves_pauses_inside() -> None:
+    actions = np.array([0, 0, 1, 0, 2, 0.01])[:, None]
+    trimmed = trim(Demonstration(np.arange(6.0)[:, None], actions), still=0.1)
+    np.testing.assert_array_equal(trimmed.states[:, 0], [2, 3, 4])
+
+
+def test_trimming_everything_or_without_times_is_refused() -> None:
+    timeless = Demonstration(np.ones((3, 1)), np.ones((3, 1)), name="wipe")
+    with pytest.raises(InvalidDataError, match=r"'wipe': nothing is left after trimming .* slower than 5\. Trim less"):
+        trim(timeless, still=5)
+    with pytest.raises(SettingError, match="'wipe' has no times to trim by"):
+        trim(timeless, 1)
+
+
+# ------------------------------------------------------------------------------------------------------ preparation
+
+
+def test_positions_become_states_and_velocities() -> None:
+    demonstration = only(prepare(wiping(STEADY)))
+    assert demonstration.name == "wipe"
+    np.testing.assert_array_equal(demonstration.states, circle(STEADY))
+    np.testing.assert_array_equal(demonstration.actions, differentiate(STEADY, circle(STEADY)))
+    np.testing.assert_array_equal(demonstration.times, STEADY)
+
+
+def test_recorded_actions_are_taken_as_they_are() -> None:
+    recording = Recording(("x", "u"), np.array([[1.0, 2], [3, 4]]), None, "a")
+    demonstration = only(prepare([recording], Recipe(states=("x",), actions=("u",))))
+    np.testing.assert_array_equal(demonstration.states, [[1], [3]])
+    np.testing.assert_array_equal(demonstration.actions, [[2], [4]])
+    assert demonstration.times is None
+
+
+def test_a_recording_without_times_takes_its_rate_from_the_recipe() -> None:
+    demonstration = only(prepare(Recording(("x", "y"), circle(STEADY)), Recipe(rate=100)))
+    np.testing.assert_allclose(demonstration.times, STEADY)
+    np.testing.assert_allclose(demonstration.actions, differentiate(STEADY, circle(STEADY)), atol=1e-12)
+
+
+def test_velocities_are_taken_at_the_full_rate_and_then_resampled() -> None:
+    demonstration = only(prepare(wiping(STEADY), Recipe(rate=20)))
+    assert demonstration.times is not None
+    np.testing.assert_allclose(np.diff(demonstration.times), 0.05)
+    np.testing.assert_allclose(demonstration.actions, differentiate(STEADY, circle(STEADY))[::5], atol=1e-12)
+
+
+def test_recorded_actions_are_resampled_with_the_states() -> None:
+    recording = Recording(("x", "vx"), np.column_stack([STEADY, 2 * STEADY]), STEADY)
+    demonstration = only(prepare(recording, Recipe(rate=7)))
+    np.testing.assert_allclose(demonstration.actions, 2 * demonstration.states, atol=1e-12)
+
+
+def test_centring_subtracts_the_mean_of_each_demonstration() -> None:
+    far = Recording(("x", "y"), circle(STEADY) + [5, -3], STEADY, "far")
+    for demonstration in prepare([wiping(STEADY), far], Recipe(centre=True)):
+        np.testing.assert_allclose(demonstration.states.mean(axis=0), 0, atol=1e-12)
+
+
+def test_preparation_trims() -> None:
+    demonstration = only(prepare(wiping(STEADY), Recipe(trim=(1, 1))))
+    assert demonstration.times is not None
+    np.testing.assert_allclose(demonstration.times[[0, -1]], [1, 2.99])
+    pause = np.concatenate([np.zeros(50), np.arange(100) * 0.01, np.ones(50)])
+    moving = Recording(("x", "y"), np.column_stack([pause, pause]), np.arange(200) * 0.01)
+    assert 95 < len(only(prepare(moving, Recipe(still=0.3)))) < 130
+
+
+def test_irregular_stamps_are_resampled_and_announced() -> None:
+    with pytest.warns(PreparationWarning, match=r"^'wipe': time stamps are irregular, so it was resampled to its med"):
+        demonstration = only(prepare(wiping(JITTERED)))
+    assert demonstration.times is not None
+    assert np.ptp(np.diff(demonstration.times)) < 1e-9
+    error = np.abs(demonstration.actions - circle_velocity(demonstration.times))
+    assert error[13:-13].max() < 0.01 * RADIUS * TURN
+
+
+def test_central_differences_take_irregular_stamps_as_they_are() -> None:
+    demonstration = only(prepare(wiping(JITTERED), Recipe(differentiate="central")))
+    np.testing.assert_array_equal(demonstration.times, JITTERED)
+
+
+def test_intervals_that_drift_by_less_than_irregular_are_differentiated() -> None:
+    intervals = np.where(np.arange(399) < 150, 0.01 * 0.991, 0.01)
+    intervals[100:110] = 0.01 * 1.0095
+    times = np.concatenate([[0], np.cumsum(intervals)])
+    times[151:] += 1
+    with pytest.warns(PreparationWarning, match="1 gap "):
+        demonstration = only(prepare(wiping(times)))
+    assert np.abs(demonstration.actions - circle_velocity(times)).max() < 0.06 * RADIUS * TURN
+
+
+def test_nothing_is_smoothed_across_a_gap() -> None:
+    with pytest.warns(PreparationWarning) as caught:
+        demonstration = only(prepare(wiping(TORN)))
+    assert [str(warning.message) for warning in caught] == [
+        "'wipe': 1 gap in the time stamps, the longest 0.72 s after 1.49 s; nothing is smoothed or interpolated across."
+    ]
+    assert caught[0].filename == __file__
+    cut = 150
+    np.testing.assert_array_equal(demonstration.times, TORN)
+    np.testing.assert_allclose(demonstration.actions[:cut], differentiate(TORN[:cut], circle(TORN[:cut])), atol=1e-12)
+    np.testing.assert_allclose(demonstration.actions[cut:], differentiate(TORN[cut:], circle(TORN[cut:])), atol=1e-12)
+
+
+def test_nothing_is_interpolated_across_a_gap() -> None:
+    with pytest.warns(PreparationWarning, match="1 gap "):
+        demonstration = only(prepare(wiping(TORN), Recipe(rate=20)))
+    assert demonstration.times is not None
+    assert not ((demonstration.times > 1.495) & (demonstration.times < 2.205)).any()
+    assert np.abs(np.linalg.norm(demonstration.states, axis=1) - RADIUS).max() < 1e-5
+
+
+def test_pieces_too_short_for_the_window_are_left_out_and_announced() -> None:
+    times = STEADY[(STEADY < 1.5) | ((STEADY > 2.0) & (STEADY < 2.1)) | (STEADY > 3)]
+    with pytest.warns(PreparationWarning) as caught:
+        demonstration = only(prepare(wiping(times)))
+    assert "2 gaps in the time stamps, the longest 0.92 s after 2.09 s" in str(caught[0].message)
+    assert "1 of 3 pieces between gaps have fewer than 25 samples and were left out." in str(caught[1].message)
+    assert demonstration.times is not None
+    assert not ((demonstration.times > 1.5) & (demonstration.times < 3)).any()
+
+
+def test_what_counts_as_a_gap_can_be_said() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        demonstration = only(prepare(wiping(TORN), Recipe(differentiate="central", max_gap_s=2)))
+    assert len(demonstration) == len(TORN)
+
+
+def test_a_recording_with_no_piece_long_enough_is_refused() -> None:
+    with pytest.raises(InvalidDataError, match=r"'wipe': got at most 9 samples in a row, expected at least 25 to diff"):
+        prepare(wiping(STEADY[:9]))
+
+
+def test_a_single_sample_can_be_taken_but_not_differentiated() -> None:
+    recording = Recording(("x", "y", "vx", "vy"), np.ones((1, 4)), np.zeros(1), "a")
+    assert len(only(prepare(recording, Recipe(rate=10)))) == 1
+    with pytest.raises(InvalidDataError, match="'a': got at most 1 samples in a row, expected at least 5"):
+        prepare(recording, Recipe(differentiate="savgol"))
+
+
+def test_rows_that_repeat_a_stamp_are_left_out_and_announced() -> None:
+    times = np.insert(STEADY, 100, STEADY[99])
+    states = np.insert(circle(STEADY), 100, 77, axis=0)
+    recording = Recording(("x", "y", "vx", "vy"), np.hstack([states, states]), times, "wipe")
+    sentence = "'wipe': 1 rows repeat the time stamp of the row before and were left out."
+    for recipe in (Recipe(), Recipe(states=("x", "y"), differentiate="savgol")):
+        with pytest.warns(PreparationWarning) as caught:
+            demonstration = only(prepare(recording, recipe))
+        assert [str(warning.message) for warning in caught] == [sentence]
+        np.testing.assert_array_equal(demonstration.states, circle(STEADY))
+
+
+def test_stamps_that_run_backwards_are_refused_with_their_row() -> None:
+    times = STEADY.copy()
+    times[7] = 0.02
+    with pytest.raises(InvalidDataError, match=r"'wipe', row 7: got time 0\.02 s after 0\.06 s, expected later ones"):
+        prepare(wiping(times))
+
+
+def test_stamps_that_are_missing_are_refused_with_their_row() -> None:
+    times = STEADY.copy()
+    times[7] = np.nan
+    with pytest.raises(InvalidDataError, match=r"times of 'wipe': found nan at row 7"):
+        prepare(wiping(times))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_missing_cell_is_refused_only_in_selected_columns(bad: float) -> None:
+    values = np.ones((3, 3))
+    values[1, 1] = bad
+    recording = Recording(("x", "force", "vx"), values, None, "wipe")
+    assert len(only(prepare(recording))) == 3
+    with pytest.raises(InvalidDataError, match=r"'wipe', row 1, column 'force': found (nan|inf) \(1 such cells in the"):
+        prepare(recording, Recipe(states=("x", "force"), actions=("vx",)))
+
+
+def test_differentiating_without_times_says_how_to_give_them() -> None:
+    with pytest.raises(SettingError, match=r"'wipe' has no times, which are needed to differentiate: name the time co"):
+        prepare(Recording(("x", "y"), circle(STEADY), None, "wipe"))
+
+
+def test_preparing_nothing_is_refused() -> None:
+    with pytest.raises(InvalidDataError, match="got no recording, expected at least one"):
+        prepare([])
+
+
+def test_a_column_missing_in_a_later_recording_is_named() -> None:
+    with pytest.raises(InvalidDataError, match=r"'b' has no column 'y'; it has x, z\."):
+        prepare([wiping(STEADY), Recording(("x", "z"), circle(STEADY), STEADY, "b")])
+
+
+# ---------------------------------------------------------------------------------------------------------- recipes
+
+
+def columns(*names: str) -> Recording:
+    return Recording(names, np.ones((2, len(names))), None, "wipe")
+
+
+@pytest.mark.parametrize(
+    ("names", "states", "actions"),
+    [
+        ("x y vx vy fx", "x y", "vx vy"),
+        ("q1 q2 dq1 dq2", "q1 q2", "dq1 dq2"),
+        ("x dx ddx", "x", "dx"),
+        ("a a_dot b b_dot", "a b", "a_dot b_dot"),
+        ("dot_a a", "a", "dot_a"),
+        ("x y z xdot ydot zdot", "x y z", "xdot ydot zdot"),
+        ("x1 x2 x3 u1 u2", "x1 x2 x3", "u1 u2"),
+    ],
+)
+def test_usual_names_tell_states_and_actions(names: str, states: str, actions: str) -> None:
+    recipe = guess_recipe(columns(*names.split()))
+    assert recipe == Recipe(states=tuple(states.split()), actions=tuple(actions.split()))
+
+
+@pytest.mark.parametrize("names", ["x y z qx qy qz qw fx fy fz", "x y", "w z y x"])
+def test_positions_alone_are_differentiated(names: str) -> None:
+    expected = ("x", "y", "z") if "z" in names else ("x", "y")
+    assert guess_recipe(columns(*names.split())) == Recipe(states=expected, differentiate="savgol")
+
+
+def test_what_is_said_is_not_guessed() -> None:
+    recording = columns("x", "y", "vx", "vy", "x1")
+    assert prepare(recording, Recipe(states=("y",)))[0].actions.shape == (2, 1)
+    recording = columns("x1", "x2")
+    with pytest.raises(SettingError, match=r"'wipe' has no times"):
+        prepare(recording, Recipe(differentiate="central"))
+
+
+@pytest.mark.parametrize(
+    ("names", "recipe", "what"),
+    [
+        ("a b c", Recipe(), "states and actions"),
+        ("x1 x2", Recipe(), "the actions"),
+        ("a b c", Recipe(actions=("a",)), "states and actions"),
+        ("x y a b", Recipe(states=("a", "b")), "the actions"),
+    ],
+)
+def test_names_that_tell_nothing_are_refused_with_what_to_say(names: str, recipe: Recipe, what: str) -> None:
+    with pytest.raises(SettingError) as caught:
+        prepare(columns(*names.split()), recipe)
+    assert f"'wipe': cannot tell {what} from its columns {', '.join(names.split())}." in str(caught.value)
+    assert "(--state, --action)" in str(caught.value)
+
+
+@given(
+    st.builds(
+        Recipe,
+        states=st.none() | st.lists(st.text(min_size=1), min_size=1, max_size=4, unique=True).map(tuple),
+        differentiate=st.sampled_from([None, "savgol", "central"]),
+        window_s=st.floats(1e-3, 10),
+        order=st.sampled_from([2, 3]),
+        rate=st.none() | st.floats(1e-3, 1e4),
+        trim=st.none() | st.tuples(st.floats(0, 9), st.floats(0, 9)),
+        still=st.none() | st.floats(0, 1),
+        centre=st.booleans(),
+        max_gap_s=st.none() | st.floats(1e-3, 10),
+    )
+)
+def test_a_recipe_survives_json(recipe: Recipe) -> None:
+    assert Recipe.from_dict(json.loads(json.dumps(recipe.to_dict()))) == recipe
+
+
+@pytest.mark.parametrize(
+    ("values", "sentence"),
+    [
+        ({"window": 1}, "recipe: got 'window', expected only states, actions, differentiate, window_s"),
+        ({"order": 7}, "order: got 7, expected one of 2, 3."),
+        ({"window_s": None}, "window_s: got None, expected a number above 0."),
+        ({"rate": 0}, "rate: got 0, expected a number above 0."),
+        ({"rate": "fast"}, "rate: got 'fast', expected a number above 0."),
+        ({"trim": 3}, "trim: got 3, expected two numbers, seconds at the start and at the end."),
+        ({"trim": [1, -1]}, "trim: got -1, expected a number of at least 0."),
+        ({"still": -1}, "still: got -1, expected a number of at least 0."),
+        ({"centre": "yes"}, "centre: got 'yes', expected one of False, True."),
+        ({"states": []}, "states: got [], expected names of columns, at least one and each once."),
+        ({"states": 5}, "states: got 5, expected names of columns"),
+        ({"actions": ["a", "a"]}, "actions: got ['a', 'a'], expected names of columns"),
+        ({"actions": ["u"], "differentiate": "savgol"}, "got actions u and differentiate='savgol', expected one"),
+    ],
+)
+def test_a_recipe_that_makes_no_sense_is_refused(values: dict[str, object], sentence: str) -> None:
+    with pytest.raises(SettingError) as caught:
+        Recipe.from_dict(values)
+    assert sentence in str(caught.value)
+
+
+def test_one_column_needs_no_tuple() -> None:
+    assert Recipe(states="x").states == ("x",)  # type: ignore[arg-type]
+
+
+# ---------------------------------------------------------------------------------------------------------- surveys
+
+
+def test_a_survey_tells_what_is_there() -> None:
+    times = np.delete(np.arange(100) * 0.02, slice(40, 60))
+    values = np.ones((80, 4))
+    values[3, 0], values[4, 0], values[[1, 2], 2:] = np.nan, np.inf, 0
+    found = survey(Recording(("x", "y", "vx", "vy"), values, times, "wipe"))
+    assert (found.name, found.samples, found.columns) == ("wipe", 80, ("x", "y", "vx", "vy"))
+    assert found.duration_s == pytest.approx(1.98)
+    assert found.rate_hz == pytest.approx(50)
+    assert found.jitter == pytest.approx(0, abs=1e-9)
+    assert found.gaps == (Gap(pytest.approx(0.78), pytest.approx(0.42)),)
+    assert found.non_increasing == ()
+    assert found.missing == {"x": 2}
+    assert found.zero_actions == 2
+
+
+def test_a_survey_refuses_nothing() -> None:
+    times = np.array([0, 1, 1, np.nan, 3, 2])
+    found = survey(Recording(("a", "b"), np.full((6, 2), np.nan), times, "bad"))
+    assert found.non_increasing == (2, 3, 4, 5)
+    assert found.missing == {"a": 6, "b": 6}
+    assert found.zero_actions is None
+    empty = survey(Recording(("a",), np.empty((0, 1)), np.empty(0)))
+    assert (empty.samples, empty.duration_s, empty.rate_hz, empty.jitter, empty.gaps) == (0, None, None, None, ())
+
+
+def test_a_survey_without_times_knows_the_rate_only_from_the_recipe() -> None:
+    recording = columns("x", "y")
+    assert survey(recording).duration_s is None
+    assert survey(recording, Recipe(rate=4)).duration_s == 0.25
+    assert survey(recording, Recipe(states=("x",), actions=("gone",))).zero_actions is None
+
+
+@given(st.integers(0, 10_000))
+def test_jitter_is_the_spread_of_the_intervals(seed: int) -> None:
+    intervals = np.random.default_rng(seed).uniform(0.9, 1.1, 50)
+    times = np.concatenate([[0], np.cumsum(intervals)])
+    found = survey(Recording(("x",), np.ones((51, 1)), times))
+    assert found.jitter == pytest.approx(intervals.std() / np.median(intervals))
+
+
+def test_gaps_are_longer_than_five_usual_intervals() -> None:
+    times = np.array([0, 1, 2, 7, 8, 13.5, 14.5])
+    assert find_gaps(times) == (Gap(8.0, 5.5),)
+    assert find_gaps(times, 4) == (Gap(2.0, 5.0), Gap(8.0, 5.5))
+    assert find_gaps(np.zeros(1)) == ()
+
+
+# -------------------------------------------------------------------------------------------------- real recordings
+
+
+@needs_data
+@pytest.mark.filterwarnings("ignore::unconstrain.preparation.PreparationWarning")
+def test_a_tracked_finger_tip_moves_as_its_positions_say() -> None:
+    recordings = read(DATA / "ccl_trakstar_planar" / "planer_circle_unflipped.csv")
+    demonstration = only(prepare(recordings, Recipe(states=("x", "y", "z"), differentiate="savgol", rate=20)))
+    assert demonstration.times is not None
+    moved = demonstration.states[-1] - demonstration.states[0]
+    np.testing.assert_allclose(np.trapezoid(demonstration.actions, demonstration.times, axis=0), moved, atol=5e-3)
+
+
+@needs_data
+def test_a_survey_of_a_tracked_finger_tip_finds_fifty_hertz() -> None:
+    found = survey(read(DATA / "ccl_trakstar_planar" / "planer_circle.csv")[0])
+    assert found.samples == 3060
+    assert found.rate_hz == pytest.approx(50, rel=0.02)
+    assert found.duration_s == pytest.approx(61, rel=0.02)
+    assert found.missing == {}
