@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
 
 from unconstrain.demonstration import Demonstration, Recording
-from unconstrain.errors import InvalidDataError, SettingError
+from unconstrain.errors import InvalidDataError, SettingError, UnconstrainError
 from unconstrain.preparation import (
     Gap,
     PreparationWarning,
@@ -205,7 +206,7 @@ def test_recorded_actions_are_resampled_with_the_states() -> None:
 
 
 def test_centring_subtracts_the_mean_of_each_demonstration() -> None:
-    far = Recording(("x", "y"), circle(STEADY) + [5, -3], STEADY, "far")
+    far = Recording(("x", "y"), circle(STEADY) + np.array([5, -3]), STEADY, "far")
     for demonstration in prepare([wiping(STEADY), far], Recipe(centre=True)):
         np.testing.assert_allclose(demonstration.states.mean(axis=0), 0, atol=1e-12)
 
@@ -316,7 +317,7 @@ def test_stamps_that_are_missing_are_refused_with_their_row() -> None:
     times = STEADY.copy()
     times[7] = np.nan
     with pytest.raises(InvalidDataError, match=r"times of 'wipe': found nan at row 7"):
-        prepare(wiping(times))
+        prepare(Recording(("x", "y"), circle(STEADY), times, "wipe"))
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
@@ -335,6 +336,8 @@ def test_differentiating_without_times_says_how_to_give_them() -> None:
 
 
 def test_preparing_nothing_is_refused() -> None:
+    with pytest.raises(InvalidDataError, match="'empty' has no samples, expected at least one"):
+        prepare(Recording(("x", "y"), np.empty((0, 2)), np.empty(0), "empty"))
     with pytest.raises(InvalidDataError, match="got no recording, expected at least one"):
         prepare([])
 
@@ -429,6 +432,7 @@ def test_a_recipe_survives_json(recipe: Recipe) -> None:
         ({"still": -1}, "still: got -1, expected a number of at least 0."),
         ({"centre": "yes"}, "centre: got 'yes', expected one of False, True."),
         ({"states": []}, "states: got [], expected names of columns, at least one and each once."),
+        ({"states": [["x"], 2]}, "states: got [['x'], 2], expected names of columns"),
         ({"states": 5}, "states: got 5, expected names of columns"),
         ({"actions": ["a", "a"]}, "actions: got ['a', 'a'], expected names of columns"),
         ({"actions": ["u"], "differentiate": "savgol"}, "got actions u and differentiate='savgol', expected one"),
@@ -438,6 +442,16 @@ def test_a_recipe_that_makes_no_sense_is_refused(values: dict[str, object], sent
     with pytest.raises(SettingError) as caught:
         Recipe.from_dict(values)
     assert sentence in str(caught.value)
+
+
+def test_a_recipe_from_something_else_is_refused() -> None:
+    with pytest.raises(SettingError, match="recipe: got 5, expected a mapping of names to values"):
+        Recipe.from_dict(5)  # type: ignore[arg-type]
+
+
+def test_a_window_longer_than_anything_is_refused() -> None:
+    with pytest.raises(InvalidDataError, match="expected at least 100000001 to differentiate them"):
+        prepare(wiping(STEADY), Recipe(window_s=1e308))
 
 
 def test_one_column_needs_no_tuple() -> None:
@@ -492,6 +506,38 @@ def test_gaps_are_longer_than_five_usual_intervals() -> None:
     assert find_gaps(times) == (Gap(8.0, 5.5),)
     assert find_gaps(times, 4) == (Gap(2.0, 5.0), Gap(8.0, 5.5))
     assert find_gaps(np.zeros(1)) == ()
+
+
+numbers = st.floats() | st.floats(-5, 5) | st.integers(0, 20).map(float)
+
+
+@settings(deadline=None)
+@given(
+    values=hnp.arrays(np.float64, st.tuples(st.integers(0, 12), st.just(3)), elements=numbers),
+    stamps=st.none() | st.lists(numbers, min_size=12, max_size=12) | st.lists(numbers, min_size=12).map(sorted),
+    recipe=st.builds(
+        Recipe,
+        states=st.just(("x",)),
+        differentiate=st.sampled_from([None, "savgol", "central"]),
+        window_s=st.floats(1e-3, 10),
+        rate=st.none() | st.floats(1e-3, 1e4),
+        still=st.none() | st.floats(0, 1),
+        max_gap_s=st.none() | st.floats(1e-3, 1e3),
+    ),
+)
+@pytest.mark.filterwarnings("ignore")
+def test_any_numbers_give_a_finite_demonstration_or_one_of_our_errors(
+    values: np.ndarray, stamps: list[float] | None, recipe: Recipe
+) -> None:
+    times = None if stamps is None else np.array(stamps[: len(values)])
+    recording = Recording(("x", "y", "vx"), values, times, "any")
+    assert survey(recording, recipe).samples == len(values)
+    try:
+        demonstration = only(prepare(recording, recipe))
+    except UnconstrainError:
+        return
+    assert np.isfinite(demonstration.states).all()
+    assert np.isfinite(demonstration.actions).all()
 
 
 # -------------------------------------------------------------------------------------------------- real recordings

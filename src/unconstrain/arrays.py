@@ -8,6 +8,8 @@ features, ``P = d p`` weights, ``M`` models (receptive fields; 1 when global).
 from __future__ import annotations
 
 import importlib
+from collections.abc import Hashable, Sequence
+from numbers import Integral
 from types import ModuleType
 from typing import Any
 
@@ -16,9 +18,26 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import InvalidDataError, MissingExtraError, SettingError
 
-__all__ = ["Array", "as_matrix", "as_vector", "as_weights", "check_at_least", "require_extra"]
+__all__ = [
+    "LARGEST",
+    "SMALLEST_VARIANCE",
+    "Array",
+    "as_groups",
+    "as_matrix",
+    "as_table",
+    "as_vector",
+    "as_weights",
+    "check_at_least",
+    "require_extra",
+]
 
 Array = NDArray[np.float64]
+
+LARGEST = 1e100
+"""Numbers beyond this are refused: squares of sums of them must stay finite."""
+
+SMALLEST_VARIANCE = 1e-200
+"""Variances down to this are refused, and states that spread less count as one: their squares lose digits."""
 
 
 def as_matrix(values: ArrayLike, what: str) -> Array:
@@ -39,8 +58,8 @@ def as_matrix(values: ArrayLike, what: str) -> Array:
     Raises
     ------
     InvalidDataError
-        If it is ragged, not two-dimensional, empty, or holds NaN or infinity;
-        the message names the row and the column.
+        If it is ragged, not two-dimensional, empty, or holds NaN, infinity or a
+        number beyond :data:`LARGEST`; the message names the row and the column.
     """
     matrix = _as_real(values, what)
     if matrix.ndim != 2:
@@ -53,6 +72,24 @@ def as_matrix(values: ArrayLike, what: str) -> Array:
             f"{what}: got an empty array of shape {matrix.shape}, expected at least one row and one column."
         )
     return _finite(matrix, what)
+
+
+def as_table(values: ArrayLike, what: str) -> tuple[Array, bool]:
+    """Check a table, or a vector as a table of one column, and say whether it was a vector.
+
+    Returns
+    -------
+    table : ndarray, shape (N, k)
+    flat : bool
+
+    Raises
+    ------
+    InvalidDataError
+        As :func:`as_matrix` does.
+    """
+    array = _as_real(values, what)
+    flat = array.ndim == 1
+    return as_matrix(array[:, None] if flat else array, what), flat
 
 
 def as_vector(values: ArrayLike, what: str, length: int | None = None) -> Array:
@@ -88,20 +125,51 @@ def as_weights(values: ArrayLike | None, length: int) -> Array:
     return weights
 
 
-def check_at_least(name: str, value: Any, least: float, *, strict: bool = False) -> None:
-    """Check that a numeric setting is finite and not below a bound.
+def as_groups(values: Sequence[Hashable] | NDArray[np.generic], length: int) -> NDArray[np.generic]:
+    """Check names or numbers of demonstrations, one for each sample, shape (N,).
+
+    Raises
+    ------
+    InvalidDataError
+        If the number is wrong, or one of them is missing or cannot be compared with the others.
+    """
+    try:
+        names = np.asarray(values)
+    except ValueError as error:  # NumPy's word for rows of different lengths
+        raise InvalidDataError(f"groups: the values are of different lengths, expected {length} names.") from error
+    if names.shape != (length,):
+        raise InvalidDataError(f"groups: got an array of shape {names.shape}, expected {length}, one for each sample.")
+    if names.dtype.kind == "f" and np.isnan(names).any():
+        raise InvalidDataError(
+            f"groups: found nan at row {int(np.isnan(names).argmax())}, expected a name or a number."
+        )
+    if names.dtype.kind == "O":
+        try:
+            np.unique(names)
+        except TypeError as error:
+            raise InvalidDataError(
+                f"groups: got values that cannot be compared ({error}), expected names or numbers, none missing."
+            ) from error
+    return names
+
+
+def check_at_least(name: str, value: Any, least: float, *, strict: bool = False, whole: bool = False) -> None:
+    """Check that a numeric setting is finite, not below a bound and, on demand, a whole number.
 
     Raises
     ------
     SettingError
-        If it is no number, not finite, or below ``least`` (at it, when ``strict``).
+        If it is no number, not finite, below ``least`` (at it, when ``strict``) or not whole.
     """
     try:
-        good = np.isfinite(value) and (value > least if strict else value >= least)
-    except TypeError:
+        good = bool(np.isfinite(value)) and bool(value > least if strict else value >= least)
+    except (TypeError, ValueError):
+        good = False
+    if whole and not isinstance(value, Integral):
         good = False
     if not good:
-        raise SettingError(f"{name}: got {value!r}, expected a number {'above' if strict else 'of at least'} {least}.")
+        kind, bound = "a whole number" if whole else "a number", "above" if strict else "of at least"
+        raise SettingError(f"{name}: got {value!r}, expected {kind} {bound} {least}.")
 
 
 def require_extra(module: str, extra: str) -> ModuleType:
@@ -145,9 +213,19 @@ def _finite(values: Array, what: str) -> Array:
     bad = ~np.isfinite(values)
     if bad.any():
         where = np.argwhere(bad)
-        place = ", ".join(f"{axis} {index}" for axis, index in zip(("row", "column"), where[0], strict=False))
         raise InvalidDataError(
-            f"{what}: found {values[tuple(where[0])]} at {place} (NaN or infinity in {len(where)} places), "
+            f"{what}: found {values[tuple(where[0])]} at {_place(where[0])} (NaN or infinity in {len(where)} places), "
             "expected finite numbers. Remove or repair these rows first."
         )
+    large = np.abs(values) > LARGEST
+    if large.any():
+        where = np.argwhere(large)
+        raise InvalidDataError(
+            f"{what}: found {values[tuple(where[0])]} at {_place(where[0])}, expected numbers up to {LARGEST}. "
+            "Repair this row or take other units."
+        )
     return values
+
+
+def _place(index: NDArray[np.intp]) -> str:
+    return ", ".join(f"{axis} {number}" for axis, number in zip(("row", "column"), index, strict=False))

@@ -40,7 +40,7 @@ class Plane:
     def __post_init__(self) -> None:
         direction, length = unit_actions(as_vector(self.normal, "normal"))
         if length == 0.0:
-            raise SettingError(f"normal: got {list(np.ravel(self.normal))}, expected a vector that is not zero.")
+            raise SettingError(f"normal: got {np.ravel(self.normal).tolist()}, expected a vector that is not zero.")
         object.__setattr__(self, "normal", direction)
 
     def __call__(self, states: Array, times: Array) -> Array:
@@ -66,6 +66,8 @@ class SwitchingLine:
     def __post_init__(self) -> None:
         object.__setattr__(self, "directions", as_matrix(self.directions, "directions"))
         object.__setattr__(self, "switches", as_vector(self.switches, "switches", len(self.directions) - 1))
+        if (np.diff(self.switches) < 0).any():
+            raise SettingError(f"switches: got {self.switches.tolist()}, expected ascending times.")
 
     def __call__(self, states: Array, times: Array) -> Array:
         """Return A, shape (T, 1, d)."""
@@ -74,9 +76,7 @@ class SwitchingLine:
         return self.directions[stretch][:, None, :]
 
     @classmethod
-    def random(
-        cls, rng: np.random.Generator, duration: float, switches: int = 2, dimensions: int = 2
-    ) -> SwitchingLine:
+    def random(cls, rng: np.random.Generator, duration: float, switches: int = 2, dimensions: int = 2) -> SwitchingLine:
         """Draw every α from a standard normal, switching at regular intervals (section IV-A)."""
         directions = rng.standard_normal((switches + 1, dimensions))
         return cls(directions, duration * np.arange(1, switches + 1) / (switches + 1))
@@ -139,5 +139,3 @@ class JacobianRows:
     def __call__(self, states: Array, times: Array) -> Array:
         """Return A, shape (T, len(rows), n)."""
         return self.jacobian(states)[:, list(self.rows), :]
-
-

@@ -1,9 +1,7 @@
 """Recordings of others, fetched on request: nothing is downloaded without being asked for.
 
-The car-rim wiping was recorded at LASA, EPFL, for N. Figueroa and A. Billard,
-"Transform-invariant clustering of SPD matrices and its application on joint
-segmentation and action discovery", arXiv:1710.10060. Its licence is SimPL-2.0, which is why it does
-not come with this package.
+The car-rim wiping was recorded at LASA, EPFL, in 2019 and published with the code of N. Figueroa and A. Billard,
+arXiv:1710.10060. Its licence is SimPL-2.0 (copyleft), which is why it does not come with this package.
 """
 
 from __future__ import annotations
@@ -69,7 +67,7 @@ class WipingBout:
     Parameters
     ----------
     name : str
-        A1 to A3 flat, B1 to B5 tilted by about 40 degrees, C1 by 66, D1 by 67 to the side.
+        A1 to A3 flat, B1 to B5 tilted by about 40 degrees, C1 by 66 and D1 by 67, each another way.
     tilt : str
         Which bouts share a surface: flat, tilt40, tilt66, tilt67.
     demonstration : Demonstration

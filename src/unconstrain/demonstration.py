@@ -171,5 +171,3 @@ def stack(demonstrations: Demonstration | Sequence[Demonstration]) -> Stack:
         np.concatenate([demo.actions for demo in demos]),
         np.repeat(np.arange(len(demos)), [len(demo) for demo in demos]),
     )
-
-

@@ -14,10 +14,14 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array, as_matrix, check_at_least
+from .arrays import SMALLEST_VARIANCE, Array, as_matrix, check_at_least
 from .errors import InvalidDataError, SettingError
 
-__all__ = ["Affine", "FeatureMap", "KMeansRBF", "NormalisedRBF", "Placeable", "shares", "squared_distances"]
+__all__ = ["Affine", "FeatureMap", "KMeansRBF", "NormalisedRBF", "Placeable", "gaussian", "shares", "squared_distances"]
+
+
+_LEAST_SPREAD = 1e10 * np.sqrt(SMALLEST_VARIANCE)
+"""States that spread less count as one; centres laid among them may be nearer to one another, by a millionth."""
 
 
 class FeatureMap(Protocol):
@@ -62,7 +66,7 @@ class Affine:
         centre = states.mean(axis=0)
         spread = np.sqrt(((states - centre) ** 2).mean(axis=0))
         # A coordinate that does not move carries rounding only; dividing by that would amplify it.
-        still = spread <= 1e-12 * np.abs(states).max(axis=0, initial=0.0)
+        still = spread <= np.maximum(1e-12 * np.abs(states).max(axis=0, initial=0.0), _LEAST_SPREAD)
         return replace(self, centre=centre, scale=np.where(still, 1.0, spread))
 
 
@@ -91,7 +95,7 @@ class NormalisedRBF:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centres", as_matrix(self.centres, "centres"))
-        check_at_least("variance", self.variance, 0.0, strict=True)
+        check_at_least("variance", self.variance, SMALLEST_VARIANCE, strict=True)
 
     def __call__(self, states: Array) -> Array:
         """Compute features (N, p) of states (N, n); each row sums to one."""
@@ -99,7 +103,7 @@ class NormalisedRBF:
 
     def support(self, states: Array) -> Array:
         """Weight of the nearest kernel, from 1 at its centre to 0 far from all, shape (N,)."""
-        return np.exp(-0.5 / self.variance * squared_distances(states, self.centres).min(axis=1))
+        return gaussian(squared_distances(states, self.centres).min(axis=1), self.variance)
 
     @classmethod
     def grid(
@@ -132,18 +136,19 @@ class NormalisedRBF:
         told = max(np.size(low), np.size(high), np.size(per_axis))
         axes = told if told > 1 else dimensions
         try:
-            lows, highs, counts = (np.broadcast_to(np.asarray(v), (axes,)) for v in (low, high, per_axis))
+            lows, highs, counts = (np.broadcast_to(np.asarray(v, np.float64), (axes,)) for v in (low, high, per_axis))
         except ValueError as error:
             raise SettingError(
                 f"grid: low, high and per_axis have {np.size(low)}, {np.size(high)} and {np.size(per_axis)} values, "
                 "expected one number each or the same number for every axis."
             ) from error
-        if (counts < 2).any() or not (lows < highs).all():
+        if (counts < 2).any() or (counts % 1 != 0).any() or not (lows < highs).all():
             raise SettingError(
-                f"grid: got low={low}, high={high}, per_axis={per_axis}; expected low < high and at least two centres."
+                f"grid: got low={low!r}, high={high!r}, per_axis={per_axis!r}; "
+                "expected low < high and a whole number of at least two centres."
             )
         check_at_least("width", width, 0.0, strict=True)
-        ticks = [np.linspace(lo, hi, count) for lo, hi, count in zip(lows, highs, counts, strict=True)]
+        ticks = [np.linspace(lo, hi, int(count)) for lo, hi, count in zip(lows, highs, counts, strict=True)]
         centres = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, axes)
         spacing = np.mean([tick[1] - tick[0] for tick in ticks])
         return cls(centres, float((width * spacing) ** 2))
@@ -164,15 +169,17 @@ class NormalisedRBF:
         """
         from sklearn.cluster import KMeans
 
-        check_at_least("count", count, 1)
+        check_at_least("count", count, 1, whole=True)
         check_at_least("width", width, 0.0, strict=True)
         table = as_matrix(states, "states")
-        middle, unit = table.mean(axis=0), float(np.abs(table - table.mean(axis=0)).max())
-        if unit == 0.0:
+        middle = table.mean(axis=0)
+        unit = float(np.abs(table - middle).max())
+        if unit <= max(1e-12 * np.abs(table).max(), _LEAST_SPREAD):
             return cls(table[:1], 1.0)
-        different = np.unique((table - middle) / unit, axis=0)
-        count = min(count, len(different))
-        found = KMeans(count, n_init=4, random_state=seed).fit((table - middle) / unit).cluster_centers_
+        # To a millionth: states that differ by rounding must not count as different.
+        scaled = np.round((table - middle) / unit, 6) + 0.0
+        count = min(count, len(np.unique(scaled, axis=0)))
+        found = KMeans(count, n_init=4, random_state=seed).fit(scaled).cluster_centers_
         distances = squared_distances(found, found)
         np.fill_diagonal(distances, np.inf)
         spacing = np.mean(np.sqrt(distances.min(axis=1))) if count > 1 else 1.0
@@ -203,6 +210,12 @@ class KMeansRBF:
         return NormalisedRBF.kmeans(states, count, width=self.width, seed=self.seed)
 
 
+def gaussian(squared: Array, variance: float) -> Array:
+    """Weights ``exp(−δ² / 2σ²)`` at squared distances."""
+    with np.errstate(over="ignore"):  # to −inf: no weight at all
+        return np.exp(-0.5 * squared / variance)
+
+
 def squared_distances(states: Array, centres: Array) -> Array:
     """Squared Euclidean distances, shape (N, M), without forming (N, M, n).
 
@@ -227,11 +240,11 @@ def shares(states: Array, centres: Array, variance: float) -> Array:
             f"states: got {states.shape[1]} columns, expected {centres.shape[1]} as the centres have."
         )
     origin = centres.mean(axis=0)
-    far = (centres - origin) / variance
-    exponents = (states - origin) @ far.T - 0.5 * (far * (centres - origin)).sum(axis=1)
+    far = centres - origin
+    exponents = (states - origin) @ far.T - 0.5 * (far**2).sum(axis=1)
     exponents -= exponents.max(axis=1, keepdims=True)
+    with np.errstate(over="ignore"):  # to −inf: no share at all
+        exponents /= variance
     weights = np.exp(exponents, out=exponents)
     weights /= weights.sum(axis=1, keepdims=True)
     return weights
-
-

@@ -9,20 +9,23 @@ data.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Array, check_at_least
+from .errors import SettingError
 from .moments import Moments
 from .objectives import inconsistency, standard_risk, unvec
 from .quadratic import SECONDARY_NOISE, Path, Quadratic, lexicographic_path, minimum
 from .validation import FoldedMoments
 
 __all__ = ["Direct", "Hybrid", "Inconsistency", "Learner", "Solution"]
+
+Averaging = Literal["geometric", "arithmetic"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +45,9 @@ class Solution:
     eigenvalues : ndarray, shape (M, P), optional
         Of the inconsistency's Hessian, ascending, where it was factored.
     scores : ndarray, shape (M, P + 1), optional
-        Held-out ``E_i + α E_2`` for every number of undetermined directions,
-        where the threshold was chosen by it.
+        Held-out ``E_i + α E_2`` per unit of weight, averaged over the folds,
+        for every number of undetermined directions, where the threshold was
+        chosen by it.
     """
 
     weights: Array
@@ -91,19 +95,19 @@ class Inconsistency:
         Eigenvalues up to this share of the largest are left out and their
         directions stay zero. 0 leaves out rounding noise only. None chooses
         by the inconsistency on held-out data.
-    standard_errors : float
+    averaging
         See :class:`Hybrid`.
     """
 
     threshold: float | None = 0.0
-    standard_errors: float = 0.0
+    averaging: Averaging = "geometric"
 
     def __post_init__(self) -> None:
-        _check(self.threshold, self.standard_errors)
+        _check(self)
 
     def solve(self, folds: FoldedMoments) -> Solution:
         """Learn from the whole, at a threshold chosen on the folds."""
-        return _solve(folds, _inconsistency_path, inconsistency, self.threshold, self.standard_errors)
+        return _solve(self, folds, _inconsistency_path, inconsistency)
 
 
 @dataclass(frozen=True)
@@ -116,10 +120,6 @@ class Hybrid:
         Weight of the standard risk in the score ``E_i + α E_2`` that picks
         the threshold on held-out data. Small for constraints that vary a lot
         from sample to sample, large for data that is nearly free.
-    standard_errors : float
-        Among the thresholds whose score is within this many standard errors
-        (over the folds) of the best, take the one that leaves most to the
-        standard risk. 0 takes the best, as the paper does.
     threshold : float, optional
         Use this λ_t, as a share of the largest eigenvalue, instead of
         choosing. 0 leaves out rounding noise only.
@@ -130,19 +130,19 @@ class Hybrid:
         goes over from one objective to the other by degrees.
     """
 
-    alpha: float = 1e-2
-    standard_errors: float = 0.0
+    alpha: float = 0.2
     threshold: float | None = None
     softness: float = 0.0
+    averaging: Averaging = "geometric"
 
     def __post_init__(self) -> None:
         check_at_least("alpha", self.alpha, 0.0)
         check_at_least("softness", self.softness, 0.0)
-        _check(self.threshold, self.standard_errors)
+        _check(self)
 
     def solve(self, folds: FoldedMoments) -> Solution:
         """Learn from the whole, at a threshold chosen on the folds."""
-        return _solve(folds, self._path, self._score, self.threshold, self.standard_errors)
+        return _solve(self, folds, self._path, self._score)
 
     def _path(self, moments: Moments) -> Path:
         consistent, risk = inconsistency(moments), standard_risk(moments)
@@ -157,46 +157,49 @@ def _inconsistency_path(moments: Moments) -> Path:
 
 
 def _solve(
+    learner: Inconsistency | Hybrid,
     folds: FoldedMoments,
     path_of: Callable[[Moments], Path],
     score_of: Callable[[Moments], Quadratic],
-    threshold: float | None,
-    standard_errors: float,
 ) -> Solution:
     whole = folds.whole
     path = path_of(whole)
     scores = None
-    if threshold is not None:
-        splits = path.split(threshold)
+    if learner.threshold is not None:
+        splits = path.split(learner.threshold)
     else:
         # With nothing to hold out, the data has to judge itself.
         rounds = folds.rounds() or [(whole, whole)]
-        of_folds = np.stack([score_of(held_out)(path_of(training).weights) for training, held_out in rounds])
-        scores = of_folds.sum(axis=0)
-        splits = np.maximum(_choose(of_folds, standard_errors), path.lowest)
+        judged = np.stack([score_of(held_out)(path_of(training).weights) for training, held_out in rounds])
+        scores = _average(judged, [held_out for _, held_out in rounds], learner.averaging)
+        splits = np.maximum(_last_best(scores), path.lowest)
     directions = path.eigenvalues.shape[1]
     weights = unvec(path.at(splits), whole.cross.shape[1])
     return Solution(weights, directions - splits, directions, path.threshold(splits), path.eigenvalues, scores)
 
 
-def _choose(scores: Array, standard_errors: float) -> NDArray[np.intp]:
-    """Pick a split for each model from scores (folds, M, P + 1).
-
-    The largest split whose total is not worse than the best by more than
-    ``standard_errors`` standard errors of the difference.
-    """
-    count, _, splits = scores.shape
-    totals = scores.sum(axis=0)
-    best = totals.argmin(axis=1)[:, None]
-    finite = np.where(np.isfinite(scores), scores, 0.0)
-    difference = finite - np.take_along_axis(finite, best[None], axis=2)
-    error = np.sqrt(count) * difference.std(axis=0, ddof=1) if count > 1 else np.zeros(totals.shape)
-    allowed = np.take_along_axis(totals, best, axis=1) + standard_errors * error
-    good = totals <= allowed
-    return splits - 1 - good[:, ::-1].argmax(axis=1)
+def _average(judged: Array, parts: Sequence[Moments], averaging: Averaging) -> Array:
+    """Average scores (folds, M, P + 1) over the folds, each per unit of its weight and counted by it."""
+    weight = np.stack([part.weight for part in parts])[..., None]
+    counts = np.where(weight > 0, weight, 1.0)  # a fold that a field does not see scores 0 with weight 0
+    scores = judged / counts
+    if averaging == "geometric":
+        # Of a perfect fit rounding is left, and the logarithm of that must not decide.
+        rounding = 1e-14 * np.stack([part.energy for part in parts])[..., None] / counts
+        scores = np.log(np.maximum(scores + rounding, np.finfo(float).tiny))
+    total = np.where(weight > 0, weight * scores, 0.0).sum(axis=0)
+    mean = total / np.maximum(weight.sum(axis=0), np.finfo(float).tiny)
+    return np.exp(mean) if averaging == "geometric" else mean
 
 
-def _check(threshold: float | None, standard_errors: float) -> None:
-    check_at_least("standard_errors", standard_errors, 0.0)
-    if threshold is not None:
-        check_at_least("threshold", threshold, 0.0)
+def _last_best(scores: Array) -> NDArray[np.intp]:
+    """The largest split with the lowest score: what does not matter is left to the standard risk."""
+    good = scores == scores.min(axis=1, keepdims=True)
+    return scores.shape[1] - 1 - good[:, ::-1].argmax(axis=1)
+
+
+def _check(learner: Inconsistency | Hybrid) -> None:
+    if learner.threshold is not None:
+        check_at_least("threshold", learner.threshold, 0.0)
+    if learner.averaging not in ("arithmetic", "geometric"):
+        raise SettingError(f"averaging: got {learner.averaging!r}, expected 'geometric' or 'arithmetic'.")

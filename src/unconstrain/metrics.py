@@ -18,7 +18,7 @@ import numpy as np
 
 from .arrays import Array
 from .demonstration import Demonstration, stack
-from .errors import InvalidDataError
+from .errors import InvalidDataError, SettingError
 from .projection import action_projection, null_space_projection, project
 
 __all__ = ["cpe", "inconsistency", "ncpe", "ninconsistency", "nupe", "upe"]
@@ -42,9 +42,12 @@ def upe(policy: PolicyLike, demonstrations: Demonstrations) -> float:
     ------
     InvalidDataError
         If a demonstration has no truth.
+    SettingError
+        If the policy does not return one action for each state.
     """
     demos = _listed(demonstrations)
-    return _squares(_true_policy(demos) - _predicted(policy, demos))
+    predicted = _predicted(policy, demos)
+    return _squares(_true_policy(demos) - predicted)
 
 
 def cpe(policy: PolicyLike, demonstrations: Demonstrations, constraint: ConstraintLike | None = None) -> float:
@@ -63,8 +66,9 @@ def cpe(policy: PolicyLike, demonstrations: Demonstrations, constraint: Constrai
         If neither a truth nor a constraint tells the projection.
     """
     demos = _listed(demonstrations)
+    predicted = _predicted(policy, demos)
     projections = np.concatenate([_projections(demo, constraint) for demo in demos])
-    return _squares(_constrained(demos, constraint) - project(projections, _predicted(policy, demos)))
+    return _squares(_constrained(demos, constraint) - project(projections, predicted))
 
 
 def inconsistency(policy: PolicyLike, demonstrations: Demonstrations) -> float:
@@ -92,19 +96,29 @@ def ninconsistency(policy: PolicyLike, demonstrations: Demonstrations) -> float:
 def _norm(demonstrations: Demonstrations) -> float:
     demos = _listed(demonstrations)
     vectors = stack(demos).actions if any(demo.truth is None for demo in demos) else _true_policy(demos)
-    variance = float(((vectors - vectors.mean(axis=0)) ** 2).sum())
-    if variance == 0.0:
-        raise InvalidDataError("the policy is the same at every sample, so errors cannot be normalised by its variance.")
+    variance = _squares(vectors - vectors.mean(axis=0))
+    if variance <= vectors.size * (1e-12 * np.abs(vectors).max()) ** 2:  # rounding of the mean is no variance
+        raise InvalidDataError(
+            "the policy is the same at every sample, so errors cannot be normalised by its variance."
+        )
     return variance
 
 
 def _listed(demonstrations: Demonstrations) -> list[Demonstration]:
-    return [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
+    demos = [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
+    if not demos:
+        raise InvalidDataError("got no demonstration, expected at least one.")
+    return demos
 
 
 def _predicted(policy: PolicyLike, demos: list[Demonstration]) -> Array:
     states, actions, _ = stack(demos)
-    return np.reshape(policy(states), actions.shape)
+    predicted = np.asarray(policy(states))
+    if predicted.shape != actions.shape and (actions.shape[1] > 1 or predicted.shape != (len(states),)):
+        raise SettingError(
+            f"policy: got actions of shape {predicted.shape} for {len(states)} states, expected {actions.shape}."
+        )
+    return predicted.reshape(actions.shape)
 
 
 def _true_policy(demos: list[Demonstration]) -> Array:

@@ -20,14 +20,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from functools import reduce
 from operator import add
-from typing import Protocol
 
 import numpy as np
 
 from .arrays import Array
 from .projection import unit_actions
 
-__all__ = ["Moments", "gather", "total"]
+__all__ = ["Moments", "gather", "gather_blocks", "total"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,82 +133,81 @@ def gather(features: Array, actions: Array, weights: Array | None = None) -> Mom
     -------
     Moments
     """
-    samples, p = features.shape
-    d = actions.shape[1]
-    counts = np.ones((samples, 1)) if weights is None else weights
-    columns = max(p * d, counts.shape[1] + p * (p + 1) // 2 * (d * (d + 1) // 2 + 1) if counts.shape[1] > 1 else 0)
-    rows = max(64, _BLOCK // columns)
-    sums = _grams_of_one if counts.shape[1] == 1 else _grams_of_many
-    return total(
-        [Moments.zero(counts.shape[1], d, p)]
-        + [
-            _gather_block(features[i : i + rows], actions[i : i + rows], counts[i : i + rows], sums)
-            for i in range(0, samples, rows)
-        ]
-    )
+    counts = np.ones((len(features), 1)) if weights is None else weights
+    return gather_blocks([(features, actions, counts)], counts.shape[1], actions.shape[1], features.shape[1])
+
+
+def gather_blocks(blocks: Iterable[tuple[Array, Array, Array]], models: int, actions: int, features: int) -> Moments:
+    """Sum over blocks of samples, each (features, actions, weights) as in :func:`gather`."""
+    single = models == 1
+    pairs = features**2 if single else features * (features + 1) // 2
+    metrics = 1 + actions * (actions + 1) // 2
+    products = np.zeros((models, metrics, pairs))
+    weight, energy, cross = np.zeros(models), np.zeros(models), np.zeros((models, actions, features))
+    rows = max(64, _BLOCK // (actions * features if single else metrics * pairs))
+    for block in blocks:
+        for start in range(0, len(block[0]), rows):
+            phi, u, w = (part[start : start + rows] for part in block)
+            directions, lengths = unit_actions(u)
+            products += (_products_of_one if single else _products_of_many)(phi, directions, w)
+            weight += w.sum(axis=0)
+            energy += w.T @ lengths**2
+            cross += (w.T @ (u[:, :, None] * phi[:, None, :]).reshape(len(u), -1)).reshape(cross.shape)
+    return Moments(weight, energy, cross, *_unpacked(products, actions, features))
 
 
 _BLOCK = 2**18
-"""Numbers in the largest temporary of a block: about a core's share of cache."""
+"""Numbers in the largest temporary: about a core's share of cache."""
 
 
-def _gather_block(features: Array, actions: Array, weights: Array, grams: _Grams) -> Moments:
-    models, (_, p), d = weights.shape[1], features.shape, actions.shape[1]
-    directions, lengths = unit_actions(actions)
-    gram, blocks = grams(features, directions, weights)
-    cross = weights.T @ (actions[:, :, None] * features[:, None, :]).reshape(len(features), d * p)
-    return Moments(
-        weights.sum(axis=0),
-        weights.T @ lengths**2,
-        cross.reshape(models, d, p),
-        gram,
-        blocks.transpose(0, 3, 1, 4, 2).reshape(models, p * d, p * d),
-    )
+def _products_of_one(features: Array, directions: Array, weights: Array) -> Array:
+    """``Σ w φφᵀ`` for the metrics 1 and û_k û_l (k ≤ l) of one model, shape (1, metrics, p²).
 
-
-class _Grams(Protocol):
-    def __call__(self, features: Array, directions: Array, weights: Array) -> tuple[Array, Array]:
-        """Compute gram (M, p, p) and, for each pair of action directions, (M, d, d, p, p)."""
-        ...
-
-
-def _grams_of_one(features: Array, directions: Array, weights: Array) -> tuple[Array, Array]:
-    """One model: a symmetric rank-k update for each pair of action directions.
-
-    With ``F_k = diag(√w û_k) φ`` the blocks are ``F_kᵀF_l``. Off the diagonal,
+    With ``F_k = diag(√w û_k) φ`` they are ``F_kᵀF_l``. Off the diagonal,
     ``F_kᵀF_l + F_lᵀF_k = (F_k + F_l)ᵀ(F_k + F_l) − F_kᵀF_k − F_lᵀF_l`` (and
     both terms are equal), so that every product is of a matrix with its own
-    transpose, which BLAS does at half the price. The last diagonal block
+    transpose, which BLAS does at half the price. The last diagonal one
     follows from the others, since ``Σ û_k² = 1``.
     """
-    d, p = directions.shape[1], features.shape[1]
     rooted = np.sqrt(weights) * features
     moving = directions.any(axis=1)
-    seen = rooted[moving] if not moving.all() else rooted
-    pointed = [seen * directions[moving, k, None] for k in range(d)]
-    gram = seen.T @ seen
-    blocks = np.empty((d, d, p, p))
-    for k in range(d - 1):
-        blocks[k, k] = pointed[k].T @ pointed[k]
-    blocks[d - 1, d - 1] = gram - sum(blocks[k, k] for k in range(d - 1))
-    for k in range(d):
-        for m in range(k):
-            both = pointed[k] + pointed[m]
-            blocks[k, m] = blocks[m, k] = 0.5 * (both.T @ both - blocks[k, k] - blocks[m, m])
     still = rooted[~moving]
-    return (gram + still.T @ still)[None], blocks[None]
+    seen = rooted if moving.all() else rooted[moving]
+    pointed = [seen * directions[moving, k, None] for k in range(directions.shape[1])]
+    whole = seen.T @ seen
+    own = [f.T @ f for f in pointed[:-1]]
+    own.append(whole - sum(own, start=np.zeros_like(whole)))
+    products = [whole + still.T @ still]
+    for k, l in zip(*np.triu_indices(len(pointed)), strict=True):
+        if k == l:
+            products.append(own[k])
+        else:
+            both = pointed[k] + pointed[l]
+            products.append(0.5 * (both.T @ both - own[k] - own[l]))
+    return np.stack(products).reshape(1, len(products), -1)
 
 
-def _grams_of_many(features: Array, directions: Array, weights: Array) -> tuple[Array, Array]:
-    """Many models: one product ``Wᵀ (vech φφᵀ ⊗ (1, vech ûûᵀ))`` for all of them."""
-    models, d, p = weights.shape[1], directions.shape[1], features.shape[1]
-    row, column = np.triu_indices(p)
-    first, second = np.triu_indices(d)
-    squares = features[:, row] * features[:, column]
+def _products_of_many(features: Array, directions: Array, weights: Array) -> Array:
+    """The same for many models, half of each: one product ``Wᵀ ((1, vech ûûᵀ) ⊗ vech φφᵀ)``."""
+    first, second = np.triu_indices(directions.shape[1])
+    row, column = np.triu_indices(features.shape[1])
     metrics = np.column_stack([np.ones(len(features)), directions[:, first] * directions[:, second]])
+    squares = features[:, row] * features[:, column]
     sums = weights.T @ (metrics[:, :, None] * squares[:, None, :]).reshape(len(features), -1)
-    full = np.empty((models, metrics.shape[1], p, p))
-    full[:, :, row, column] = full[:, :, column, row] = sums.reshape(models, metrics.shape[1], len(row))
-    blocks = np.empty((models, d, d, p, p))
-    blocks[:, first, second] = blocks[:, second, first] = full[:, 1:]
-    return full[:, 0], blocks
+    return sums.reshape(weights.shape[1], metrics.shape[1], len(row))
+
+
+def _unpacked(products: Array, d: int, p: int) -> tuple[Array, Array]:
+    """Gram (M, p, p) and consistent (M, d p, d p) from the products of each metric."""
+    models, metrics, pairs = products.shape
+    if pairs == p * p:
+        full = products.reshape(models, metrics, p, p)
+    else:
+        row, column = np.triu_indices(p)
+        full = np.empty((models, metrics, p, p))
+        full[..., row, column] = full[..., column, row] = products
+    first, second = np.triu_indices(d)
+    consistent = np.empty((models, p, d, p, d))
+    for metric, (k, l) in enumerate(zip(first, second, strict=True), start=1):
+        consistent[:, :, k, :, l] = consistent[:, :, l, :, k] = full[:, metric]
+    return full[:, 0].copy(), consistent.reshape(models, p * d, p * d)

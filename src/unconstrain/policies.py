@@ -10,20 +10,21 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
+from copy import deepcopy
 from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from .arrays import Array, as_matrix, as_weights
+from .arrays import Array, as_groups, as_matrix, as_table, as_weights
 from .demonstration import Demonstration, stack
 from .errors import InvalidDataError, SettingError
 from .features import Affine, FeatureMap, KMeansRBF, Placeable
 from .learners import Hybrid, Learner, Solution
-from .moments import Moments, gather
+from .moments import Moments, gather_blocks
 from .projection import unit_actions
 from .receptive_fields import ReceptiveFields, choose_variance, cover
 from .validation import FoldedMoments, Folds, Groups, Splitter, Validation
@@ -36,11 +37,14 @@ PLACING_SAMPLES = 20_000
 _ROWS = 4096
 
 
-class Policy(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+class Policy(RegressorMixin, BaseEstimator):
     """What both policies share: fitting from a stream, predicting, changing the learner."""
 
     learner: Learner | None
     validation: Validation | None
+    _folds: FoldedMoments
+    _splitter: Splitter
+    _flat: bool
 
     @abstractmethod
     def _place(self, states: Array) -> None:
@@ -103,8 +107,8 @@ class Policy(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         first = not hasattr(self, "_folds")
         states, actions = self._checked(X, y, reset=first)
         weights = as_weights(sample_weight, len(states))
-        if groups is not None and len(groups) != len(states):
-            raise InvalidDataError(f"groups: got {len(groups)} values, expected {len(states)}, one for each sample.")
+        if groups is not None:
+            groups = as_groups(groups, len(states))
         if not weights.any():
             raise InvalidDataError("sample_weight: all weights are zero, expected at least one that counts.")
         if first:
@@ -132,7 +136,7 @@ class Policy(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         """
         check_is_fitted(self, "solution_")
         states = self._checked_states(X)
-        actions = np.concatenate([self._predict_block(states[rows]) for rows in _blocks(len(states))])
+        actions = np.concatenate([self._predict_block(states[rows]) for rows in _chunks(np.arange(len(states)))])
         return actions[:, 0] if self._flat else actions
 
     def __call__(self, states: ArrayLike) -> Array:
@@ -163,6 +167,7 @@ class Policy(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         check_is_fitted(self, "solution_")
         other = clone(self).set_params(learner=learner)
         other.__dict__ |= {name: value for name, value in self.__dict__.items() if name not in other.__dict__}
+        other._splitter = deepcopy(self._splitter)  # each keeps its own list of demonstrations from here on
         other._conclude()
         return other
 
@@ -175,7 +180,7 @@ class Policy(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         states = self._checked_states(X, reset=reset)
         if y is None:
             raise InvalidDataError("requires y to be passed, but the target y is None: expected the observed actions.")
-        actions, flat = as_actions(y)
+        actions, flat = as_table(y, "actions")
         if len(actions) != len(states):
             raise InvalidDataError(
                 f"got {len(states)} states and {len(actions)} actions (inconsistent numbers of samples), "
@@ -203,26 +208,26 @@ class Policy(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         counting = states[weights > 0]
         # Different states in a fixed order: repetition and order must not move the features.
         self._place(np.unique(counting[:: -(-len(counting) // PLACING_SAMPLES)], axis=0))
-        empty = self._gather_rows(states[:0], np.empty((0, self.n_outputs_)), weights[:0])
+        features, actions, in_models = self._block(states[:1], np.zeros((1, self.n_outputs_)), weights[:1])
+        empty = Moments.zero(in_models.shape[1], actions.shape[1], features.shape[1])
         self._folds = FoldedMoments((empty,) * validation.count, validation.held_out)
 
     def _gather(self, states: Array, actions: Array, weights: Array, groups: Groups | None) -> FoldedMoments:
         folds = self._splitter.assign(states, groups)
         order = np.argsort(folds, kind="stable")
         starts = np.searchsorted(folds[order], np.arange(len(self._folds.parts) + 1))
+        empty = self._folds.parts[0]
         parts = []
-        for empty, start, stop in zip(self._folds.parts, starts[:-1], starts[1:], strict=True):
-            part = 0.0 * empty
-            for rows in _blocks(stop - start):
-                chosen = order[start:stop][rows]
-                part = part + self._gather_rows(states[chosen], actions[chosen], weights[chosen])
-            parts.append(part)
+        for start, stop in zip(starts[:-1], starts[1:], strict=True):
+            blocks = (self._block(states[rows], actions[rows], weights[rows]) for rows in _chunks(order[start:stop]))
+            parts.append(gather_blocks(blocks, *empty.cross.shape))
         return FoldedMoments(tuple(parts), self._folds.held_out)
 
-    def _gather_rows(self, states: Array, actions: Array, weights: Array) -> Moments:
+    def _block(self, states: Array, actions: Array, weights: Array) -> tuple[Array, Array, Array]:
+        """Features, actions, and how much each sample counts in each model."""
         in_models = self._weights(states)
         column = weights[:, None]
-        return gather(self._features(states), actions, column if in_models is None else column * in_models)
+        return self._features(states), actions, column if in_models is None else column * in_models
 
     def _conclude(self) -> None:
         self.solution_ = self._solve(self.learner if self.learner is not None else Hybrid(), self._folds)
@@ -286,7 +291,7 @@ class ParametricPolicy(Policy):
                 f"features: got an array of shape {np.shape(features)} for {len(states)} states, "
                 "expected (samples, features)."
             )
-        return features
+        return as_matrix(features, "features")
 
     def _weights(self, states: Array) -> None:
         return None
@@ -358,7 +363,7 @@ class LocallyLinearPolicy(Policy):
         if self.centres is None:
             self.fields_ = cover(states, variance, self.at_least)
         else:
-            self.fields_ = ReceptiveFields(np.asarray(self.centres, dtype=np.float64), variance)
+            self.fields_ = ReceptiveFields(as_matrix(self.centres, "centres"), variance)
         self.features_ = Affine(self.fields_.centres.mean(axis=0), np.sqrt(variance))
 
     def _features(self, states: Array) -> Array:
@@ -385,14 +390,5 @@ class LocallyLinearPolicy(Policy):
         return self.fields_.support(self._checked_states(states))
 
 
-def as_actions(y: ArrayLike) -> tuple[Array, bool]:
-    """Actions as a table (N, d), and whether they came as a vector (N,)."""
-    if isinstance(y, list | tuple) and y and np.ndim(y[0]) > 0:
-        return as_matrix(y, "actions"), False  # our words for ragged rows
-    values = np.asarray(y)
-    flat = values.ndim == 1
-    return as_matrix(values[:, None] if flat else values, "actions"), flat
-
-
-def _blocks(length: int) -> Iterator[slice]:
-    return (slice(start, min(start + _ROWS, length)) for start in range(0, length, _ROWS))
+def _chunks(rows: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
+    return (rows[start : start + _ROWS] for start in range(0, len(rows), _ROWS))

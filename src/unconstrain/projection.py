@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import Array
+from .errors import InvalidDataError
 
 __all__ = ["RANK_TOLERANCE", "action_projection", "null_space_projection", "project", "unit_actions"]
 
@@ -30,7 +31,20 @@ def null_space_projection(constraint_matrix: Array, tolerance: float = RANK_TOLE
     -------
     ndarray, shape (..., d, d)
         The projections, exactly symmetric.
+
+    Raises
+    ------
+    InvalidDataError
+        If it is not a matrix, or holds NaN or infinity.
     """
+    constraint_matrix = np.asarray(constraint_matrix, dtype=np.float64)
+    if constraint_matrix.ndim < 2:
+        raise InvalidDataError(
+            f"constraint matrix: got an array of shape {constraint_matrix.shape}, expected (..., k, d), "
+            "one constraint in each row."
+        )
+    if not np.isfinite(constraint_matrix).all():
+        raise InvalidDataError("constraint matrix: found NaN or infinity, expected finite numbers.")
     # By rows of Vᵀ rather than by A⁺: the rank decision is explicit and N is symmetric by construction.
     _, singular, rows = np.linalg.svd(constraint_matrix, full_matrices=False)
     active = singular > tolerance * singular.max(axis=-1, initial=0.0, keepdims=True)

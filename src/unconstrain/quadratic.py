@@ -37,6 +37,9 @@ NOISE = 1e-10
 SECONDARY_NOISE = 1e-12
 """The same for the second objective."""
 
+UNDERFLOW = 1e-290
+"""A Hessian whose largest eigenvalue is below this is zero: its smaller ones have lost their digits."""
+
 
 @dataclass(frozen=True, eq=False)
 class Quadratic:
@@ -140,7 +143,7 @@ def lexicographic_path(first: Quadratic, second: Quadratic | None = None) -> Pat
     eigenvalues, vectors = np.linalg.eigh(first.hessian)
     size = eigenvalues.shape[1]
     largest = eigenvalues[:, -1:]
-    noise = (eigenvalues <= NOISE * largest) | (eigenvalues <= np.finfo(float).tiny)
+    noise = (eigenvalues <= NOISE * largest) | (largest <= UNDERFLOW)
     lowest = noise.sum(axis=1)
     determined = _across(vectors, first.linear) / np.where(noise, 1.0, eigenvalues)
 
@@ -172,22 +175,24 @@ def _factor(hessian: Array, vectors: Array) -> tuple[Array, Array]:
 
     Where M is singular, its null directions are given the weight of its
     largest eigenvalue first. The linear term has no part in them, so they
-    stay zero, which is the solution of least norm.
+    stay zero, which is the solution of least norm. An M that is nothing but
+    underflow, as of a field that no sample is near, counts as zero.
     """
     metric = np.swapaxes(vectors, -1, -2) @ hessian @ vectors
     try:
-        lower = np.linalg.cholesky(metric)
+        lower: Array = np.linalg.cholesky(metric).astype(np.float64, copy=False)
         pivots = np.diagonal(lower, axis1=-2, axis2=-1) ** 2
         if (pivots.min(axis=-1) > SECONDARY_NOISE * pivots.max(axis=-1)).all():
             return lower, metric
     except np.linalg.LinAlgError:
         pass
     eigenvalues, axes = np.linalg.eigh(hessian)
-    largest = np.maximum(eigenvalues[:, -1:], np.finfo(float).tiny)
-    floored = np.where(eigenvalues > SECONDARY_NOISE * largest, eigenvalues, np.where(largest > 1e-290, largest, 1.0))
+    largest = eigenvalues[:, -1:]
+    floored = np.where(eigenvalues > SECONDARY_NOISE * largest, eigenvalues, largest)
+    floored = np.where(largest > UNDERFLOW, floored, 1.0)
     rotated = np.swapaxes(axes, -1, -2) @ vectors
     metric = np.swapaxes(rotated, -1, -2) @ (floored[..., None] * rotated)
-    return np.linalg.cholesky(metric), metric
+    return np.linalg.cholesky(metric).astype(np.float64, copy=False), metric
 
 
 def _across(vectors: Array, vector: Array) -> Array:

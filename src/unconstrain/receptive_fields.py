@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Array, as_matrix, check_at_least
+from .arrays import SMALLEST_VARIANCE, Array, as_matrix, check_at_least
 from .errors import SettingError
-from .features import shares, squared_distances
+from .features import gaussian, shares, squared_distances
 
 __all__ = ["MOST_FIELDS", "ReceptiveFields", "choose_variance", "cover"]
 
@@ -32,11 +32,11 @@ class ReceptiveFields:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centres", as_matrix(self.centres, "centres"))
-        check_at_least("variance", self.variance, 0.0, strict=True)
+        check_at_least("variance", self.variance, SMALLEST_VARIANCE, strict=True)
 
     def weights(self, states: Array) -> Array:
         """How much each sample counts in each field, shape (N, M) (eq. 14)."""
-        return np.exp(-0.5 / self.variance * squared_distances(states, self.centres))
+        return gaussian(squared_distances(states, self.centres), self.variance)
 
     def shares(self, states: Array) -> Array:
         """The same weights, normalised over the fields, shape (N, M)."""
@@ -44,7 +44,7 @@ class ReceptiveFields:
 
     def support(self, states: Array) -> Array:
         """Weight in the nearest field, from 1 at a centre to 0 far from all, shape (N,)."""
-        return np.exp(-0.5 / self.variance * squared_distances(states, self.centres).min(axis=1))
+        return gaussian(squared_distances(states, self.centres).min(axis=1), self.variance)
 
 
 def cover(states: Array, variance: float, at_least: float = 0.7) -> ReceptiveFields:
@@ -81,7 +81,9 @@ def choose_variance(states: Array, at_least: float = 0.7, most: int = MOST_FIELD
     Returns 1 where the states do not vary.
     """
     total = float(states.var(axis=0).sum())
-    variance = total / 4 if total > 0 else 1.0
+    # What rounding of the mean leaves is no variance.
+    least = max((1e-12 * np.abs(states).max()) ** 2, 8 * SMALLEST_VARIANCE)
+    variance = total / 4 if total > least else 1.0
     while len(_cover(states, variance, at_least, most).centres) > most:
         variance *= 2
     return variance
@@ -90,7 +92,7 @@ def choose_variance(states: Array, at_least: float = 0.7, most: int = MOST_FIELD
 def _cover(states: Array, variance: float, at_least: float, most: int | None) -> ReceptiveFields:
     if not 0.0 < at_least < 1.0:
         raise SettingError(f"at_least: got {at_least!r}, expected a weight between 0 and 1.")
-    check_at_least("variance", variance, 0.0, strict=True)
+    check_at_least("variance", variance, SMALLEST_VARIANCE, strict=True)
     reach = -2.0 * variance * np.log(at_least)
     chosen = [int(((states - states.mean(axis=0)) ** 2).sum(axis=1).argmin())]
     nearest = ((states - states[chosen[0]]) ** 2).sum(axis=1)

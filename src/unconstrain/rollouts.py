@@ -8,7 +8,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array, as_matrix, check_at_least
+from .arrays import Array, as_table, check_at_least
 from .demonstration import Demonstration, Truth
 from .errors import InvalidDataError, SettingError
 from .projection import null_space_projection, project
@@ -21,7 +21,7 @@ ConstraintLike = Callable[[Array, Array], Array]
 @overload
 def rollout(
     policy: Callable[[Array], Array],
-    start: Sequence[float] | Array,
+    start: Sequence[float] | np.ndarray[tuple[int], np.dtype[np.float64]],
     steps: int = ...,
     dt: float = ...,
     constraint: ConstraintLike | None = ...,
@@ -33,7 +33,7 @@ def rollout(
 @overload
 def rollout(
     policy: Callable[[Array], Array],
-    start: Sequence[Sequence[float]] | Array,
+    start: Sequence[Sequence[float]] | np.ndarray[tuple[int, int], np.dtype[np.float64]],
     steps: int = ...,
     dt: float = ...,
     constraint: ConstraintLike | Sequence[ConstraintLike] | None = ...,
@@ -80,17 +80,17 @@ def rollout(
     InvalidDataError
         If the movement leaves the finite numbers.
     """
-    check_at_least("steps", steps, 1)
+    check_at_least("steps", steps, 1, whole=True)
     check_at_least("dt", dt, 0.0, strict=True)
-    single = np.ndim(start) == 1
-    state = as_matrix(np.atleast_2d(np.asarray(start, dtype=np.float64)), "start").copy()
+    table, single = as_table(start, "start")
+    state = table.reshape(1, -1) if single else table
     runs, n = state.shape
     apart = None if constraint is None or callable(constraint) else list(constraint)
     if apart is not None and len(apart) != runs:
         raise SettingError(f"constraint: got {len(apart)} constraints for {runs} starts, expected one for each.")
     shape = (runs, steps, n)
     states, actions, wanted, projections = (np.empty(s) for s in (shape, shape, shape, (*shape, n)))
-    times = dt * np.arange(steps)
+    times = dt * np.arange(steps, dtype=np.float64)
     for step in range(steps):
         states[:, step] = state
         wanted[:, step] = _action(policy, state)
@@ -103,7 +103,8 @@ def rollout(
             rows = [_matrix(one, state[k : k + 1], now[k : k + 1]) for k, one in enumerate(apart)]
             projections[:, step] = null_space_projection(np.concatenate(rows))
         actions[:, step] = project(projections[:, step], wanted[:, step])
-        state = state + dt * actions[:, step]
+        with np.errstate(over="ignore", invalid="ignore"):
+            state = state + dt * actions[:, step]
         if not np.isfinite(state).all():
             raise InvalidDataError(
                 f"the movement left the finite numbers at step {step}: start nearer to the data or take a smaller dt."

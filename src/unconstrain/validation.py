@@ -41,7 +41,7 @@ class Folds:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        check_at_least("count", self.count, 2)
+        check_at_least("count", self.count, 2, whole=True)
         _check_unit(self.by)
 
     @property
@@ -77,7 +77,8 @@ class HeldOut:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.share < 1.0:
+        check_at_least("share", self.share, 0.0, strict=True)
+        if self.share >= 1.0:
             raise SettingError(f"share: got {self.share!r}, expected a number between 0 and 1.")
         _check_unit(self.by)
 
@@ -183,9 +184,7 @@ class FoldedMoments:
         before = list(accumulate((self.parts[i] for i in filled), initial=nothing))
         after = list(accumulate((self.parts[i] for i in reversed(filled)), initial=nothing))[::-1]
         return [
-            (before[place] + after[place + 1], self.parts[i])
-            for place, i in enumerate(filled)
-            if i in self.held_out
+            (before[place] + after[place + 1], self.parts[i]) for place, i in enumerate(filled) if i in self.held_out
         ]
 
     def in_features(self, change: Array) -> FoldedMoments:

@@ -9,7 +9,7 @@ from ..errors import SettingError
 
 __all__ = ["NAMES", "find"]
 
-NAMES = ("table1", "figure4", "figure5", "washing")
+NAMES = ("table1", "figure4", "figure5", "table2", "washing")
 """What can be reproduced."""
 
 

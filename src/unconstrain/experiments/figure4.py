@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from . import toy
 from .table1 import CONSTRAINTS
 from .trials import Progress, Result, errors, row
 
-__all__ = ["Settings", "run"]
+__all__ = ["Settings", "headlines", "run"]
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,11 @@ class Settings(toy.ToySettings):
     seed: int = 0
 
 
-def run(settings: Settings | None = None, workers: int = 1, progress: Progress | None = None) -> Result:
+def run(
+    settings: Settings | None = None,
+    workers: int = 1,  # noqa: ARG001 - every experiment is called alike, and this is a single trial
+    progress: Progress | None = None,
+) -> Result:
     """Reproduce figure 4, with the hybrid method beside the paper's two.
 
     Returns
@@ -42,7 +47,7 @@ def run(settings: Settings | None = None, workers: int = 1, progress: Progress |
     chosen = settings or Settings()
     axis = np.linspace(-chosen.reach, chosen.reach, chosen.arrows)
     grid = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
-    details = {"grid": grid, "policy": chosen.system(grid)}
+    details: dict[str, Any] = {"grid": grid, "policy": chosen.system(grid)}
     rows = []
     for done, (constraint, draw) in enumerate(CONSTRAINTS.items(), start=1):
         rng = np.random.default_rng(np.random.SeedSequence(chosen.seed))
@@ -57,3 +62,14 @@ def run(settings: Settings | None = None, workers: int = 1, progress: Progress |
         if progress is not None:
             progress(done, len(CONSTRAINTS))
     return Result("figure4", chosen, rows, details)
+
+
+def headlines(result: Result) -> list[str]:
+    """What the figure says, in a sentence for each panel."""
+    return [
+        f"{constraint}: nUPE "
+        + ", ".join(
+            f"{r['method']} {100 * r['nupe_mean']:.4f}e-2" for r in result.rows if r["constraint"] == constraint
+        )
+        for constraint in CONSTRAINTS
+    ]

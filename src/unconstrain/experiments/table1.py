@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from . import toy
-from .trials import Progress, Result, errors, row, run_trials
+from .journal import Journal
+from .trials import LABELS, Progress, Result, errors, row, run_trials
 
-__all__ = ["PAPER", "Settings", "run"]
+__all__ = ["PAPER", "Settings", "headlines", "run"]
 
 PAPER: dict[tuple[str, str], dict[str, tuple[float, float]]] = {
     ("direct", "none"): {"nupe": (0.034, 0.044), "ncpe": (0.034, 0.044), "ninc": (0.026, 0.039)},
@@ -41,7 +42,9 @@ class Settings(toy.ToySettings):
     seed: int = 0
 
 
-def run(settings: Settings | None = None, workers: int = 1, progress: Progress | None = None) -> Result:
+def run(
+    settings: Settings | None = None, workers: int = 1, progress: Progress | None = None, journal: Journal | None = None
+) -> Result:
     """Reproduce Table I.
 
     Parameters
@@ -51,6 +54,8 @@ def run(settings: Settings | None = None, workers: int = 1, progress: Progress |
         Processes; the numbers do not depend on it.
     progress : callable, optional
         Called with (done, of) after each trial.
+    journal : Journal, optional
+        Keeps finished trials; see :func:`~unconstrain.experiments.trials.run_trials`.
 
     Returns
     -------
@@ -60,7 +65,7 @@ def run(settings: Settings | None = None, workers: int = 1, progress: Progress |
     chosen = settings or Settings()
     seeds = np.random.SeedSequence(chosen.seed).spawn(chosen.trials)
     calls = [(chosen, constraint, seed) for constraint in CONSTRAINTS for seed in seeds]
-    found = run_trials(trial, calls, workers, progress)
+    found = run_trials(trial, calls, workers, progress, journal)
     by_constraint = {
         constraint: found[index * chosen.trials : (index + 1) * chosen.trials]
         for index, constraint in enumerate(CONSTRAINTS)
@@ -74,9 +79,30 @@ def run(settings: Settings | None = None, workers: int = 1, progress: Progress |
     return Result("table1", chosen, rows)
 
 
-def trial(
-    settings: toy.ToySettings, constraint: str, seed: np.random.SeedSequence
-) -> dict[str, tuple[float, ...]]:
+def headlines(result: Result) -> list[str]:
+    """What the table says, in a sentence for each claim."""
+    mean = {(row["method"], row["constraint"]): row for row in result.rows}
+
+    def compare(metric: str, constraint: str, other: str) -> str:
+        ours, theirs = (mean[method, constraint][f"{metric}_mean"] for method in ("hybrid", other))
+        paper = mean["hybrid", constraint][f"paper_{metric}_mean"]
+        return (
+            f"hybrid, {constraint}: {LABELS[metric]} {100 * ours:.4f}e-2, {ours / theirs:.2f} times that of {other} "
+            f"(paper's hybrid {100 * paper:.3f}e-2)"
+        )
+
+    return [
+        compare("nupe", "none", "direct"),
+        compare("nupe", "random", "inconsistency"),
+        compare("ncpe", "random", "inconsistency"),
+        (
+            f"direct, random: nUPE {100 * mean['direct', 'random']['nupe_mean']:.1f}e-2; "
+            f"inconsistency, none: nUPE {100 * mean['inconsistency', 'none']['nupe_mean']:.0f}e-2"
+        ),
+    ]
+
+
+def trial(settings: toy.ToySettings, constraint: str, seed: np.random.SeedSequence) -> dict[str, tuple[float, ...]]:
     """Learn from one data set; the errors of each method."""
     rng = np.random.default_rng(seed)
     demos = toy.demonstrate(settings, rng, CONSTRAINTS[constraint])

@@ -45,7 +45,7 @@ class ToySettings:
         Share of the samples, drawn at random from all trajectories, that is held out for testing.
     folds : int
         Folds of whole demonstrations on which the threshold is chosen.
-    alpha, standard_errors : float
+    alpha : float
         See :class:`~unconstrain.Hybrid`.
     """
 
@@ -63,7 +63,6 @@ class ToySettings:
     test_share: float = 0.1
     folds: int = 40
     alpha: float = 0.3
-    standard_errors: float = 0.5
 
     @property
     def system(self) -> LimitCycle:
@@ -120,5 +119,5 @@ def learners(settings: ToySettings) -> dict[str, Learner]:
     return {
         "direct": Direct(),
         "inconsistency": Inconsistency(),
-        "hybrid": Hybrid(settings.alpha, settings.standard_errors),
+        "hybrid": Hybrid(settings.alpha),
     }

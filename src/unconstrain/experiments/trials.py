@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -14,18 +14,18 @@ from ..demonstration import Demonstration
 from ..learners import Learner
 from ..metrics import ncpe, ninconsistency, nupe
 from ..policies import Policy
+from .journal import DataClass, Journal
 
-__all__ = ["METRICS", "Progress", "Result", "errors", "row", "run_trials"]
+__all__ = ["LABELS", "METRICS", "Progress", "Result", "errors", "row", "run_trials"]
 
 METRICS = ("nupe", "ncpe", "ninc")
 """Normalised unconstrained and constrained policy error, and inconsistency."""
 
+LABELS = {"nupe": "nUPE", "ncpe": "nCPE", "ninc": "normalised inconsistency"}
+"""What people call them."""
+
 Progress = Callable[[int, int], None]
 """Called with how many trials are done, and of how many."""
-
-
-class _DataClass(Protocol):
-    __dataclass_fields__: Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,13 +44,13 @@ class Result:
     """
 
     name: str
-    settings: _DataClass
+    settings: DataClass
     rows: list[dict[str, Any]]
     details: dict[str, Any] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Settings and rows as plain values."""
-        return {"name": self.name, "settings": asdict(self.settings), "rows": self.rows}  # type: ignore[call-overload]
+        return {"name": self.name, "settings": asdict(self.settings), "rows": self.rows}
 
 
 def run_trials(
@@ -58,6 +58,7 @@ def run_trials(
     arguments: Iterable[Sequence[Any]],
     workers: int = 1,
     progress: Progress | None = None,
+    journal: Journal | None = None,
 ) -> list[Any]:
     """Run independent trials, in order, on some processes.
 
@@ -74,16 +75,23 @@ def run_trials(
         Processes; -1 for one on each core.
     progress : callable, optional
         See :data:`Progress`.
+    journal : Journal, optional
+        Keeps what is finished, so that an interrupted run goes on where it stopped.
     """
     calls = list(arguments)
-    results: list[Any] = []
+    found: dict[int, Any] = journal.begin() if journal is not None else {}
+    left = [index for index in range(len(calls)) if index not in found]
     with threadpool_limits(1):
-        jobs = (delayed(_on_one_thread)(trial, call) for call in calls)
-        for result in Parallel(n_jobs=workers, return_as="generator", batch_size=1)(jobs):
-            results.append(result)
+        jobs = (delayed(_on_one_thread)(trial, calls[index]) for index in left)
+        for index, result in zip(
+            left, Parallel(n_jobs=workers, return_as="generator", batch_size=1)(jobs), strict=True
+        ):
+            found[index] = result
+            if journal is not None:
+                journal.add(index, result)
             if progress is not None:
-                progress(len(results), len(calls))
-    return results
+                progress(len(found), len(calls))
+    return [found[index] for index in range(len(calls))]
 
 
 def errors(

@@ -20,7 +20,7 @@ from ..systems.wiping import HELD_OUT, PLATES, demonstrate
 from ..validation import Folds
 from .trials import Progress, Result, run_trials
 
-__all__ = ["Settings", "Split", "Surface", "run"]
+__all__ = ["Settings", "Split", "Surface", "headlines", "run"]
 
 
 @dataclass(frozen=True)
@@ -123,6 +123,23 @@ def run(settings: Settings | None = None, workers: int = 1, progress: Progress |
     learnt = run_trials(_learn, [(chosen, *split) for split in splits], workers, progress)
     rows = [row for split in learnt for row in (_real_rows(split) if chosen.real else _simulated_rows(split))]
     return Result("washing", chosen, rows, {"splits": learnt})
+
+
+def headlines(result: Result) -> list[str]:
+    """How the methods do on surfaces that they have not seen, in a sentence for each error."""
+    unseen = [row for row in result.rows if not row["seen"]]
+    said = []
+    for error, label in (("ncpe", "nCPE"), ("nupe", "nUPE")):
+        for kind in dict.fromkeys(row.get("normal") for row in unseen):
+            of_kind = [row for row in unseen if row.get("normal") == kind and row[error] is not None]
+            methods = dict.fromkeys(row["method"] for row in of_kind)
+            means = {m: float(np.mean([row[error] for row in of_kind if row["method"] == m])) for m in methods}
+            if means:
+                of = "" if kind is None else f" with the {kind} normals"
+                values = ", ".join(f"{method} {mean:.4f}" for method, mean in means.items())
+                ratio = means["hybrid"] / means["direct"]
+                said.append(f"{label} on unseen surfaces{of}, mean: {values}; hybrid is {ratio:.2f} times direct")
+    return said
 
 
 def learners(settings: Settings) -> dict[str, Learner]:

@@ -162,9 +162,13 @@ def resample(times: Array, values: Array, rate: float) -> tuple[Array, Array]:
 
     Raises
     ------
+    InvalidDataError
+        If there are no samples, or not as many stamps as values.
     SettingError
-        If the rate is not positive.
+        If the rate is not positive, or makes more samples than any memory holds.
     """
+    values = as_matrix(values, "values")
+    times = as_vector(times, "times", len(values))
     check_at_least("rate", rate, 0, strict=True)
     # A hair more than the duration: rounding must not lose the last sample.
     duration = (times[-1] - times[0]) * rate + 1e-6
@@ -239,6 +243,8 @@ def stamps(recording: Recording, recipe: Recipe) -> Array | None:
 
 
 def _prepare(recording: Recording, recipe: Recipe) -> tuple[Demonstration, list[str]]:
+    if not len(recording):
+        raise InvalidDataError(f"'{recording.name}' has no samples, expected at least one.")
     states = _finite(recording, recipe.states or ())
     actions = None if recipe.actions is None else _finite(recording, recipe.actions)
     times = stamps(recording, recipe)
@@ -381,5 +387,5 @@ def _samples_needed(recipe: Recipe, interval: float) -> int:
     """Length of the window: odd, and enough for the polynomial; three for central differences."""
     if recipe.differentiate == "central":
         return 3
-    wished = 0 if np.isnan(interval) else round(recipe.window_s / interval)
+    wished = 0 if np.isnan(interval) else round(min(recipe.window_s / interval, MOST_SAMPLES))
     return max(wished, recipe.order + 1) | 1

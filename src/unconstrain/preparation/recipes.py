@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
@@ -79,6 +79,7 @@ class Recipe:
         if self.still is not None:
             check_at_least("still", self.still, 0)
         _check_choice("order", self.order, ORDERS)
+        object.__setattr__(self, "order", int(self.order))
         _check_choice("centre", self.centre, (False, True))
         if self.differentiate is not None:
             _check_choice("differentiate", self.differentiate, METHODS)
@@ -101,6 +102,8 @@ class Recipe:
         SettingError
             If a name is unknown or a value out of its range.
         """
+        if not isinstance(values, Mapping):
+            raise SettingError(f"recipe: got {values!r}, expected a mapping of names to values.")
         known = [field.name for field in fields(cls)]
         unknown = [name for name in values if name not in known]
         if unknown:
@@ -176,8 +179,8 @@ def _numbered(columns: Sequence[str], letter: str) -> tuple[str, ...] | None:
 def _names(what: str, names: Any) -> tuple[str, ...] | None:
     if names is None:
         return None
-    listed = (names,) if isinstance(names, str) else tuple(names)
-    if not listed or len(set(listed)) < len(listed) or not all(isinstance(name, str) for name in listed):
+    listed = (names,) if isinstance(names, str) else tuple(names) if isinstance(names, Iterable) else ()
+    if not listed or not all(isinstance(name, str) for name in listed) or len(set(listed)) < len(listed):
         raise SettingError(f"{what}: got {names!r}, expected names of columns, at least one and each once.")
     return listed
 

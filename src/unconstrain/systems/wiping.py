@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..constraints import Plane
-from ..demonstration import Demonstration, Recording, Truth
+from ..demonstration import Demonstration, Recording, Truth, stack
 from ..preparation import Recipe, prepare
 from ..projection import null_space_projection
 from ..rollouts import rollout
@@ -40,9 +40,9 @@ class WipingPolicy:
         How much the sponge rises and falls with the circle, 1/s.
     """
 
-    radius: float = 0.15
+    radius: float = 0.3
     frequency: float = 0.5
-    grip: float = 2.0
+    grip: float = 1.5
     press: float = 0.05
     lift: float = 1.0
 
@@ -96,11 +96,17 @@ def demonstrate(
     policy: WipingPolicy | None = None,
     *,
     duration: float = 20.0,
+    strokes: int = 5,
+    reach: float = 2.0,
     rate: float = 20.0,
     noise: float = 0.002,
     unsteadiness: float = 0.03,
 ) -> Demonstration:
-    """Wipe a plate and be watched doing it.
+    """Wipe a plate in a few strokes, and be watched doing it.
+
+    Each stroke is put down somewhere on the plate and swings in to the
+    circle. Without that nobody could tell that the circle attracts: on a
+    steady cycle, the distance to it and its rate of change are uncorrelated.
 
     Parameters
     ----------
@@ -108,7 +114,11 @@ def demonstrate(
     rng : numpy.random.Generator
     policy : WipingPolicy, optional
     duration : float
-        Seconds.
+        Of all strokes together, s.
+    strokes : int
+        How often the sponge is put down.
+    reach : float
+        It is put down anywhere within this many radii of the circle.
     rate : float
         Frames per second.
     noise : float
@@ -123,25 +133,40 @@ def demonstrate(
         them, with the policy and the plate's projection at those positions.
     """
     wipe = policy or WipingPolicy()
+    recordings = [
+        _stroke(plate, wipe, rng, duration / strokes, rate, noise, unsteadiness, reach) for _ in range(strokes)
+    ]
+    pieces = prepare(recordings, Recipe(states=("x", "y", "z"), differentiate="savgol", window_s=0.25))
+    states, actions, _ = stack(pieces)
+    projection = null_space_projection(plate.constraint(states[:1], np.zeros(1)))
+    truth = Truth(wipe(states), np.repeat(projection, len(states), axis=0))
+    return Demonstration(states, actions, np.arange(len(states)) / rate, truth, plate.name)
+
+
+def _stroke(
+    plate: Plate,
+    wipe: WipingPolicy,
+    rng: np.random.Generator,
+    duration: float,
+    rate: float,
+    noise: float,
+    unsteadiness: float,
+    reach: float,
+) -> Recording:
+    """Put the sponge down somewhere and wipe: what the camera sees."""
     substeps = 10
     dt = 1.0 / (rate * substeps)
     steps = int(round(duration * rate)) * substeps
-    drift = _slow_noise(rng, steps, dt) * unsteadiness
-
-    clock = iter(range(steps))
+    drift = iter(unsteadiness * _slow_noise(rng, steps, dt))
 
     def hand(states: Array) -> Array:
-        return wipe(states) + drift[next(clock)]
+        return wipe(states) + next(drift)
 
-    start = plate.rotation[:, :2] @ (wipe.radius * _unit(rng.standard_normal(2)))
+    angle, radius = rng.uniform(0.0, 2.0 * np.pi), reach * wipe.radius * np.sqrt(rng.uniform(0.01, 1.0))
+    start = plate.rotation[:, :2] @ (radius * np.array([np.cos(angle), np.sin(angle)]))
     track = rollout(hand, start, steps, dt, plate.constraint)
     seen = track.states[::substeps] + noise * rng.standard_normal((steps // substeps, 3))
-    recording = Recording(("x", "y", "z"), seen, np.arange(len(seen)) / rate, plate.name)
-    recipe = Recipe(states=("x", "y", "z"), differentiate="savgol", window_s=0.25, order=2)
-    demo = prepare([recording], recipe)[0]
-    projection = null_space_projection(plate.constraint(demo.states[:1], np.zeros(1)))
-    truth = Truth(wipe(demo.states), np.repeat(projection, len(demo), axis=0))
-    return Demonstration(demo.states, demo.actions, demo.times, truth, plate.name)
+    return Recording(("x", "y", "z"), seen, np.arange(len(seen)) / rate, plate.name)
 
 
 def _slow_noise(rng: np.random.Generator, steps: int, dt: float, memory: float = 0.5) -> Array:
@@ -151,6 +176,3 @@ def _slow_noise(rng: np.random.Generator, steps: int, dt: float, memory: float =
     keep = np.exp(-dt / memory)
     return np.asarray(lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.standard_normal((steps, 3)), axis=0))
 
-
-def _unit(vector: Array) -> Array:
-    return vector / np.linalg.norm(vector)

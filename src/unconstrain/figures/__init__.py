@@ -1,0 +1,33 @@
+"""Pictures of demonstrations, policies and errors.
+
+They know arrays, demonstrations and callables, not estimators or experiments.
+Interactive ones are plotly figures; :func:`overview` draws with matplotlib.
+Both come with the extra ``viz`` and are imported when first used.
+"""
+
+from .curves import RATIO_COLOURS, bands, bars, dots, over_time, ratios, spectra, step_scores
+from .overview import overview
+from .planes import Quad, broken, paths, vector_field
+from .spaces import movements
+from .style import COLOURS, LABELS, METHODS, PALETTE
+
+__all__ = [
+    "COLOURS",
+    "LABELS",
+    "METHODS",
+    "PALETTE",
+    "RATIO_COLOURS",
+    "Quad",
+    "bands",
+    "bars",
+    "broken",
+    "dots",
+    "movements",
+    "over_time",
+    "overview",
+    "paths",
+    "ratios",
+    "spectra",
+    "step_scores",
+    "vector_field",
+]

@@ -1,0 +1,43 @@
+"""Data to learn from, drawn from a seed, with the truth that made it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Samples(NamedTuple):
+    """States (N, n), actions (N, d), their groups, and what made them."""
+
+    states: np.ndarray
+    actions: np.ndarray
+    groups: np.ndarray
+    policy: np.ndarray
+    projections: np.ndarray
+
+
+def spiral(states):
+    """A smooth policy in the plane that no affine map and no few kernels fit exactly."""
+    x, y = states[:, 0], states[:, 1]
+    return np.column_stack([y + 0.3 * x**2, -x + 0.5 * np.sin(2 * y)])
+
+
+def draw(seed=0, samples=90, groups=6, noise=0.02, constrained=True, policy=spiral, dimensions=2):
+    """Samples of a policy, each behind its own random one-dimensional constraint."""
+    rng = np.random.default_rng(seed)
+    states = rng.uniform(-1, 1, (samples, dimensions))
+    wanted = policy(states)
+    d = wanted.shape[1]
+    projections = np.tile(np.eye(d), (samples, 1, 1))
+    if constrained:
+        normals = rng.standard_normal((samples, d))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        projections -= normals[:, :, None] * normals[:, None, :]
+    actions = np.stack([N @ u for N, u in zip(projections, wanted, strict=True)])
+    actions += noise * rng.standard_normal(actions.shape)
+    return Samples(states, actions, np.arange(samples) % groups, wanted, projections)
+
+
+def rotation(seed, d):
+    """A random rotation of d dimensions."""
+    Q, R = np.linalg.qr(np.random.default_rng(seed).standard_normal((d, d)))
+    return Q * np.sign(np.diagonal(R))

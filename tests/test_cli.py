@@ -1,0 +1,941 @@
+"""The command line as its users meet it: what it prints, what it writes, how it says no."""
+
+import csv
+import io
+import json
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from numpy.testing import assert_allclose
+
+import unconstrain as uc
+from unconstrain import cli, experiments, storage
+from unconstrain.experiments import table1
+
+DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))
+RIM = DATA / "lasa_rim_wiping" / "demos_rim_processed_data.mat"
+needs_data = pytest.mark.skipif(
+    not RIM.is_file(),
+    reason=f"no car-rim recordings in {RIM.parent}; set UNCONSTRAIN_DATA to a folder that holds lasa_rim_wiping/",
+)
+needs_plotly = pytest.mark.skipif(
+    "plotly" not in sys.modules and not __import__("importlib.util").util.find_spec("plotly"),
+    reason="plotly is not installed; it comes with unconstrain[viz]",
+)
+
+A = np.array([[-0.5, 2.0], [-1.5, -0.3]])
+b = np.array([0.2, -0.1])
+"""The policy of the recordings, u = A x + b, known to none of the commands."""
+
+DT = 0.05
+
+
+class Ran:
+    """A command that has run: its exit code and its two streams."""
+
+    def __init__(self, code, out, err):
+        self.code, self.out, self.err = code, out, err
+
+
+def call(*args):
+    """Run a command in this process, for speed."""
+    result = CliRunner().invoke(cli.main, list(map(str, args)), prog_name="unconstrain")
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return Ran(result.exit_code, result.stdout, result.stderr)
+
+
+def run(*args):
+    """Run a command that has to succeed; returns what it printed."""
+    ran = call(*args)
+    assert ran.code == 0, ran.err
+    return ran.out
+
+
+def refused(*args):
+    """Run a command that has to refuse; returns its one sentence."""
+    ran = call(*args)
+    assert ran.code == 2
+    assert not ran.out
+    [said] = [line for line in ran.err.splitlines() if line.startswith("Error: ")]
+    assert ran.err.splitlines()[-1] == said
+    return said.removeprefix("Error: ")
+
+
+def environment(**more):
+    """The package under test, for a process of its own."""
+    package = str(Path(uc.__file__).parents[1])
+    return os.environ | {"PYTHONPATH": package, "OPENBLAS_NUM_THREADS": "1", "COLUMNS": "80", **more}
+
+
+def shell(command, cwd=None, **more):
+    """Run a line of shell in which ``unconstrain`` is the command."""
+    line = f'unconstrain() {{ "{sys.executable}" -m unconstrain "$@"; }}; {command}'
+    done = subprocess.run(
+        ["bash", "-c", line], capture_output=True, text=True, cwd=cwd, env=environment(**more), check=False, timeout=120
+    )
+    return Ran(done.returncode, done.stdout, done.stderr)
+
+
+# Recordings
+
+
+def record(start, steps=40, free=False, seed=0):
+    """Times, states and actions of the policy behind a random line that changes half-way."""
+    rng = np.random.default_rng(seed)
+    state, rows = np.array(start, dtype=float), []
+    for step in range(steps):
+        if step in (0, steps // 2):
+            normal = rng.standard_normal(2)
+            normal /= np.linalg.norm(normal)
+        action = A @ state + b
+        if not free:
+            action = action - normal * (normal @ action)
+        rows.append([step * DT, *state, *action])
+        state = state + DT * action
+    return np.array(rows)
+
+
+def write(path, head, rows):
+    """A CSV file with all digits."""
+    with path.open("w", newline="") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(head.split(","))
+        writer.writerows([[value if isinstance(value, str) else repr(float(value)) for value in row] for row in rows])
+    return path
+
+
+STARTS = np.random.default_rng(3).uniform(-1, 1, (8, 2))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Eight recordings, one in each file, and a policy learnt from them."""
+    folder = tmp_path_factory.mktemp("recordings")
+    for number, start in enumerate(STARTS):
+        write(folder / f"swing_{number}.csv", "t,x,y,vx,vy", record(start, seed=number))
+    run("fit", folder / "swing_*.csv", "--model", "linear", "-o", folder / "swing.npz")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def files(folder):
+    return sorted(folder.glob("swing_*.csv"))
+
+
+@pytest.fixture(scope="module")
+def policy(folder):
+    return folder / "swing.npz"
+
+
+def learnt(path):
+    """What the linear policy in a file says: its A and b, from three states."""
+    at = storage.load(path)(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+    return np.column_stack([at[1] - at[0], at[2] - at[0]]), at[0]
+
+
+def assert_learnt_the_policy(path, tolerance=1e-6):
+    found_A, found_b = learnt(path)
+    assert_allclose(found_A, A, atol=tolerance)
+    assert_allclose(found_b, b, atol=tolerance)
+
+
+# Help
+
+
+COMMANDS = ["inspect", "fit", "score", "rollout", "reproduce", "demo"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_has_an_example_and_fits_a_terminal(command):
+    said = run(command, "--help")
+    assert f"\n  Example:\n    unconstrain {command} " in said
+    assert max(map(len, said.splitlines())) <= 80
+    assert run(command, "-h") == said
+
+
+def test_help_of_all_names_each_command_in_a_whole_sentence():
+    said = run("--help")
+    for command in COMMANDS:
+        [line] = [line for line in said.splitlines() if line.startswith(f"  {command} ")]
+        assert line.endswith("."), line
+        assert not line.endswith("..."), line
+    assert max(map(len, said.splitlines())) <= 80
+
+
+def test_examples_use_options_that_exist():
+    for name in COMMANDS:
+        command = cli.main.commands[name]
+        known = {option for parameter in command.params for option in parameter.opts}
+        assert {word for word in command.epilog.split() if word.startswith("-")} <= known
+
+
+def test_importing_the_command_line_imports_nothing_heavy():
+    code = "import sys, unconstrain.cli; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment(), check=True)
+    heavy = {"numpy", "scipy", "sklearn", "joblib", "pandas", "matplotlib", "plotly", "rich", "mujoco", "pooch"}
+    assert not heavy & set(done.stdout.split())
+
+
+def test_each_experiment_that_exists_can_be_asked_for():
+    said = run("reproduce", "--help")
+    assert f"{{{'|'.join(experiments.NAMES)}}}" in said.replace("\n", "").replace(" ", "")
+
+
+def test_the_module_can_be_run(folder):
+    ran = shell("unconstrain --help", folder)
+    assert ran.code == 0
+    assert ran.out.startswith("Usage: unconstrain [OPTIONS] COMMAND [ARGS]...")
+
+
+def test_without_a_command_it_shows_how_to_go_on(folder):
+    ran = shell("unconstrain", folder)
+    assert ran.code == 2
+    assert "unconstrain inspect *.csv" in ran.out + ran.err
+
+
+# inspect
+
+
+def test_inspect_shows_a_line_for_each_demonstration(files):
+    lines = run("inspect", *files).splitlines()
+    assert lines[0].split("  ")[0] == "demonstration"
+    assert lines[1].split() == ["swing_0", "40", "1.95", "s", "20.0", "Hz", "0.0%", "none", "none", "0"]
+    assert [line.split()[0] for line in lines[1:9]] == [f"swing_{number}" for number in range(8)]
+    assert lines[9] == "columns: x, y, vx, vy"
+    assert lines[10] == "fit takes x, y as states and vx, vy as actions."
+    assert max(map(len, lines)) <= 80
+
+
+def test_inspect_finds_what_is_wrong(tmp_path):
+    rows = [[step * 0.1, step, 1.0, 0.0 if step in (2, 3) else 1.0, 0.0] for step in range(30)]
+    for row in rows[20:]:
+        row[0] += 2.0
+    rows[5][2] = float("nan")
+    rows[8][0] = rows[7][0]
+    write(tmp_path / "odd.csv", "t,x,y,vx,vy", rows)
+    said = run("inspect", tmp_path / "odd.csv")
+    assert "2.10 s at 1.90 s" in said
+    assert "y: 1" in said
+    assert said.splitlines()[1].split()[-1] == "2"
+    assert "'odd': time does not increase at row 8." in said
+
+
+def test_inspect_prints_json_for_programs(files):
+    found = json.loads(run("inspect", *files, "--json"))
+    assert [one["name"] for one in found] == [f"swing_{number}" for number in range(8)]
+    assert found[0]["columns"] == ["x", "y", "vx", "vy"]
+    assert found[0]["samples"] == 40
+    assert found[0]["rate_hz"] == pytest.approx(20.0)
+    assert found[0]["duration_s"] == pytest.approx(1.95)
+    assert found[0]["gaps"] == []
+    assert found[0]["zero_actions"] == 0
+
+
+def test_inspect_shows_columns_that_fit_cannot_guess(tmp_path):
+    write(tmp_path / "odd.csv", "left,right,up", [[1, 2, 3], [4, 5, 6]])
+    said = run("inspect", tmp_path / "odd.csv")
+    assert "columns: left, right, up\n" in said
+    assert "fit needs to know more: 'odd': cannot tell states and actions from its columns left, right, up." in said
+    assert "(--state, --action)" in said
+
+
+def test_inspect_counts_many_gaps(tmp_path):
+    times = np.arange(60) * 0.1 + 3.0 * (np.arange(60) // 10)
+    write(tmp_path / "gaps.csv", "t,x,y", np.column_stack([times, times, times]))
+    assert "and 2 more" in run("inspect", tmp_path / "gaps.csv")
+
+
+# fit
+
+
+def test_fit_finds_the_policy_behind_random_constraints(policy):
+    assert_learnt_the_policy(policy)
+
+
+def test_direct_learning_does_not(files, tmp_path):
+    run("fit", *files, "--model", "linear", "--learner", "direct", "-o", tmp_path / "p.npz")
+    found, _ = learnt(tmp_path / "p.npz")
+    assert np.abs(found - A).max() > 0.1
+
+
+def test_fit_says_what_it_did(files, tmp_path):
+    lines = run("fit", *files, "--model", "linear", "-o", tmp_path / "p.npz").splitlines()
+    assert lines[:3] == [
+        "Learnt from x, y as states and vx, vy as actions.",
+        "8 demonstrations, 320 samples.",
+        "The inconsistency determined 100% of 6 weight directions; the rest follows the standard risk.",
+    ]
+    assert lines[3].startswith("normalised inconsistency on the training data: ")
+    assert float(lines[3].split(": ")[1]) < 1e-12
+    assert lines[4] == f"policy: {tmp_path / 'p.npz'}"
+
+
+@pytest.mark.parametrize("learner", cli.LEARNERS)
+@pytest.mark.parametrize("model", cli.MODELS)
+def test_each_model_takes_each_learner(files, tmp_path, model, learner):
+    said = run("fit", *files, "--model", model, "--learner", learner, "-o", tmp_path / "p.npz")
+    assert ("local models" in said) == (model == "local")
+    assert ("The inconsistency determined" in said) == (learner != "direct")
+    assert type(storage.load(tmp_path / "p.npz").learner).__name__.lower() == learner
+
+
+def test_settings_reach_the_policy(files, tmp_path):
+    run(
+        "fit",
+        *files,
+        "--variance",
+        0.3,
+        "--alpha",
+        0.05,
+        "--folds",
+        4,
+        "--hold-out",
+        "sample",
+        "-o",
+        tmp_path / "p.npz",
+    )
+    found = storage.load(tmp_path / "p.npz")
+    assert (found.variance, found.learner) == (0.3, uc.Hybrid(alpha=0.05))
+    assert found.validation == uc.Folds(4, by="sample")
+    run("fit", *files, "--model", "rbf", "--centres", 9, "--softness", 0.1, "-o", tmp_path / "p.npz")
+    found = storage.load(tmp_path / "p.npz")
+    assert (found.features, found.learner) == (uc.KMeansRBF(9), uc.Hybrid(softness=0.1, threshold=0.0))
+
+
+def test_a_pattern_is_expanded_where_the_shell_did_not(folder, tmp_path):
+    assert "8 demonstrations" in run("fit", folder / "swing_?.csv", "--model", "linear", "-o", tmp_path / "p.npz")
+
+
+@pytest.mark.parametrize(("column", "option"), [("demo", ()), ("person", ("--group", "person"))])
+def test_one_file_can_hold_many_demonstrations(tmp_path, column, option):
+    rows = [[f"no {k}", *row] for k, start in enumerate(STARTS) for row in record(start, seed=k)]
+    write(tmp_path / "all.csv", f"{column},t,x,y,vx,vy", rows)
+    assert "8 demonstrations, 320" in run(
+        "fit", tmp_path / "all.csv", *option, "--model", "linear", "-o", tmp_path / "p.npz"
+    )
+    assert_learnt_the_policy(tmp_path / "p.npz")
+    lines = run("score", tmp_path / "p.npz", tmp_path / "all.csv").splitlines()
+    assert [line.split("  ")[0] for line in lines[1:]] == [*(f"no {k}" for k in range(8)), "all"]
+
+
+def test_columns_can_be_named(tmp_path):
+    for k, start in enumerate(STARTS):
+        write(tmp_path / f"{k}.csv", "clock,p,q,force,dp,dq", np.insert(record(start, seed=k), 3, 7.0, axis=1))
+    named = ("--state", "p,q", "--action", "dp, dq", "--time", "clock")
+    run("fit", tmp_path / "*.csv", *named, "--model", "linear", "-o", tmp_path / "p.npz")
+    assert_learnt_the_policy(tmp_path / "p.npz")
+    assert run("rollout", tmp_path / "p.npz", "--start", "0,0", "--steps", 1).splitlines()[0] == "t,p,q,vp,vq"
+
+
+def circle(tmp_path, rate=100.0):
+    """Two turns at one radian a second, at several radii: u = (−y, x)."""
+    times = np.arange(0.0, 4 * np.pi, 1 / rate)
+    for k, radius in enumerate((0.5, 1.0, 1.5)):
+        track = radius * np.column_stack([np.cos(times), np.sin(times)])
+        write(tmp_path / f"circle_{k}.csv", "t,x,y", np.column_stack([times, track]))
+    return tmp_path / "circle_*.csv"
+
+
+@pytest.mark.parametrize("how", [(), ("--differentiate",), ("--by", "central"), ("--by", "savgol", "--window", 0.1)])
+def test_velocities_are_found_from_positions(tmp_path, how):
+    said = run("fit", circle(tmp_path), *how, "--model", "linear", "-o", tmp_path / "p.npz")
+    method = "central differences" if "central" in how else "savgol, 0.1 s" if 0.1 in how else "savgol, 0.25 s"
+    assert f"x, y as states and their velocity ({method}) as actions." in said
+    found_A, found_b = learnt(tmp_path / "p.npz")
+    assert_allclose(found_A, [[0, -1], [1, 0]], atol=1e-3)
+    assert_allclose(found_b, 0, atol=1e-3)
+
+
+def test_rate_resamples(tmp_path):
+    said = run("fit", circle(tmp_path), "--rate", 10, "--model", "linear", "-o", tmp_path / "p.npz")
+    assert f"3 demonstrations, {3 * 126} samples" in said  # 4π s at 10 Hz, with both ends
+    assert_allclose(learnt(tmp_path / "p.npz")[0], [[0, -1], [1, 0]], atol=2e-3)
+
+
+def test_centre_takes_positions_from_the_mean(tmp_path):
+    for k, at in enumerate([(5.0, -3.0), (0.0, 9.0), (1.0, 1.0)]):
+        times = np.arange(0.0, 2 * np.pi, 0.01)
+        track = np.array(at) + np.column_stack([np.cos(times), np.sin(times)])
+        write(tmp_path / f"{k}.csv", "t,x,y", np.column_stack([times, track]))
+    run("fit", tmp_path / "*.csv", "--centre", "--model", "linear", "-o", tmp_path / "p.npz")
+    assert_allclose(learnt(tmp_path / "p.npz")[0], [[0, -1], [1, 0]], atol=1e-2)
+
+
+def test_archives_are_read(tmp_path):
+    rows = np.concatenate([record(start, seed=k) for k, start in enumerate(STARTS)])
+    groups = np.repeat([f"demo {k}" for k in range(8)], 40)
+    np.savez(tmp_path / "all.npz", states=rows[:, 1:3], actions=rows[:, 3:], times=rows[:, 0], groups=groups)
+    assert "8 demonstrations" in run("fit", tmp_path / "all.npz", "--model", "linear", "-o", tmp_path / "p.npz")
+    assert_learnt_the_policy(tmp_path / "p.npz")
+
+
+def test_what_was_mended_is_said_in_a_note(tmp_path):
+    pattern = circle(tmp_path)
+    track = np.loadtxt(tmp_path / "circle_0.csv", delimiter=",", skiprows=1)
+    track[600:, 0] += 3.0
+    write(tmp_path / "circle_0.csv", "t,x,y", track)
+    ran = call("fit", pattern, "--model", "linear", "-o", tmp_path / "p.npz")
+    assert ran.code == 0
+    [note] = ran.err.splitlines()
+    assert note.startswith("Note: 'circle_0': 1 gap in the time stamps, the longest 3.01 s after 5.99 s; ")
+
+
+@needs_plotly
+def test_fit_writes_a_report_too(files, tmp_path):
+    said = run("fit", *files, "--model", "linear", "-o", tmp_path / "p.npz", "--report", tmp_path / "p.html")
+    assert f"report: {tmp_path / 'p.html'}" in said
+    assert "<html" in (tmp_path / "p.html").read_text(encoding="utf-8")
+
+
+# score
+
+
+def test_score_prints_a_line_for_each_demonstration_and_all(policy, files):
+    lines = run("score", policy, *files[:2]).splitlines()
+    assert lines[0].split("  ")[0] == "demonstration"
+    assert [line.split()[0] for line in lines[1:]] == ["swing_0", "swing_1", "all"]
+    assert [line.split()[1] for line in lines[1:]] == ["40", "40", "80"]
+    assert max(float(line.split()[2]) for line in lines[1:]) < 1e-12
+
+
+def test_score_is_the_inconsistency_by_hand(files, tmp_path):
+    run("fit", *files, "--model", "linear", "--learner", "direct", "-o", tmp_path / "p.npz")
+    found = json.loads(run("score", tmp_path / "p.npz", files[0], "--json"))
+    found_A, found_b = learnt(tmp_path / "p.npz")
+    rows = np.loadtxt(files[0], delimiter=",", skiprows=1)
+    missed = 0.0
+    for row in rows:
+        state, action = row[1:3], row[3:]
+        length = np.linalg.norm(action)
+        missed += (length - action @ (found_A @ state + found_b) / length) ** 2
+    variance = len(rows) * rows[:, 3:].var(axis=0).sum()
+    assert found["rows"] == [{"demonstration": "swing_0", "samples": 40, "ninc": pytest.approx(missed / variance)}]
+    assert found["all"]["ninc"] == pytest.approx(missed / variance)
+    assert found["policy"] == str(tmp_path / "p.npz")
+
+
+def test_score_with_a_plane_is_the_constrained_error_by_hand(policy, tmp_path):
+    normal = np.array([0.6, 0.8])
+    rows = record((0.3, 0.5), free=True)
+    rows[:, 3:] -= np.outer(rows[:, 3:] @ normal, normal)
+    rows[:, 3:] += 0.1 * np.array([-0.8, 0.6])  # a mistake along the plane, of length 0.1 at each sample
+    write(tmp_path / "held.csv", "t,x,y,vx,vy", rows)
+    variance = rows[:, 3:].var(axis=0).sum()
+    said = run("score", policy, tmp_path / "held.csv", "--plane", "3,4")  # of any length
+    assert said.splitlines()[0].split()[-1] == "nCPE"
+    assert float(said.splitlines()[1].split()[-1]) == pytest.approx(0.01 / variance, rel=1e-3)
+    assert json.loads(run("score", policy, tmp_path / "held.csv", "--plane", "3,4", "--json"))["all"]["ncpe"] == (
+        pytest.approx(0.01 / variance)
+    )
+
+
+def test_score_prepares_recordings_as_fit_did(tmp_path):
+    pattern = circle(tmp_path)
+    run("fit", pattern, "--by", "central", "--rate", 10, "--model", "linear", "-o", tmp_path / "p.npz")
+    assert json.loads(run("score", tmp_path / "p.npz", pattern, "--json"))["rows"][0]["samples"] == 126
+
+
+def test_a_policy_saved_from_python_can_be_scored(files, tmp_path):
+    demos = uc.prepare(uc.read(files))
+    uc.save(uc.ParametricPolicy(uc.Affine()).fit_demonstrations(demos), tmp_path / "p.npz")
+    assert run("score", tmp_path / "p.npz", files[0]).splitlines()[1].startswith("swing_0")
+
+
+# rollout
+
+
+def table(text):
+    """Head and numbers of a CSV text."""
+    head, *rows = csv.reader(io.StringIO(text))
+    return head, np.array(rows, dtype=float)
+
+
+def test_rollout_follows_the_policy_by_euler_steps(policy):
+    head, rows = table(run("rollout", policy, "--start", "0.5,-0.25", "--steps", 30, "--dt", 0.1))
+    assert head == ["t", "x", "y", "vx", "vy"]
+    state = np.array([0.5, -0.25])
+    for step, row in enumerate(rows):
+        action = A @ state + b
+        assert_allclose(row, [0.1 * step, *state, *action], atol=1e-6)
+        state = state + 0.1 * action
+    assert len(rows) == 30
+
+
+def test_rollout_stays_on_a_plane(policy):
+    normal = np.array([1.0, 2.0])
+    _, free = table(run("rollout", policy, "--start", "0.5,0.1", "--steps", 100))
+    _, held = table(run("rollout", policy, "--start", "0.5,0.1", "--steps", 100, "--plane", "1,2"))
+    assert np.abs((free[:, 1:3] - [0.5, 0.1]) @ normal).max() > 0.1
+    assert_allclose((held[:, 1:3] - [0.5, 0.1]) @ normal, 0, atol=1e-8)
+    assert_allclose(held[:, 3:] @ normal, 0, atol=1e-8)
+    along = np.array([2.0, -1.0]) / np.sqrt(5)
+    assert_allclose(held[:, 3:] @ along, (held[:, 1:3] @ A.T + b) @ along, atol=1e-6)  # u = N π
+
+
+def test_rollout_writes_what_it_would_print(policy, tmp_path):
+    printed = run("rollout", policy, "--start", "0.5,0", "--steps", 5)
+    assert run("rollout", policy, "--start", "0.5,0", "--steps", 5, "-o", "-") == printed
+    assert not run("rollout", policy, "--start", "0.5,0", "--steps", 5, "-o", tmp_path / "path.csv")
+    assert (tmp_path / "path.csv").read_text() == printed
+
+
+def test_a_negative_start_is_a_number_and_no_option(policy):
+    _, rows = table(run("rollout", policy, "--start", "-0.5,-1e-3", "--steps", 1))
+    assert_allclose(rows[0, 1:3], [-0.5, -1e-3])
+
+
+def test_a_rollout_can_be_learnt_from(policy, tmp_path):
+    for k, start in enumerate(["0.5,0", "-0.5,0.5", "0.2,-0.9"]):
+        run("rollout", policy, "--start", start, "-o", tmp_path / f"{k}.csv")
+    run("fit", tmp_path / "?.csv", "--model", "linear", "-o", tmp_path / "again.npz")
+    assert_learnt_the_policy(tmp_path / "again.npz", 1e-4)
+
+
+def test_a_movement_far_from_the_data_is_noted(files, tmp_path):
+    run("fit", *files, "-o", tmp_path / "p.npz")
+    near = call("rollout", tmp_path / "p.npz", "--start", f"{STARTS[0][0]},{STARTS[0][1]}", "--steps", 3)
+    far = call("rollout", tmp_path / "p.npz", "--start", "90,0", "--steps", 3)
+    assert (near.code, near.err) == (0, "")
+    assert (far.code, far.err) == (0, "Note: from 0.00 s on the movement is far from all data.\n")
+    assert len(far.out.splitlines()) == 4
+
+
+# Wrong input
+
+
+def bad(folder, what):
+    """A recording that cannot be learnt from."""
+    path = folder / f"{what}.csv"
+    rows = [[f"{value:.6f}" for value in row] for row in record((0.5, 0.5))]
+    if what == "hole":
+        rows[7][2] = ""
+    if what == "nan":
+        rows[7][2] = "nan"
+    if what == "word":
+        rows[7][2] = "left"
+    if what == "backwards":
+        rows[7][0] = "-1"
+    write(path, "t,x,y,vx,vy", rows)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda at: at / "none.csv", "{at}/none.csv: no such file, expected the path of a file."),
+        (lambda at: at / "none_*.csv", "{at}/none_*.csv: no such file, expected the path of a file."),
+        (lambda at: at, "{at}: a folder, expected the path of a file."),
+        (
+            lambda at: bad(at, "hole"),
+            (
+                "'hole', row 7, column 'y': found nan (1 such cells in the selected columns), expected finite numbers. "
+                "Remove or repair these rows first."
+            ),
+        ),
+        (
+            lambda at: bad(at, "nan"),
+            (
+                "'nan', row 7, column 'y': found nan (1 such cells in the selected columns), expected finite numbers. "
+                "Remove or repair these rows first."
+            ),
+        ),
+        (
+            lambda at: bad(at, "word"),
+            "{at}/word.csv, line 9, column 'y': got 'left', expected a number as elsewhere in this column.",
+        ),
+        (
+            lambda at: bad(at, "backwards"),
+            (
+                "'backwards', row 7: got time -1 s after 0.3 s, expected later ones. "
+                "Sort the rows, or split the file where a new recording begins."
+            ),
+        ),
+    ],
+    ids=["missing", "pattern", "folder", "hole", "nan", "word", "backwards"],
+)
+def test_a_recording_that_cannot_be_used_is_refused_in_one_sentence(tmp_path, make, sentence):
+    said = refused("fit", make(tmp_path), "-o", tmp_path / "p.npz")
+    assert said == sentence.format(at=tmp_path)
+    assert not (tmp_path / "p.npz").exists()
+
+
+def test_garbage_is_refused(tmp_path):
+    garbage = np.random.default_rng(0).bytes(5000)
+    for name in ("garbage", "garbage.csv", "garbage.npz"):
+        (tmp_path / name).write_bytes(garbage)
+        for command in (("fit", "-o", tmp_path / "p.npz"), ("inspect",)):
+            assert refused(*command, tmp_path / name).startswith(f"{tmp_path / name}: ")
+
+
+def test_an_empty_file_and_one_without_rows_are_refused(tmp_path):
+    (tmp_path / "empty.csv").touch()
+    (tmp_path / "head.csv").write_text("t,x,y\n")
+    assert refused("inspect", tmp_path / "empty.csv").endswith(
+        "the file is empty, expected a header and rows of numbers."
+    )
+    assert "a header but no rows" in refused("inspect", tmp_path / "head.csv")
+
+
+@pytest.mark.parametrize(
+    "option", [("--state", "x,z"), ("--state", "x,y", "--action", "z"), ("--state", "z", "--by", "savgol")]
+)
+def test_an_unknown_column_is_answered_with_those_there_are(files, tmp_path, option):
+    said = refused("fit", *files, *option, "-o", tmp_path / "p.npz")
+    assert said == "'swing_0' has no column 'z'; it has x, y, vx, vy."
+
+
+@pytest.mark.parametrize("option", ["--group", "--time"])
+def test_an_unknown_group_or_time_is_answered_with_the_columns_there_are(files, tmp_path, option):
+    said = refused("fit", files[0], option, "z", "-o", tmp_path / "p.npz")
+    assert said == f"{files[0]}: no column 'z' for {option[2:]}; it has t, x, y, vx, vy."
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--rate", "-3"), "rate: got -3.0, expected a number above 0."),
+        (("--rate", "nan"), "rate: got nan, expected a number above 0."),
+        (("--rate", "fast"), "Invalid value for '--rate': 'fast' is not a valid float."),
+        (("--window", "0"), "window_s: got 0.0, expected a number above 0."),
+        (("--variance", "0"), "variance: got 0.0, expected a number above "),
+        (("--folds", "1"), "Invalid value for '--folds': 1 is not in the range x>=2."),
+        (("--alpha", "-1"), "alpha: got -1.0, expected a number of at least 0.0."),
+        (("--softness", "inf"), "softness: got inf, expected a number of at least 0.0."),
+        (
+            ("--model", "deep"),
+            "Invalid value for '--model': 'deep' is not one of 'local', 'rbf', 'linear'.",
+        ),
+        (
+            ("--learner", "direct", "--alpha", "1"),
+            "--alpha: belongs to the hybrid learner, got --learner direct.",
+        ),
+        (
+            ("--learner", "inconsistency", "--softness", "1"),
+            "--softness: belongs to the hybrid learner, got --learner inconsistency.",
+        ),
+        (
+            ("--alpha", "0.1", "--softness", "0.1"),
+            "--alpha: chooses a threshold, and --softness does without one; give one of the two.",
+        ),
+        (("--centres", "9"), "--centres: belongs to --model rbf, got --model local."),
+        (("--model", "rbf", "--variance", "1"), "--variance: belongs to --model local, got --model rbf."),
+        (
+            ("--action", "vx,vy", "--differentiate"),
+            "--action: got columns, and --differentiate or --by too; give one or the other.",
+        ),
+    ],
+)
+def test_a_wrong_setting_is_refused_in_one_sentence(files, tmp_path, options, sentence):
+    assert refused("fit", *files, *options, "-o", tmp_path / "p.npz").startswith(sentence)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_recording_is_never_overwritten_by_its_policy(files, tmp_path):
+    path = tmp_path / "swing.csv"
+    path.write_bytes(files[0].read_bytes())
+    for options in (("-o", path), ("-o", tmp_path / "p.npz", "--report", path)):
+        said = refused("fit", path, *options)
+        assert said == f"{path}: is one of the files to learn from; give another name to write to."
+    assert path.read_bytes() == files[0].read_bytes()
+
+
+def test_a_place_that_cannot_be_written_to_is_named(files, policy, tmp_path):
+    away = tmp_path / "none" / "x"
+    assert refused("fit", files[0], "-o", away) == f"{away}: cannot be written (No such file or directory)."
+    assert refused("rollout", policy, "--start", "0,0", "-o", away) == f"{away}: No such file or directory."
+    assert "is a directory" in refused("rollout", policy, "--start", "0,0", "-o", tmp_path)
+    assert "is a directory" in refused("fit", files[0], "-o", tmp_path)
+
+
+@pytest.mark.parametrize("command", [("score", "{policy}", "{file}"), ("rollout", "{policy}", "--start", "0,0")])
+def test_a_policy_file_that_is_not_ours_is_refused(files, tmp_path, command):
+    class Trap:
+        def __reduce__(self):
+            return os.mkdir, (str(tmp_path / "run"),)
+
+    (tmp_path / "pickle.npz").write_bytes(pickle.dumps(Trap()))
+    np.savez(tmp_path / "plain.npz", states=np.zeros((3, 2)), actions=np.zeros((3, 2)))
+    uc.save(uc.LocallyLinearPolicy(), tmp_path / "new.npz")
+    for name, sentence in (
+        ("none.npz", "no such file, expected a policy file."),
+        ("", "a folder, expected a policy file."),
+        ("pickle.npz", "is no policy file, or a damaged one. Expected a file that save() wrote."),
+        ("plain.npz", "was not written by unconstrain. Expected a file that save() wrote."),
+        ("new.npz", "holds a policy that has learnt nothing yet. Fit it before saving."),
+    ):
+        path = tmp_path / name
+        said = refused(*(word.format(policy=path, file=files[0]) for word in command))
+        assert said == f"{path}: {sentence}"
+    assert refused(*(word.format(policy=files[0], file=files[0]) for word in command)).startswith(f"{files[0]}: is no ")
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--start", "1"), "--start: got 1 numbers, expected 2, one for each state."),
+        (("--start", "1,2,3"), "--start: got 3 numbers, expected 2, one for each state."),
+        (
+            ("--start", "1,two"),
+            "Invalid value for '--start': got '1,two', expected finite numbers separated by commas, such as 0.1,0,-2.",
+        ),
+        (
+            ("--start", "1,nan"),
+            "Invalid value for '--start': got '1,nan', expected finite numbers separated by commas, such as 0.1,0,-2.",
+        ),
+        (("--start", "0,0", "--plane", "1,0,0"), "--plane: got 3 numbers, expected 2, as many as states."),
+        (("--start", "0,0", "--dt", "0"), "dt: got 0.0, expected a number above 0.0."),
+        (("--start", "0,0", "--steps", "0"), "Invalid value for '--steps': 0 is not in the range x>=1."),
+        ((), "Missing option '--start'."),
+    ],
+)
+def test_a_rollout_that_makes_no_sense_is_refused(policy, tmp_path, options, sentence):
+    assert refused("rollout", policy, *options, "-o", tmp_path / "path.csv") == sentence
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_plane_without_a_direction_is_refused(policy, files):
+    for command in (("rollout", policy, "--start", "0,0"), ("score", policy, files[0])):
+        assert refused(*command, "--plane", "0,0").startswith("normal: got [")
+
+
+def test_a_plane_of_other_dimension_than_the_actions_is_refused(policy, files):
+    said = refused("score", policy, files[0], "--plane", "1,0,0")
+    assert said == "--plane: got 3 numbers, expected 2, one for each action."
+
+
+def test_a_rollout_that_runs_away_is_refused(policy, tmp_path):
+    refused("rollout", policy, "--start", "1e90,0", "--dt", 1e90, "-o", tmp_path / "path.csv")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_recording_of_other_columns_is_refused_by_score(policy, tmp_path):
+    write(tmp_path / "other.csv", "t,a,b", [[0, 1, 2], [1, 2, 3]])
+    assert refused("score", policy, tmp_path / "other.csv") == "'other' has no column 'x', 'y'; it has a, b."
+
+
+def test_actions_that_are_no_velocities_cannot_be_rolled_out(tmp_path):
+    rows = record((0.5, 0.5))
+    write(tmp_path / "one.csv", "t,x,y,u", rows[:, :4])
+    run("fit", tmp_path / "one.csv", "--state", "x,y", "--action", "u", "--model", "linear", "-o", tmp_path / "p.npz")
+    said = refused("rollout", tmp_path / "p.npz", "--start", "0,0")
+    assert said.endswith("a rollout expects actions that are velocities of the state.")
+
+
+# In a terminal
+
+
+def test_no_traceback_in_a_process_of_its_own(folder):
+    ran = shell("unconstrain fit none.csv -o p.npz", folder)
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err == "Error: none.csv: no such file, expected the path of a file.\n"
+
+
+def test_a_closed_pipe_is_no_error_to_see(folder):
+    for command, head in (
+        ("rollout swing.npz --start 0.5,0 --steps 3000", "t,x,y,vx,vy\n"),
+        ("inspect swing_*.csv --json", "[\n"),
+    ):
+        ran = shell(f"unconstrain {command} | head -1", folder)
+        assert (ran.code, ran.out, ran.err) == (0, head, "")
+
+
+def test_tables_do_not_wrap_in_a_terminal_of_80_columns(folder):
+    if not (Path("/usr/bin/script").exists() and sys.platform == "linux"):
+        pytest.skip("no script(1) of util-linux to be a terminal")
+    line = f"'{sys.executable}' -m unconstrain inspect swing_*.csv"
+    done = subprocess.run(
+        ["script", "-qec", f"stty cols 80; {line}", "/dev/null"],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        env=environment(TERM="xterm"),
+        check=True,
+    )
+    rows = [row for row in done.stdout.splitlines() if "swing_" in row]
+    assert [len(row.split()) for row in rows] == [10] * 8
+
+
+# reproduce and demo
+
+
+@pytest.fixture(scope="module")
+def table1_of_two(tmp_path_factory):
+    """The JSON of two trials of table 1, and what was printed."""
+    pytest.importorskip("plotly")
+    out = tmp_path_factory.mktemp("table1")
+    said = run("reproduce", "table1", "--trials", 2, "--workers", 1, "--out", out)
+    return (out / "table1.json").read_text(), said, out
+
+
+def test_reproduce_writes_numbers_and_a_page(table1_of_two):
+    text, said, out = table1_of_two
+    assert sorted(path.name for path in out.iterdir()) == ["table1.html", "table1.json"]
+    assert said.endswith(f"numbers: {out / 'table1.json'}\nreport:  {out / 'table1.html'}\n")
+    found = json.loads(text)
+    assert found["settings"]["trials"] == 2
+    assert found["settings"]["seed"] == 0
+    assert len(found["rows"]) == 6
+    assert "<html" in (out / "table1.html").read_text(encoding="utf-8")
+
+
+def test_reproduce_prints_a_table_for_80_columns(table1_of_two):
+    _, said, _ = table1_of_two
+    lines = said.splitlines()
+    assert lines[0].split() == ["method", "constr.", "nUPE", "nCPE", "norm.", "incon."]
+    assert [line.split()[:2] for line in lines[1:7]] == [
+        [method, data] for method in ("direct", "inconsistency", "hybrid") for data in ("none", "random")
+    ]
+    assert max(map(len, lines[:7])) <= 80
+
+
+def test_the_printed_means_are_those_in_the_file(table1_of_two):
+    text, said, _ = table1_of_two
+    for line, row in zip(said.splitlines()[1:7], json.loads(text)["rows"], strict=True):
+        assert float(line.split()[2]) == pytest.approx(row["nupe_mean"], rel=0.05)
+        assert line.split()[3] == "±"
+
+
+@pytest.mark.slow
+def test_numbers_do_not_depend_on_workers(table1_of_two, tmp_path):
+    run("reproduce", "table1", "--trials", 2, "--workers", 2, "--out", tmp_path)
+    assert (tmp_path / "table1.json").read_text() == table1_of_two[0]
+
+
+def test_another_seed_gives_other_numbers(table1_of_two, tmp_path):
+    run("reproduce", "table1", "--trials", 2, "--workers", 1, "--seed", 1, "--out", tmp_path)
+    found, other = json.loads((tmp_path / "table1.json").read_text()), json.loads(table1_of_two[0])
+    assert found["settings"] == other["settings"] | {"seed": 1}
+    assert all(a["nupe_mean"] != b["nupe_mean"] for a, b in zip(found["rows"], other["rows"], strict=True))
+
+
+def test_an_interrupted_run_goes_on_where_it_stopped(table1_of_two, tmp_path, monkeypatch):
+    calls = []
+
+    def interrupted(*args):
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        calls.append(args)
+        return whole(*args)
+
+    whole = table1.trial
+    arguments = ("reproduce", "table1", "--trials", 2, "--workers", 1, "--out", tmp_path)
+    monkeypatch.setattr(table1, "trial", interrupted)
+    assert call(*arguments).code == 1
+    assert not (tmp_path / "table1.json").exists()
+    monkeypatch.setattr(table1, "trial", lambda *args: calls.append(args) or whole(*args))
+    run(*arguments)
+    assert len(calls) == 4  # two data sets free and two constrained, none of them twice
+    assert (tmp_path / "table1.json").read_text() == table1_of_two[0]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["table1.html", "table1.json"]
+
+
+@needs_plotly
+@pytest.mark.parametrize("name", ["figure4", "washing"])
+def test_an_experiment_of_a_single_data_set_takes_no_trials(name, tmp_path):
+    assert refused("reproduce", name, "--trials", 3, "--out", tmp_path) == f"--trials: {name} is a single data set."
+    assert not list(tmp_path.iterdir())
+
+
+@needs_plotly
+def test_figure4_writes_its_rows(tmp_path):
+    run("reproduce", "figure4", "--workers", 1, "--out", tmp_path)
+    assert len(json.loads((tmp_path / "figure4.json").read_text())["rows"]) == 6
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("table9",), "Invalid value for "),
+        (("table1", "--workers", "0"), "--workers: got 0, expected a number of processes, or -1 for one on each core."),
+        (("table1", "--trials", "0"), "Invalid value for '--trials': 0 is not in the range x>=1."),
+        (("table1", "--seed", "-1"), "Invalid value for '--seed': -1 is not in the range x>=0."),
+    ],
+)
+def test_an_experiment_that_cannot_be_run_is_refused(tmp_path, options, sentence):
+    said = refused("reproduce", *options, "--out", tmp_path)
+    assert said.startswith(sentence)
+    if options == ("table9",):
+        assert all(repr(name) in said for name in experiments.NAMES)
+    assert not list(tmp_path.iterdir())
+
+
+def test_results_cannot_go_into_a_file(tmp_path):
+    (tmp_path / "taken").touch()
+    for command in (("reproduce", "table1", "--trials", 1), ("demo",)):
+        said = refused(*command, "--out", tmp_path / "taken")
+        assert said == f"Invalid value for '--out': Directory '{tmp_path / 'taken'}' is a file."
+
+
+@pytest.fixture(scope="module")
+def demonstrated(tmp_path_factory):
+    """What the demo says and writes."""
+    pytest.importorskip("plotly")
+    out = tmp_path_factory.mktemp("demo")
+    return run("demo", "--out", out), out
+
+
+@pytest.mark.slow
+def test_demo_washes_a_car_and_says_how_well(demonstrated):
+    said, out = demonstrated
+    lines = said.splitlines()
+    assert lines[0] == "Seven plates are wiped, five to learn from, two to be tested on."
+    assert lines[1].split() == ["method", "surface", "seen", "nCPE", "nUPE"]
+    assert any(line.startswith("nCPE on unseen surfaces, mean: direct ") for line in lines)
+    assert lines[-1] == f"report:  {out / 'washing.html'}"
+    assert max(map(len, lines[:23])) <= 80
+
+
+@pytest.mark.slow
+def test_demo_writes_a_row_for_each_method_and_surface(demonstrated):
+    found = json.loads((demonstrated[1] / "washing.json").read_text())
+    assert {(row["method"], row["surface"]) for row in found["rows"]} == {
+        (method, surface)
+        for method in ("direct", "inconsistency", "hybrid")
+        for surface in (
+            [
+                "flat",
+                *(f"{sign}{angle}° about x" for sign in "+-" for angle in (16, 27)),
+                "+16° about y",
+                "-16° about y",
+            ]
+        )
+    }
+    assert {row["surface"] for row in found["rows"] if not row["seen"]} == {"+16° about y", "-16° about y"}
+    assert all(row["ncpe"] <= row["nupe"] for row in found["rows"])
+
+
+@needs_data
+@needs_plotly
+@pytest.mark.slow
+def test_demo_learns_from_real_recordings(tmp_path, monkeypatch):
+    monkeypatch.setenv("UNCONSTRAIN_DATA", str(DATA))
+    said = run("demo", "--real", "--out", tmp_path)
+    assert "nCPE on unseen surfaces with the plane normals, mean: direct " in said
+    rows = json.loads((tmp_path / "washing.json").read_text())["rows"]
+    assert {(row["surface"], row["normal"]) for row in rows} == {
+        (tilt, normal) for tilt in ("flat", "tilt40", "tilt66", "tilt67") for normal in ("plane", "tool")
+    }
+    assert all(row["nupe"] is None and row["seen"] is False for row in rows)
+
+
+def test_demo_says_where_it_looked_for_recordings(tmp_path):
+    ran = shell(
+        "unconstrain demo --real", tmp_path, UNCONSTRAIN_DATA=str(tmp_path), HOME=str(tmp_path), XDG_CACHE_HOME=""
+    )
+    assert ran.code == 2
+    assert not ran.out
+    [said] = ran.err.splitlines()
+    assert said.startswith(
+        f"Error: demos_rim_processed_data.mat is not on this machine (looked in {tmp_path}/demos_rim"
+    )
+    assert said.endswith("On the command line, --download allows it.")
+    assert "set UNCONSTRAIN_DATA to a folder" in said
+    assert not list(tmp_path.iterdir())

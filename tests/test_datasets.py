@@ -1,0 +1,197 @@
+"""Published recordings: found, checked, fetched only if allowed, and cut into what they show."""
+
+from __future__ import annotations
+
+import csv
+import functools
+import hashlib
+import http.server
+import os
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from unconstrain import datasets
+from unconstrain.datasets import WipingBout, load_rim_wiping
+from unconstrain.errors import MissingExtraError, ReadError
+
+DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))
+RIM = DATA / "lasa_rim_wiping"
+needs_data = pytest.mark.skipif(
+    not (RIM / datasets.RIM_FILE).is_file(),
+    reason=f"no car-rim recordings in {RIM}; set UNCONSTRAIN_DATA to a folder that holds lasa_rim_wiping/",
+)
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty cache, and no local copy."""
+    pooch = pytest.importorskip("pooch")
+    monkeypatch.setattr(pooch, "os_cache", lambda name: tmp_path / "cache" / name)
+    monkeypatch.delenv(datasets.DATA_VARIABLE, raising=False)
+    return tmp_path / "cache" / "unconstrain"
+
+
+@pytest.fixture
+def published(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder on a server of this machine, in place of the one on the internet."""
+
+    class Silent(http.server.SimpleHTTPRequestHandler):
+        def log_message(self, *_: object) -> None:
+            pass
+
+    folder = tmp_path / "published"
+    folder.mkdir()
+    monkeypatch.setenv("NO_PROXY", "127.0.0.1")
+    monkeypatch.setenv("no_proxy", "127.0.0.1")
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Silent, directory=folder)) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        monkeypatch.setattr(datasets, "RIM_URL", f"http://127.0.0.1:{server.server_port}/{datasets.RIM_FILE}")
+        yield folder
+        server.shutdown()
+        thread.join()
+
+
+# --------------------------------------------------------------------------------------------------- where it is
+
+
+def test_without_a_copy_both_ways_to_one_are_told(cache: Path) -> None:
+    with pytest.raises(ReadError) as caught:
+        load_rim_wiping()
+    assert f"{datasets.RIM_FILE} is not on this machine (looked in {cache / datasets.RIM_FILE})" in str(caught.value)
+    assert "allow the download with download=True" in str(caught.value)
+    assert f"set UNCONSTRAIN_DATA to a folder that holds a copy of {datasets.RIM_URL}" in str(caught.value)
+
+
+def test_without_pooch_only_the_download_needs_it(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pooch", None)
+    with pytest.raises(ReadError, match=r"looked in no folder"):
+        load_rim_wiping()
+    with pytest.raises(MissingExtraError, match=r"pip install 'unconstrain\[data\]'"):
+        load_rim_wiping(download=True)
+
+
+@pytest.mark.parametrize("folder", [".", "lasa_rim_wiping"])
+def test_a_local_copy_is_found_and_checked(
+    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: str
+) -> None:
+    local = tmp_path / "local" / folder
+    local.mkdir(parents=True)
+    (local / datasets.RIM_FILE).write_bytes(b"something else")
+    monkeypatch.setenv(datasets.DATA_VARIABLE, str(tmp_path / "local"))
+    found = hashlib.sha256(b"something else").hexdigest()
+    with pytest.raises(ReadError, match=f"its SHA-256 is {found}, expected {datasets.RIM_SHA256}: damaged, or another"):
+        load_rim_wiping()
+
+
+def test_a_download_with_the_wrong_checksum_is_refused_and_not_kept(cache: Path, published: Path) -> None:
+    (published / datasets.RIM_FILE).write_bytes(b"tampered")
+    with pytest.raises(ReadError, match=r"could not be downloaded from http://127.* hash .* does not match"):
+        load_rim_wiping(download=True)
+    assert not (cache / datasets.RIM_FILE).exists()
+
+
+def test_a_download_that_is_not_there_is_one_clear_error(cache: Path, published: Path) -> None:
+    with pytest.raises(ReadError, match=r"could not be downloaded from .*404 .*Try again, or set UNCONSTRAIN_DATA"):
+        load_rim_wiping(download=True)
+
+
+@needs_data
+def test_a_download_is_kept_and_used_without_asking_again(cache: Path, published: Path) -> None:
+    (published / datasets.RIM_FILE).write_bytes((RIM / datasets.RIM_FILE).read_bytes())
+    first = load_rim_wiping(download=True)
+    (published / datasets.RIM_FILE).unlink()
+    again = load_rim_wiping()
+    assert (cache / datasets.RIM_FILE).is_file()
+    for one, other in zip(first, again, strict=True):
+        np.testing.assert_array_equal(one.demonstration.states, other.demonstration.states)
+
+
+# ----------------------------------------------------------------------------------------------------- what it is
+
+
+@pytest.fixture
+def bouts(monkeypatch: pytest.MonkeyPatch) -> dict[str, WipingBout]:
+    monkeypatch.setenv(datasets.DATA_VARIABLE, str(DATA))
+    return {bout.name: bout for bout in load_rim_wiping()}
+
+
+@pytest.fixture
+def annotations() -> dict[str, dict[str, str]]:
+    with (RIM / "bouts.csv").open() as file:
+        return {row["bout"]: row for row in csv.DictReader(file)}
+
+
+def numbers(row: dict[str, str], *names: str) -> list[float]:
+    return [float(row[name]) for name in names]
+
+
+@needs_data
+def test_the_recordings_are_those_of_the_converted_tables() -> None:
+    tracks = datasets._load_rim(RIM / datasets.RIM_FILE)
+    assert len(tracks) == 6
+    for index, track in enumerate(tracks):
+        table = np.loadtxt(RIM / f"demo_{index}.csv", delimiter=",", skiprows=1)
+        np.testing.assert_allclose(track.positions, table[:, 1:4], atol=1e-6)
+        assert track.interval == pytest.approx(np.diff(table[:, 0]).mean(), rel=1e-6)
+
+
+@needs_data
+def test_rows_and_tilts_are_those_annotated(annotations: dict[str, dict[str, str]]) -> None:
+    for bout in datasets.RIM_BOUTS:
+        row = annotations[bout.name]
+        assert [bout.recording, bout.start, bout.stop] == [int(row[key]) for key in ("demo", "start", "stop")]
+        assert bout.tilt == row["group"]
+    assert len(annotations) == len(datasets.RIM_BOUTS)
+
+
+@needs_data
+def test_both_normals_are_those_annotated(bouts: dict[str, WipingBout], annotations: dict[str, dict[str, str]]) -> None:
+    for name, bout in bouts.items():
+        row = annotations[name]
+        np.testing.assert_allclose(bout.plane_normal, numbers(row, "nx", "ny", "nz"), atol=2e-6)
+        np.testing.assert_allclose(bout.tool_normal, numbers(row, "toolnx", "toolny", "toolnz"), atol=2e-6)
+        angle = np.degrees(np.arccos(bout.plane_normal @ bout.tool_normal))
+        assert angle == pytest.approx(float(row["angle_plane_tool_deg"]), abs=1e-4)
+
+
+@needs_data
+def test_all_bouts_go_round_the_same_way(bouts: dict[str, WipingBout]) -> None:
+    for bout in bouts.values():
+        demonstration = bout.demonstration
+        arms = demonstration.states - demonstration.states.mean(axis=0)
+        assert (np.cross(arms, demonstration.actions) @ bout.plane_normal).mean() > 0
+
+
+@needs_data
+def test_velocities_are_tangent_to_the_flat_rim_and_add_up_to_the_way(bouts: dict[str, WipingBout]) -> None:
+    for name, bout in bouts.items():
+        demonstration = bout.demonstration
+        assert demonstration.times is not None
+        np.testing.assert_allclose(np.diff(demonstration.times), 0.05)
+        way = np.trapezoid(demonstration.actions, demonstration.times, axis=0)
+        np.testing.assert_allclose(way, demonstration.states[-1] - demonstration.states[0], atol=4e-3)
+        if name.startswith("A"):
+            off = np.linalg.norm(demonstration.actions @ bout.plane_normal) / np.linalg.norm(demonstration.actions)
+            assert off < 0.04
+
+
+@needs_data
+def test_the_bout_wiped_backwards_is_turned_round(bouts: dict[str, WipingBout]) -> None:
+    states = bouts["C1"].demonstration.states
+    track = datasets._load_rim(RIM / datasets.RIM_FILE)[3]
+    np.testing.assert_array_equal(states[-1], track.positions[350])
+
+
+@needs_data
+def test_rate_and_centring_can_be_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(datasets.DATA_VARIABLE, str(DATA))
+    for bout in load_rim_wiping(rate=10, centre=True):
+        assert bout.demonstration.times is not None
+        np.testing.assert_allclose(np.diff(bout.demonstration.times), 0.1)
+        np.testing.assert_allclose(bout.demonstration.states.mean(axis=0), 0, atol=1e-12)

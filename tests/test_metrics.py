@@ -1,0 +1,151 @@
+"""How far a policy is from the truth."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+import naive
+import unconstrain as uc
+from samples import draw
+from unconstrain.constraints import Plane
+from unconstrain.errors import InvalidDataError, SettingError
+
+
+def demonstrations(seed=0, noise=0.0, groups=3):
+    data = draw(seed, samples=30, noise=noise)
+    pick = [data.groups % groups == g for g in range(groups)]
+    return [
+        uc.Demonstration(data.states[r], data.actions[r], truth=uc.Truth(data.policy[r], data.projections[r]), name=f"d{g}")
+        for g, r in enumerate(pick)
+    ]
+
+
+def guess(states):
+    return np.column_stack([states[:, 0], 0.5 + 0 * states[:, 1]])
+
+
+def loops(policy, demos):
+    """UPE, CPE and inconsistency, one sample after the other."""
+    free = constrained = inconsistent = 0.0
+    for demo in demos:
+        for x, u, pi, N in zip(demo.states, demo.actions, demo.truth.policy, demo.truth.projections, strict=True):
+            error = pi - policy(x[None])[0]
+            free += error @ error
+            constrained += (N @ error) @ (N @ error)
+            inconsistent += naive.inconsistency(u[None], policy(x[None]))
+    return free, constrained, inconsistent
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+def test_errors_are_those_of_plain_loops(noise):
+    demos = demonstrations(noise=noise)
+    free, constrained, inconsistent = loops(guess, demos)
+    assert uc.upe(guess, demos) == pytest.approx(free)
+    assert uc.cpe(guess, demos) == pytest.approx(constrained)
+    assert uc.inconsistency(guess, demos) == pytest.approx(inconsistent)
+
+
+def test_normalised_errors_are_divided_by_samples_and_variance():
+    demos = demonstrations()
+    pi = np.concatenate([demo.truth.policy for demo in demos])
+    norm = len(pi) * (pi[:, 0].var() + pi[:, 1].var())
+    for plain, normalised in ((uc.upe, uc.nupe), (uc.cpe, uc.ncpe), (uc.inconsistency, uc.ninconsistency)):
+        assert normalised(guess, demos) == pytest.approx(plain(guess, demos) / norm)
+
+
+@given(st.integers(0, 1000))
+def test_they_are_ordered_sample_by_sample(seed):
+    (demo,) = demonstrations(seed, groups=1)
+    for n in range(len(demo)):
+        one = demo[n : n + 1]
+        assert uc.inconsistency(guess, one) <= uc.cpe(guess, one) + 1e-12
+        assert uc.cpe(guess, one) <= uc.upe(guess, one) + 1e-12
+
+
+def test_in_the_plane_behind_one_constraint_inconsistency_is_cpe():
+    demos = demonstrations()
+    assert uc.inconsistency(guess, demos) == pytest.approx(uc.cpe(guess, demos))
+
+
+def test_the_true_policy_has_no_error():
+    from samples import spiral
+
+    for metric in (uc.nupe, uc.ncpe, uc.ninconsistency):
+        assert_allclose(metric(spiral, demonstrations()), 0, atol=1e-20)
+
+
+def test_the_mean_of_a_free_policy_has_an_error_of_one():
+    (demo,) = demonstrations(groups=1)
+    assert uc.nupe(lambda x: np.tile(demo.truth.policy.mean(axis=0), (len(x), 1)), demo) == pytest.approx(1.0)
+
+
+def test_without_a_truth_a_constraint_tells_the_projection():
+    rng = np.random.default_rng(0)
+    states, wanted = rng.standard_normal((20, 3)), rng.standard_normal((20, 3))
+    normal = np.array([0.0, 0.6, 0.8])
+    N = np.eye(3) - np.outer(normal, normal)
+    demo = uc.Demonstration(states, wanted @ N, np.arange(20.0))
+    expected = sum(np.sum((u - N @ x) ** 2) for u, x in zip(demo.actions, states, strict=True))
+    variance = demo.actions.var(axis=0).sum()
+    assert uc.cpe(lambda x: x, demo, Plane(normal)) == pytest.approx(expected)
+    assert uc.ncpe(lambda x: x, demo, Plane(normal)) == pytest.approx(expected / (20 * variance))
+    assert uc.ninconsistency(lambda x: x, demo) == pytest.approx(
+        naive.inconsistency(demo.actions, states) / (20 * variance)
+    )
+
+
+def test_a_constraint_goes_by_the_demonstration_s_clock():
+    seen = []
+
+    def constraint(states, times):
+        seen.append(times)
+        return np.zeros((len(states), 1, 2))
+
+    states = np.random.default_rng(0).standard_normal((3, 2))
+    demos = [uc.Demonstration(states, states, [1, 2, 3]), uc.Demonstration(states, states)]
+    uc.cpe(lambda x: x, demos, constraint)
+    assert_allclose(seen, [[1, 2, 3], [0, 0, 0]])
+
+
+def test_a_policy_of_one_dimension_may_be_flat():
+    demo = uc.Demonstration([[0.0], [1.0]], [[1.0], [3.0]])
+    assert uc.inconsistency(lambda x: x[:, 0], demo) == pytest.approx(1.0 + 4.0)
+
+
+@pytest.mark.parametrize("predict", [lambda x: x[:, :1], lambda x: x.T, lambda x: x.ravel(), lambda x: x[:-1]])
+def test_actions_of_another_shape_are_refused_and_never_reshaped(predict):
+    with pytest.raises(SettingError, match=r"policy: got actions of shape .* for 30 states, expected \(30, 2\)"):
+        uc.inconsistency(predict, demonstrations())
+
+
+def test_errors_that_need_the_truth_say_so():
+    (known,) = demonstrations(groups=1)
+    unknown = uc.Demonstration(known.states, known.actions, name="log")
+    with pytest.raises(InvalidDataError, match=r"demonstration 1 \('log'\) has no truth, and this error needs the true"):
+        uc.nupe(guess, [known, unknown])
+    with pytest.raises(InvalidDataError, match=r"'log' has no truth that tells how it was constrained"):
+        uc.ncpe(guess, unknown)
+
+
+@pytest.mark.parametrize("value", [0.0, 0.1, 1e8])
+def test_a_policy_that_never_changes_cannot_normalise(value):
+    demo = uc.Demonstration(np.arange(7.0)[:, None], np.full((7, 1), value))
+    with pytest.raises(InvalidDataError, match="the policy is the same at every sample"):
+        uc.ninconsistency(lambda x: x, demo)
+
+
+@pytest.mark.parametrize("metric", [uc.upe, uc.cpe, uc.inconsistency, uc.nupe, uc.ncpe, uc.ninconsistency])
+def test_no_demonstration_has_no_error(metric):
+    with pytest.raises(InvalidDataError, match="got no demonstration, expected at least one"):
+        metric(guess, [])
+
+
+@pytest.mark.parametrize("metric", [uc.upe, uc.cpe, uc.inconsistency])
+def test_demonstrations_of_different_width_are_refused(metric):
+    (demo,) = demonstrations(groups=1)
+    truth = uc.Truth(np.ones((2, 1)), np.ones((2, 1, 1)))
+    odd = uc.Demonstration(np.ones((2, 1)), np.ones((2, 1)), truth=truth, name="odd")
+    with pytest.raises(InvalidDataError, match=r"demonstration 1 \('odd'\) has 1 state and 1 action columns"):
+        metric(guess, [demo, odd])

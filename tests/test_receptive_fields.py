@@ -1,0 +1,110 @@
+"""Receptive fields and where they are put."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+import naive
+from unconstrain import ReceptiveFields, cover
+from unconstrain.errors import InvalidDataError, SettingError
+from unconstrain.receptive_fields import choose_variance
+
+
+def states(seed=0, samples=60, n=2):
+    return np.random.default_rng(seed).uniform(-1, 1, (samples, n))
+
+
+@given(st.integers(0, 1000), st.floats(0.01, 10), st.floats(0.05, 0.95), st.integers(1, 3))
+def test_every_sample_counts_enough_in_some_field(seed, variance, at_least, n):
+    table = states(seed, n=n)
+    fields = cover(table, variance, at_least)
+    best = [max(naive.gaussian(x, c, variance) for c in fields.centres) for x in table]
+    assert min(best) >= at_least * (1 - 1e-12)
+    assert (fields.support(table) >= at_least * (1 - 1e-9)).all()
+
+
+@given(st.integers(0, 1000))
+def test_no_field_covers_the_centre_of_another(seed):
+    fields = cover(states(seed), 0.1, 0.7)
+    weights = fields.weights(fields.centres)
+    np.fill_diagonal(weights, 0.0)
+    assert weights.max() < 0.7
+
+
+def test_fields_sit_on_samples_and_the_first_near_the_mean():
+    table = states()
+    fields = cover(table, 0.1)
+    assert all((table == c).all(axis=1).any() for c in fields.centres)
+    assert_array_equal(fields.centres[0], table[((table - table.mean(axis=0)) ** 2).sum(axis=1).argmin()])
+
+
+def test_farthest_first_is_the_plain_loop():
+    table, variance = states(1), 0.2
+    chosen = [int(np.argmin([(x - table.mean(axis=0)) @ (x - table.mean(axis=0)) for x in table]))]
+    while True:
+        best = np.array([max(naive.gaussian(x, table[c], variance) for c in chosen) for x in table])
+        if best.min() >= 0.7:
+            break
+        chosen.append(int(best.argmin()))
+    assert_array_equal(cover(table, variance).centres, table[chosen])
+
+
+def test_wide_fields_are_few():
+    assert len(cover(states(), 1e6).centres) == 1
+    assert len(cover(states(), 1e-9).centres) == 60
+
+
+def test_weights_are_the_paper_s():
+    fields = ReceptiveFields(states(2, 4), 0.3)
+    expected = [[naive.gaussian(x, c, 0.3) for c in fields.centres] for x in states(3, 9)]
+    assert_allclose(fields.weights(states(3, 9)), expected)
+    assert_allclose(fields.shares(states(3, 9)), np.array(expected) / np.sum(expected, axis=1, keepdims=True))
+    assert_allclose(fields.support(states(3, 9)), np.max(expected, axis=1))
+
+
+@pytest.mark.parametrize("distance", [1e2, 1e10, 1e99])
+def test_far_from_all_data_the_nearest_field_decides_and_support_is_nil(distance):
+    fields = ReceptiveFields(np.array([[0.0, 0.0], [1.0, 0.0]]), 0.1)
+    far = np.array([[distance, 0.0], [-distance, 0.0]])
+    assert_allclose(fields.shares(far), [[0.0, 1.0], [1.0, 0.0]], atol=1e-9)
+    assert_array_equal(fields.support(far), [0.0, 0.0])
+    assert_array_equal(fields.weights(far), np.zeros((2, 2)))
+
+
+@pytest.mark.parametrize("most", [1, 5, 20])
+def test_the_variance_is_widened_until_few_fields_suffice(most):
+    table = states()
+    variance = choose_variance(table, most=most)
+    assert len(cover(table, variance).centres) <= most
+    quarter = sum(np.mean((column - column.mean()) ** 2) for column in table.T) / 4
+    doublings = np.log2(variance / quarter)
+    assert doublings == pytest.approx(round(doublings), abs=1e-9)
+    assert doublings == 0 or len(cover(table, variance / 2).centres) > most
+
+
+@pytest.mark.parametrize("value", [0.0, 0.1, -1e8])
+def test_states_that_do_not_vary_have_variance_one(value):
+    assert choose_variance(np.full((7, 2), value)) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "sentence"),
+    [
+        ((np.ones((2, 1)), 0.0), SettingError, "variance: got 0.0, expected a number above 1e-200"),
+        ((np.ones((2, 1)), 1.0, 1.0), SettingError, "at_least: got 1.0, expected a weight between 0 and 1"),
+        ((np.ones((2, 1)), 1.0, 0.0), SettingError, "at_least: got 0.0, expected a weight between 0 and 1"),
+        (([[1.0], [np.nan]], 1.0), InvalidDataError, "states: found nan at row 1, column 0"),
+    ],
+)
+def test_what_cannot_be_covered_is_said_in_a_sentence(arguments, error, sentence):
+    with pytest.raises(error, match=sentence):
+        cover(*arguments)
+
+
+def test_fields_are_checked():
+    with pytest.raises(InvalidDataError, match=r"centres: got an array of shape \(2,\)"):
+        ReceptiveFields([1.0, 2.0], 1.0)
+    with pytest.raises(SettingError, match="variance: got -1.0"):
+        ReceptiveFields([[1.0, 2.0]], -1.0)

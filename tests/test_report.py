@@ -1,0 +1,356 @@
+"""Reports can be read by people, in a browser and without a network, and by machines."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import sys
+from dataclasses import dataclass, replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import unconstrain as uc
+from unconstrain import report
+from unconstrain.errors import MissingExtraError
+from unconstrain.experiments import figure4, figure5, table1, toy, washing
+from unconstrain.experiments.trials import Result
+from unconstrain.report import html
+from unconstrain.systems.wiping import PLATES, demonstrate
+
+DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))
+SMALL = {"demonstrations": 8, "steps": 10, "per_axis": 4, "folds": 4}
+RESULTS = {
+    "table1": lambda: table1.run(table1.Settings(**SMALL, trials=2)),
+    "figure4": lambda: figure4.run(figure4.Settings(**SMALL, arrows=5)),
+    "figure5": lambda: figure5.run(figure5.Settings(**SMALL, widest=(0.0, 0.5, 1.5), trials=2)),
+    "washing": lambda: washing.run(washing.Settings(duration=4.0, steps=40)),
+    "of another kind": lambda: Result("else", Odd(), [{"method": "direct", "seen": True, "ncpe": 0.1, "nupe": None}]),
+}
+
+
+@dataclass(frozen=True)
+class Odd:
+    """Settings.
+
+    Parameters
+    ----------
+    first, second : float
+        Something with a :class:`~unconstrain.Hybrid` and <angles>,
+        over two lines.
+    """
+
+    first: float = 0.5
+    second: tuple[bool, str] = (True, "a")
+
+
+def wiping(columns: slice = slice(None), times: bool = True) -> list[uc.Demonstration]:
+    """As a user has it: without the truth."""
+    demos = [demonstrate(plate, np.random.default_rng(at), duration=4.0) for at, plate in enumerate(PLATES[:5])]
+    return [
+        uc.Demonstration(one.states[:, columns], one.actions[:, columns], one.times if times else None, name=one.name)
+        for one in demos
+    ]
+
+
+def plane() -> list[uc.Demonstration]:
+    settings = toy.ToySettings(**SMALL)
+    return toy.demonstrate(settings, np.random.default_rng(0), toy.random_lines)
+
+
+def still() -> list[uc.Demonstration]:
+    return [uc.Demonstration(np.zeros((4, 4)), np.zeros((4, 2)), name="still")]
+
+
+FITS = {
+    "in the plane": (uc.ParametricPolicy(uc.NormalisedRBF.grid(-1, 1, 3), uc.Hybrid()), plane),
+    "in space": (uc.LocallyLinearPolicy(), wiping),
+    "in one dimension": (uc.ParametricPolicy(uc.Affine(), uc.Direct()), lambda: wiping(slice(1), times=False)),
+    "that never moves": (uc.LocallyLinearPolicy(learner=uc.Inconsistency()), still),
+}
+
+
+@pytest.fixture(scope="module")
+def results():
+    """Each result, computed when first asked for."""
+    found = {}
+
+    def of(name):
+        if name not in found:
+            found[name] = RESULTS[name]()
+        return found[name]
+
+    return of
+
+
+def fit_page(name, title="A policy"):
+    policy, demos = FITS[name][0], FITS[name][1]()
+    return report.policy_page(policy.fit_demonstrations(demos), demos, title)
+
+
+class TestFiles:
+    @pytest.mark.parametrize("name", RESULTS)
+    def test_json_and_html_are_written(self, results, name, tmp_path):
+        result = results(name)
+        data, page = report.write(result, tmp_path / "new" / "folder")
+        assert (data.name, page.name) == (f"{result.name}.json", f"{result.name}.html")
+        assert {one.name for one in data.parent.iterdir()} == {data.name, page.name}
+        assert json.loads(data.read_text("utf-8")) == json.loads(json.dumps(result.to_json()))
+        assert page.stat().st_size < 8e6
+
+    def test_a_second_time_replaces_the_first(self, results, tmp_path):
+        for _ in range(2):
+            data, page = report.write(results("of another kind"), tmp_path)
+        assert sorted(tmp_path.iterdir()) == sorted([data, page])
+
+    def test_what_is_not_finite_becomes_null(self, results, tmp_path):
+        row = {"a": np.nan, "b": -np.inf, "c": np.float64(1.5), "d": np.arange(2), "e": (None, True), "f": np.int64(3)}
+        data, _ = report.write(replace(results("of another kind"), rows=[row]), tmp_path)
+        found = json.loads(data.read_text("utf-8"), parse_constant=pytest.fail)["rows"]
+        assert found == [{"a": None, "b": None, "c": 1.5, "d": [0, 1], "e": [None, True], "f": 3}]
+
+    def test_nothing_is_left_when_writing_fails(self, results, tmp_path, monkeypatch):
+        def full(*_):
+            raise OSError("no space left")
+
+        monkeypatch.setattr(Path, "replace", full)
+        with pytest.raises(OSError, match="no space"):
+            report.write(results("of another kind"), tmp_path)
+        assert list(tmp_path.iterdir()) == []
+
+    def test_without_plotly_it_says_what_to_install_and_writes_nothing(self, results, tmp_path, monkeypatch):
+        monkeypatch.setitem(sys.modules, "plotly.offline", None)
+        with pytest.raises(MissingExtraError, match=r"'plotly', which is not installed.*unconstrain\[viz\]"):
+            report.write(results("of another kind"), tmp_path / "out")
+        assert not (tmp_path / "out").exists()
+
+
+class TestRows:
+    """What machines may rely on."""
+
+    ERRORS = {f"{metric}_{what}" for metric in ("nupe", "ncpe", "ninc") for what in ("mean", "sd")}
+
+    def rows(self, results, name, tmp_path):
+        return json.loads(report.write(results(name), tmp_path)[0].read_text("utf-8"))["rows"]
+
+    def test_table1_has_a_row_for_each_method_and_constraint(self, results, tmp_path):
+        rows = self.rows(results, "table1", tmp_path)
+        assert len({(row["method"], row["constraint"]) for row in rows}) == len(rows) == 6
+        for row in rows:
+            assert row.keys() >= self.ERRORS | {f"paper_{name}" for name in self.ERRORS}
+
+    def test_table1_is_in_plain_units(self, results, tmp_path):
+        rows = self.rows(results, "table1", tmp_path)
+        [row] = [row for row in rows if (row["method"], row["constraint"]) == ("hybrid", "random")]
+        assert row["paper_nupe_mean"] == pytest.approx(0.00373)
+
+    def test_figure5_has_a_row_for_each_method_and_angle(self, results, tmp_path):
+        rows = self.rows(results, "figure5", tmp_path)
+        assert {row["theta_max"] for row in rows} == {0.0, 0.5, 1.5}
+        assert all(row.keys() >= self.ERRORS for row in rows)
+
+    def test_washing_says_which_surfaces_were_seen(self, results, tmp_path):
+        rows = self.rows(results, "washing", tmp_path)
+        assert all(row.keys() >= {"method", "surface", "seen", "ncpe", "nupe"} for row in rows)
+        assert sum(row["seen"] for row in rows) == 15
+        assert sum(not row["seen"] for row in rows) == 6
+
+
+class References(HTMLParser):
+    """Everything a browser would fetch."""
+
+    def __init__(self):
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, tag, attributes):
+        for name, value in attributes:
+            if name in {"src", "href", "srcset", "data", "poster", "action"} and not (value or "").startswith("data:"):
+                self.found.append(f"{tag} {name}={value}")
+
+
+class TestPages:
+    @pytest.mark.parametrize("name", RESULTS)
+    def test_a_page_refers_to_nothing_outside_itself(self, results, name):
+        page = report.page(results(name))
+        references = References()
+        references.feed(page)
+        assert references.found == []
+        style = re.search(r"<style>(.*?)</style>", page, re.DOTALL)[1]
+        assert "url(" not in style
+        assert "@import" not in style
+
+    def test_plotly_is_embedded_once(self, results):
+        page = report.page(results("figure5"))
+        assert page.count("* plotly.js v") == 1
+        assert page.count("Plotly.newPlot(") >= 5
+
+    def test_names_are_text_and_never_markup(self):
+        evil = "<script>alert(1)</script>"
+        demos = [replace(demo, name=evil) for demo in plane()]
+        page = report.policy_page(uc.ParametricPolicy().fit_demonstrations(demos), demos, evil)
+        assert evil not in page
+        assert "&lt;script&gt;alert(1)" in page
+
+    def test_settings_are_explained_by_their_docstring(self, results):
+        page = report.page(results("of another kind"))
+        assert "Something with a Hybrid and &lt;angles&gt;, over two lines." in page
+        assert '<td class="left">yes, a</td>' in page
+
+    def test_ours_is_beside_the_papers(self, results):
+        page = report.page(results("table1"))
+        assert "58.3 ± 9.6" in page  # direct, random constraint, nUPE × 10⁻²
+        assert "0.373 ± 1.1" in page
+
+    def test_arrows_that_were_cut_are_confessed(self, results):
+        result = results("figure4")
+        wild = {**result.details["none"]["fields"], "inconsistency": 1e6 * result.details["policy"] + 1e6}
+        details = result.details | {"none": {**result.details["none"], "fields": wild}}
+        assert "100% of inconsistency (left)" in report.page(replace(result, details=details))
+
+    def test_movements_that_leave_the_picture_are_named(self, results):
+        result = results("washing")
+        [split] = result.details["splits"]
+        run = split.rollouts["direct"]
+        away = replace(run, states=run.states + np.linspace(0, 1, len(run))[:, None])
+        changed = replace(split, rollouts=split.rollouts | {"direct": away})
+        page = report.page(replace(result, details={"splits": [changed]}))
+        assert re.search(r"These left the picture: [^.]*direct after [\d.]+ s on \+16° about y", page)
+
+
+class TestNumbers:
+    @pytest.mark.parametrize(
+        ("value", "text"),
+        [
+            (0.0131, "0.0131"),
+            (50217.0, "50200"),
+            (58.338, "58.3"),
+            (0.034, "0.034"),
+            (1.0, "1"),
+            (-0.5, "−0.5"),
+            (0.99999, "1"),
+            (1.234e-7, "1.23×10⁻⁷"),
+            (9.999e-8, "1×10⁻⁷"),
+            (7.4e7, "7.4×10⁷"),
+            (0.0, "0"),
+            (None, "–"),
+            (np.nan, "–"),
+            (np.inf, "–"),
+        ],
+    )
+    def test_numbers_have_three_significant_digits(self, value, text):
+        assert html.number(value) == text
+
+    def test_mean_and_deviation_are_scaled_together(self):
+        assert html.mean_sd(0.00131, 0.00028) == "0.131 ± 0.028"
+        assert html.mean_sd(None, None) == "–"
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    """Chromium without a window."""
+    if os.environ.get("UNCONSTRAIN_NO_BROWSER") == "1":
+        pytest.skip("UNCONSTRAIN_NO_BROWSER is set")
+    chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
+    if chromium is None or driver is None:
+        pytest.fail(
+            "These tests open reports in Chromium, and it or its driver is missing. Install them with "
+            "'apt-get install chromium chromium-driver' (or scripts/install-browser), or set UNCONSTRAIN_NO_BROWSER=1 "
+            "to leave these tests out."
+        )
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    for argument in (
+        "headless",
+        "no-sandbox",
+        "disable-gpu",
+        "disable-dev-shm-usage",
+        "enable-unsafe-swiftshader",  # WebGL without a graphics card
+        "no-first-run",
+        "disable-background-networking",
+        "disable-component-update",
+        "disable-sync",
+        "window-size=1200,1000",
+        f"user-data-dir={tmp_path_factory.mktemp('chromium')}",
+    ):
+        options.add_argument(f"--{argument}")
+    started = webdriver.Chrome(options=options, service=Service(driver))
+    yield started
+    started.quit()
+
+
+GRAPHS = """
+return [...document.querySelectorAll(".js-plotly-plot")].map(graph => ({
+  id: graph.id, traces: graph.data.length, drawn: graph.querySelectorAll(".main-svg").length,
+  scenes: graph.data.some(trace => trace.type === "scatter3d"),
+  canvases: graph.querySelectorAll(".gl-container canvas").length,
+  empty: graph.data.filter(t => !["x", "y"].some(axis => t[axis] && (t[axis].length || t[axis]._inputArray))).length,
+  wide: graph.getBoundingClientRect().width,
+}));
+"""
+
+
+def opened(browser, page, folder):
+    """Open a page, check that it has drawn all it has, and return its graphs."""
+    path = folder / "page.html"
+    path.write_text(page, "utf-8")
+    browser.get(path.as_uri())
+    graphs = browser.execute_script(GRAPHS)
+    said = [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
+    assert said == []
+    assert browser.execute_script("return performance.getEntriesByType('resource').map(one => one.name)") == []
+    assert len(graphs) == browser.execute_script("return document.querySelectorAll('.plotly-graph-div').length")
+    for graph in graphs:
+        assert graph["drawn"] >= 1, graph
+        assert graph["traces"] >= 1, graph
+        assert graph["empty"] == 0, graph
+        assert graph["canvases"] >= 1 or not graph["scenes"], graph
+    return graphs
+
+
+class TestInABrowser:
+    @pytest.mark.parametrize(
+        ("name", "count"), [("table1", 2), ("figure4", 2), ("figure5", 5), ("washing", 8), ("of another kind", 0)]
+    )
+    def test_a_page_draws_all_its_pictures(self, results, browser, tmp_path, name, count):
+        assert len(opened(browser, report.page(results(name)), tmp_path)) == count
+
+    @pytest.mark.skipif(not DATA.is_dir(), reason=f"no real recordings in {DATA}; set UNCONSTRAIN_DATA")
+    def test_the_page_of_real_recordings_draws_all_its_pictures(self, browser, tmp_path, monkeypatch):
+        monkeypatch.setenv("UNCONSTRAIN_DATA", str(DATA))
+        result = washing.run(washing.Settings(real=True, steps=40))
+        assert len(opened(browser, report.page(result), tmp_path)) == 2 + 1 + 4 * 4
+
+    @pytest.mark.parametrize("name", FITS)
+    def test_the_page_of_a_fit_draws_all_its_pictures(self, browser, tmp_path, name):
+        assert len(opened(browser, fit_page(name), tmp_path)) >= 2
+
+    def test_a_key_hides_its_traces_in_all_panels(self, results, browser, tmp_path):
+        opened(browser, report.page(results("figure4")), tmp_path)
+        hidden = (
+            "return [...document.querySelectorAll('.js-plotly-plot')].map(g => g.data.filter(t => "
+            "t.legendgroup === 'direct' && t.visible === false).length)"
+        )
+        browser.execute_script("document.querySelector('.key button[value=direct]').click()")
+        assert browser.execute_script(hidden) == [1, 1]
+        browser.execute_script("document.querySelector('.key button[value=direct]').click()")
+        assert browser.execute_script(hidden) == [0, 0]
+
+    @pytest.mark.parametrize("name", ["table1", "figure5", "washing"])
+    def test_a_page_fits_on_a_phone(self, results, browser, tmp_path, name):
+        metrics = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        try:
+            graphs = opened(browser, report.page(results(name)), tmp_path)
+            assert browser.execute_script("return document.documentElement.scrollWidth") <= 400
+            assert all(graph["wide"] <= 400 for graph in graphs)
+        finally:
+            browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})

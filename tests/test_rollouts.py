@@ -1,0 +1,114 @@
+"""Following a policy under constraints."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import unconstrain as uc
+from samples import draw
+from unconstrain.constraints import Plane, SwitchingLine
+from unconstrain.errors import InvalidDataError, SettingError
+from unconstrain.systems.limit_cycle import LimitCycle
+
+
+def decay(states):
+    return -states
+
+
+def test_a_free_movement_is_euler_s():
+    demo = uc.rollout(decay, [1.0, -2.0], steps=50, dt=0.1)
+    assert_allclose(demo.states, np.array([1.0, -2.0]) * 0.9 ** np.arange(50)[:, None])
+    assert_array_equal(demo.actions, -demo.states)
+    assert_allclose(demo.times, 0.1 * np.arange(50))
+    assert_array_equal(demo.truth.policy, demo.actions)
+    assert_array_equal(demo.truth.projections, np.tile(np.eye(2), (50, 1, 1)))
+    assert demo.name == "rollout"
+
+
+def test_a_constrained_movement_is_the_plain_loop():
+    policy, line = LimitCycle(), SwitchingLine([[1.0, 0.3], [-0.2, 1.0]], [0.2])
+    demo = uc.rollout(policy, [0.5, 0.1], steps=30, dt=0.02, constraint=line)
+    x = np.array([0.5, 0.1])
+    for k in range(30):
+        A = np.array([[1.0, 0.3]]) if k < 10 else np.array([[-0.2, 1.0]])
+        N = np.eye(2) - np.linalg.pinv(A) @ A
+        assert_allclose(demo.states[k], x, atol=1e-12)
+        assert_allclose(demo.truth.projections[k], N, atol=1e-12)
+        assert_allclose(demo.actions[k], N @ policy(x[None])[0], atol=1e-12)
+        x = x + 0.02 * demo.actions[k]
+
+
+def test_a_constrained_movement_stays_on_its_plane():
+    normal = np.array([1.0, 2.0, 2.0]) / 3
+    demo = uc.rollout(lambda x: np.sin(5 * x) - x, [0.3, -0.2, 0.4], 100, 0.05, Plane(normal))
+    assert_allclose(demo.states @ normal, demo.states[0] @ normal, atol=1e-12)
+
+
+def test_several_starts_run_side_by_side():
+    starts = np.array([[1.0, 0.0], [0.0, 1.0], [0.3, 0.3]])
+    many = uc.rollout(LimitCycle(), starts, 20, constraint=Plane([1.0, 1.0]), name="toy")
+    assert [demo.name for demo in many] == ["toy 1", "toy 2", "toy 3"]
+    for start, demo in zip(starts, many, strict=True):
+        alone = uc.rollout(LimitCycle(), start, 20, constraint=Plane([1.0, 1.0]))
+        assert_allclose(demo.states, alone.states)
+        assert_allclose(demo.actions, alone.actions)
+
+
+def test_each_start_may_have_its_own_constraint():
+    planes = [Plane([1.0, 0.0]), Plane([0.0, 1.0])]
+    first, second = uc.rollout(LimitCycle(), [[1.0, 0.5], [0.5, 1.0]], 5, constraint=planes)
+    assert_allclose(first.actions[:, 0], 0, atol=1e-15)
+    assert_allclose(second.actions[:, 1], 0, atol=1e-15)
+
+
+def test_a_learnt_policy_can_be_followed():
+    data = draw(policy=LimitCycle(), samples=200)
+    policy = uc.ParametricPolicy().fit(data.states, data.actions)
+    true, learnt = (uc.rollout(p, [0.5, 0.0], 50) for p in (LimitCycle(), policy))
+    assert_allclose(learnt.states, true.states, atol=0.1)
+
+
+def test_the_start_is_not_touched():
+    start = np.ones((2, 2))
+    uc.rollout(decay, start, 3)
+    assert_array_equal(start, np.ones((2, 2)))
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "sentence"),
+    [
+        ({"steps": 0}, SettingError, "steps: got 0, expected a whole number of at least 1"),
+        ({"steps": 2.5}, SettingError, "steps: got 2.5, expected a whole number of at least 1"),
+        ({"dt": 0.0}, SettingError, "dt: got 0.0, expected a number above 0.0"),
+        ({"start": [[1.0, 2.0], [1.0]]}, InvalidDataError, "start: the rows have different lengths"),
+        ({"start": [np.nan, 1.0]}, InvalidDataError, "start: found nan at row 0"),
+        ({"start": ["here", "there"]}, InvalidDataError, "start: got values that are not numbers"),
+        (
+            {"policy": lambda x: x[:, :1]},
+            SettingError,
+            r"policy: got actions of shape \(1, 1\) for states of shape \(1, 2\)",
+        ),
+        (
+            {"constraint": [Plane([1.0, 0.0])] * 2},
+            SettingError,
+            "constraint: got 2 constraints for 1 starts, expected one for each",
+        ),
+        (
+            {"constraint": Plane([1.0, 0.0, 0.0])},
+            SettingError,
+            r"constraint: got A of shape \(1, 1, 3\) for 1 states, expected \(1, k, 2\)",
+        ),
+        (
+            {"constraint": lambda x, t: np.ones(2)},
+            SettingError,
+            r"constraint: got A of shape \(2,\) for 1 states, expected \(1, k, 2\)",
+        ),
+        ({"constraint": lambda x, t: np.full((1, 1, 2), np.nan)}, InvalidDataError, "constraint matrix: found NaN"),
+        ({"policy": lambda x: np.full(x.shape, np.nan)}, InvalidDataError, "left the finite numbers at step 0"),
+        ({"policy": lambda x: 1e30 * x}, InvalidDataError, "found .* at row 4, column 0, expected numbers up to 1e.100"),
+        ({"policy": lambda x: np.full(x.shape, 1e308)}, InvalidDataError, "left the finite numbers at step 1: start nearer"),
+    ],
+)
+def test_what_cannot_be_followed_is_said_in_a_sentence(change, error, sentence):
+    with pytest.raises(error, match=sentence):
+        uc.rollout(**({"policy": decay, "start": [1.0, 2.0], "steps": 10, "dt": 1.0} | change))
