@@ -21,7 +21,7 @@ demo: $(USER_STAMP) ## learn a wiping movement end to end and write a report to 
 	@echo "The report is in $(CURDIR)/$(DEMO_DIR); open its .html file in a browser."
 
 test: $(DEV_STAMP) ## run all tests, in parallel, with coverage
-	@scripts/install-browser || echo "make test: going on; tests that need a browser are skipped." >&2
+	@scripts/install-browser || echo "make test: going on; tests that need a browser will fail." >&2
 	@$(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --cov --cov-report=term-missing:skip-covered
 
 check: $(DEV_STAMP) ## lint, formatting, types, import order

@@ -26,7 +26,7 @@ def broken(table, row, column, value):
 BAD_STATES = [
     (lambda X: broken(X, 7, 1, np.nan), "states: found nan at row 7, column 1"),
     (lambda X: broken(X, 7, 0, -np.inf), "states: found -inf at row 7, column 0"),
-    (lambda X: broken(X, 3, 1, 1e200), r"states: found 1e\+200 at row 3, column 1, expected numbers up to 1e\+100"),
+    (lambda X: broken(X, 3, 1, 1e200), r"states: found 1e\+200 at row 3, column 1, expected numbers up to 1e\+30"),
     (lambda X: [[1.0, 2.0], [1.0]], "states: the rows have different lengths"),
     (lambda X: X[:, 0], "Expected 2D array, got 1D array instead"),
     (lambda X: X[None], "Found array with dim 3"),
@@ -90,7 +90,7 @@ def test_groups_must_be_one_name_for_each_sample(data):
 
 # Little to learn from: fits, and says what is determined
 
-FAR = np.array([[0.0, 0.0], [1e3, -1e3], [1e12, 1e12], [-1e30, 0.0]])
+FAR = np.array([[0.0, 0.0], [1e3, -1e3], [1e12, 1e12], [-1e25, 0.0]])
 
 
 def assert_finite(policy, states):
@@ -233,20 +233,20 @@ def test_units_of_states_and_actions_do_not_matter(kind, unit, data):
         assert_allclose(unit * other, plain, atol=1e-5)
 
 
-@pytest.mark.parametrize("size", [1e-320, 1e-200, 1e-160, 1e-90, 1e90])
+@pytest.mark.parametrize("size", [1e-320, 1e-200, 1e-160, 1e-30, 1e29])
 def test_actions_of_any_size_give_a_finite_policy(policy, size, data):
     policy.fit(data.states, size * data.actions)
     assert_finite(policy, data.states)
     assert np.abs(policy.predict(data.states)).max() < 100 * size
 
 
-@pytest.mark.parametrize("size", [1e-300, 1e-100, 1e-30, 1e30, 1e90])
+@pytest.mark.parametrize("size", [1e-300, 1e-100, 1e-30, 1e15, 1e29])
 def test_states_of_any_size_give_a_finite_policy(size, data):
     for policy in (uc.ParametricPolicy(), uc.ParametricPolicy(uc.Affine()), uc.LocallyLinearPolicy()):
         assert_finite(policy.fit(size * data.states, data.actions), size * data.states)
 
 
-@pytest.mark.parametrize("weight", [1e-300, 1e-30, 1e30, 1e90])
+@pytest.mark.parametrize("weight", [1e-300, 1e-30, 1e29])
 def test_weights_of_any_size_give_a_finite_policy(policy, weight, data):
     policy.fit(data.states, data.actions, np.full(90, weight))
     assert_finite(policy, data.states)
@@ -266,9 +266,9 @@ def test_a_single_wild_state_does_not_spoil_the_others(data):
 # Anything at all
 
 numbers = st.one_of(
-    st.sampled_from([0.0, 1.0, -1.0, 0.1, 1e-8, 1e8, 5e-324, 1e-300, 1e-160, 1e100, -1e100]),
+    st.sampled_from([0.0, 1.0, -1.0, 0.1, 1e-8, 1e8, 5e-324, 1e-300, 1e-160, 1e30, -1e30]),
     st.floats(-2, 2),
-    st.floats(-1e100, 1e100),
+    st.floats(-1e30, 1e30),
 )
 
 

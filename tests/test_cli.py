@@ -15,7 +15,8 @@ from click.testing import CliRunner
 from numpy.testing import assert_allclose
 
 import unconstrain as uc
-from unconstrain import cli, experiments, storage
+from unconstrain import cli, experiments, report, storage
+from unconstrain.errors import MissingExtraError
 from unconstrain.experiments import table1
 
 DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))
@@ -166,6 +167,8 @@ def test_help_of_all_names_each_command_in_a_whole_sentence():
         [line] = [line for line in said.splitlines() if line.startswith(f"  {command} ")]
         assert line.endswith("."), line
         assert not line.endswith("..."), line
+    for example in ("demo", "inspect *.csv", "fit *.csv -o policy.npz"):
+        assert f"\n  unconstrain {example}   " in said
     assert max(map(len, said.splitlines())) <= 80
 
 
@@ -732,6 +735,21 @@ def test_actions_that_are_no_velocities_cannot_be_rolled_out(tmp_path):
 # In a terminal
 
 
+@pytest.mark.parametrize(
+    ("error", "sentence"),
+    [
+        (OSError(28, "No space left on device", "/full"), "/full: No space left on device."),
+        (OSError("the disk is gone"), "the disk is gone"),
+    ],
+)
+def test_trouble_with_the_file_system_is_told_in_one_sentence(policy, tmp_path, monkeypatch, error, sentence):
+    def fail(*_, **__):
+        raise error
+
+    monkeypatch.setattr(cli.click, "open_file", fail)
+    assert refused("rollout", policy, "--start", "0,0", "-o", tmp_path / "path.csv") == sentence
+
+
 def test_no_traceback_in_a_process_of_its_own(folder):
     ran = shell("unconstrain fit none.csv -o p.npz", folder)
     assert (ran.code, ran.out) == (2, "")
@@ -814,6 +832,18 @@ def test_another_seed_gives_other_numbers(table1_of_two, tmp_path):
     found, other = json.loads((tmp_path / "table1.json").read_text()), json.loads(table1_of_two[0])
     assert found["settings"] == other["settings"] | {"seed": 1}
     assert all(a["nupe_mean"] != b["nupe_mean"] for a, b in zip(found["rows"], other["rows"], strict=True))
+
+
+def test_without_plotly_the_trials_are_kept_for_later(tmp_path, monkeypatch):
+    def missing(*_):
+        raise MissingExtraError("this needs 'plotly', which is not installed.")
+
+    monkeypatch.setattr(report, "write", missing)
+    ran = call("reproduce", "table1", "--trials", 1, "--workers", 1, "--out", tmp_path)
+    assert ran.code == 0
+    assert "hybrid, none: nUPE " in ran.out
+    assert ran.err == "No report: this needs 'plotly', which is not installed.\n"
+    assert [path.name for path in tmp_path.iterdir()] == [".table1.trials"]
 
 
 def test_an_interrupted_run_goes_on_where_it_stopped(table1_of_two, tmp_path, monkeypatch):

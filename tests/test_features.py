@@ -112,8 +112,8 @@ def test_states_of_another_width_are_refused(function):
 @pytest.mark.parametrize(
     ("centres", "variance", "error", "sentence"),
     [
-        ([[0.0]], 0.0, SettingError, "variance: got 0.0, expected a number above 1e-200"),
-        ([[0.0]], np.nan, SettingError, "variance: got nan, expected a number above 1e-200"),
+        ([[0.0]], 0.0, SettingError, "variance: got 0.0, expected a number above 1e-100"),
+        ([[0.0]], np.nan, SettingError, "variance: got nan, expected a number above 1e-100"),
         ([0.0], 1.0, InvalidDataError, r"centres: got an array of shape \(1,\)"),
         ([[np.nan]], 1.0, InvalidDataError, "centres: found nan at row 0, column 0"),
     ],

@@ -230,7 +230,7 @@ class NoFeatures:
         (uc.ParametricPolicy(uc.NormalisedRBF([[0.0]], 1.0)), InvalidDataError, "states: got 2 columns, expected 1 as"),
         (uc.LocallyLinearPolicy(centres=[[0, 0, 0]]), InvalidDataError, "states: got 2 columns, expected 3 as"),
         (uc.LocallyLinearPolicy(centres=[[0, 0], [1]]), InvalidDataError, "centres: the rows have different lengths"),
-        (uc.LocallyLinearPolicy(variance=-1.0), SettingError, "variance: got -1.0, expected a number above 1e-200"),
+        (uc.LocallyLinearPolicy(variance=-1.0), SettingError, "variance: got -1.0, expected a number above 1e-100"),
         (uc.LocallyLinearPolicy(at_least=1.5), SettingError, "at_least: got 1.5, expected a weight between 0 and 1"),
         (
             uc.ParametricPolicy(validation=uc.Folds(by="demonstration")),

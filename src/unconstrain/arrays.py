@@ -33,10 +33,10 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-LARGEST = 1e100
-"""Numbers beyond this are refused: squares of sums of them must stay finite."""
+LARGEST = 1e30
+"""Numbers beyond this are refused: fillers for missing values are, and products of several must stay finite."""
 
-SMALLEST_VARIANCE = 1e-200
+SMALLEST_VARIANCE = 1e-100
 """Variances down to this are refused, and states that spread less count as one: their squares lose digits."""
 
 

@@ -109,13 +109,13 @@ def options_for_reading(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="unconstrain")
 def main() -> None:
-    r"""Learn the policy behind movements that were recorded under unknown, changing constraints.
+    """Learn the policy behind movements that were recorded under unknown, changing constraints.
 
     \b
-    unconstrain demo                          the car-washing job, with a report to look at
-    unconstrain inspect *.csv                 what is in your recordings
-    unconstrain fit *.csv -o policy.npz       learn from them
-    """
+    unconstrain demo                      the car-washing job, with a report
+    unconstrain inspect *.csv             what is in your recordings
+    unconstrain fit *.csv -o policy.npz   learn from them
+    """  # noqa: D301 - click's mark for lines that stay as they are
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain inspect wipe_*.csv --state x,y,z")
@@ -159,7 +159,7 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
         click.echo(f"fit needs to know more: {error}")
 
 
-@main.command(epilog="\b\nExample:\n  unconstrain fit wipe_*.csv --state x,y,z --differentiate --rate 20 -o wipe.npz")
+@main.command(epilog="\b\nExample:\n  unconstrain fit wipe_*.csv --state x,y,z --differentiate -o wipe.npz")
 @options_for_reading
 @click.option("-o", "--output", required=True, type=click.Path(dir_okay=False), help="File for the policy (.npz).")
 @click.option("--model", type=click.Choice(MODELS), default="local", show_default=True, help="What the policy is.")

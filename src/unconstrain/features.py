@@ -183,7 +183,8 @@ class NormalisedRBF:
         distances = squared_distances(found, found)
         np.fill_diagonal(distances, np.inf)
         spacing = np.mean(np.sqrt(distances.min(axis=1))) if count > 1 else 1.0
-        return cls(middle + unit * found, float((width * spacing * unit) ** 2))
+        centres = np.clip(middle + unit * found, table.min(axis=0), table.max(axis=0))  # but for rounding they are
+        return cls(centres, float((width * spacing * unit) ** 2))
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from .arrays import Array, check_at_least
 from .errors import SettingError
 from .moments import Moments
 from .objectives import inconsistency, standard_risk, unvec
-from .quadratic import SECONDARY_NOISE, Path, Quadratic, lexicographic_path, minimum
+from .quadratic import SECONDARY_NOISE, Path, Quadratic, eigensystem, lexicographic_path, minimum
 from .validation import FoldedMoments
 
 __all__ = ["Direct", "Hybrid", "Inconsistency", "Learner", "Solution"]
@@ -79,7 +79,7 @@ class Direct:
         """Learn from the whole; nothing is left to choose."""
         whole = folds.whole
         models, d, p = whole.cross.shape
-        spectrum = np.linalg.eigvalsh(whole.gram)
+        spectrum, _ = eigensystem(whole.gram)
         rank = (spectrum > SECONDARY_NOISE * spectrum[:, -1:]).sum(axis=1)
         weights = unvec(minimum(standard_risk(whole)), d)
         return Solution(weights, d * rank, d * p, np.zeros(models))

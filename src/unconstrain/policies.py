@@ -107,13 +107,16 @@ class Policy(RegressorMixin, BaseEstimator):
         first = not hasattr(self, "_folds")
         states, actions = self._checked(X, y, reset=first)
         weights = as_weights(sample_weight, len(states))
-        if groups is not None:
-            groups = as_groups(groups, len(states))
+        names = None if groups is None else as_groups(groups, len(states))
         if not weights.any():
             raise InvalidDataError("sample_weight: all weights are zero, expected at least one that counts.")
+        if not weights.all():  # a weight of zero is the same as not being there
+            counting = weights > 0
+            states, actions, weights = states[counting], actions[counting], weights[counting]
+            names = None if names is None else names[counting]
         if first:
-            self._begin(states, weights, groups)
-        self._folds = self._folds + self._gather(states, actions, weights, groups)
+            self._begin(states, weights, names)
+        self._folds = self._folds + self._gather(states, actions, weights, names)
         self._conclude()
         return self
 
@@ -205,9 +208,8 @@ class Policy(RegressorMixin, BaseEstimator):
     def _begin(self, states: Array, weights: Array, groups: Groups | None) -> None:
         validation = self.validation if self.validation is not None else Folds()
         self._splitter = Splitter(validation, states, weights, groups)
-        counting = states[weights > 0]
         # Different states in a fixed order: repetition and order must not move the features.
-        self._place(np.unique(counting[:: -(-len(counting) // PLACING_SAMPLES)], axis=0))
+        self._place(np.unique(states[:: -(-len(states) // PLACING_SAMPLES)], axis=0))
         features, actions, in_models = self._block(states[:1], np.zeros((1, self.n_outputs_)), weights[:1])
         empty = Moments.zero(in_models.shape[1], actions.shape[1], features.shape[1])
         self._folds = FoldedMoments((empty,) * validation.count, validation.held_out)
@@ -367,7 +369,7 @@ class LocallyLinearPolicy(Policy):
         self.features_ = Affine(self.fields_.centres.mean(axis=0), np.sqrt(variance))
 
     def _features(self, states: Array) -> Array:
-        return self.features_(states)
+        return as_matrix(self.features_(states), "features")
 
     def _weights(self, states: Array) -> Array:
         return self.fields_.weights(states)

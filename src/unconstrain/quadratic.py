@@ -29,7 +29,7 @@ from scipy.linalg import solve_triangular
 
 from .arrays import Array
 
-__all__ = ["NOISE", "SECONDARY_NOISE", "Path", "Quadratic", "lexicographic_path", "minimum"]
+__all__ = ["NOISE", "SECONDARY_NOISE", "Path", "Quadratic", "eigensystem", "lexicographic_path", "minimum"]
 
 NOISE = 1e-10
 """Eigenvalues of the first objective below this share of the largest are rounding."""
@@ -140,7 +140,7 @@ def lexicographic_path(first: Quadratic, second: Quadratic | None = None) -> Pat
     -------
     Path
     """
-    eigenvalues, vectors = np.linalg.eigh(first.hessian)
+    eigenvalues, vectors = eigensystem(first.hessian)
     size = eigenvalues.shape[1]
     largest = eigenvalues[:, -1:]
     noise = (eigenvalues <= NOISE * largest) | (largest <= UNDERFLOW)
@@ -160,6 +160,19 @@ def minimum(objective: Quadratic) -> Array:
     size = objective.linear.shape[1]
     lower, _ = _factor(objective.hessian, np.broadcast_to(np.eye(size), objective.hessian.shape))
     return _solve_lower(lower, _solve_lower(lower, objective.linear), transposed=True)
+
+
+def eigensystem(hessian: Array) -> tuple[Array, Array]:
+    """Eigenvalues (M, P), ascending, and eigenvectors (M, P, P) of symmetric matrices.
+
+    Scaled to one, and without what is too small to matter: LAPACK gives up
+    on some matrices whose entries span hundreds of orders of magnitude.
+    """
+    size = np.abs(hessian).max(axis=(-2, -1), keepdims=True)
+    unit = np.where(size > UNDERFLOW, size, 1.0)
+    scaled = hessian / unit
+    eigenvalues, vectors = np.linalg.eigh(np.where(np.abs(scaled) > 1e-60, scaled, 0.0))
+    return eigenvalues * unit[..., 0], vectors
 
 
 def _fill(second: Quadratic, vectors: Array, coordinates: Array, undetermined: NDArray[np.bool_]) -> Array:
@@ -186,7 +199,7 @@ def _factor(hessian: Array, vectors: Array) -> tuple[Array, Array]:
             return lower, metric
     except np.linalg.LinAlgError:
         pass
-    eigenvalues, axes = np.linalg.eigh(hessian)
+    eigenvalues, axes = eigensystem(hessian)
     largest = eigenvalues[:, -1:]
     floored = np.where(eigenvalues > SECONDARY_NOISE * largest, eigenvalues, largest)
     floored = np.where(largest > UNDERFLOW, floored, 1.0)

@@ -43,13 +43,13 @@ class Settings:
     noise : float
         Of the simulated camera, m.
     variance : float
-        σ² of the receptive fields, m² (the paper's value).
+        σ² of the receptive fields, m². The paper has 0.025 in units that it does not state.
     at_least : float
         Weight that every sample has in one of them.
     softness, threshold : float
         See :class:`~unconstrain.Hybrid`.
-    steps : int
-        Length of the reproduced movement, at ``rate``.
+    steps, substeps : int
+        Length of the reproduced movement in samples at ``rate``, and steps of the integration between two of them.
     """
 
     real: bool = False
@@ -58,11 +58,12 @@ class Settings:
     rate: float = 20.0
     duration: float = 20.0
     noise: float = 0.002
-    variance: float = 0.025
+    variance: float = 0.0125
     at_least: float = 0.7
     softness: float = 0.1
     threshold: float = 0.0
     steps: int = 300
+    substeps: int = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,10 +179,17 @@ def _learn(settings: Settings, training: Sequence[Surface], held_out: Sequence[S
     policies = {name: base.with_learner(learner) for name, learner in learners(settings).items()}
     first, normal = held_out[0].demonstrations[0], held_out[0].normals[0]["plane"]
     rollouts = {
-        name: rollout(policy, first.states[0], settings.steps, 1 / settings.rate, Plane(normal), name=name)
+        name: _reproduce(policy, first.states[0], Plane(normal), settings, name)
         for name, policy in policies.items()
     }
     return Split(tuple(training), tuple(held_out), policies, rollouts)
+
+
+def _reproduce(policy: Policy, start: Array, plane: Plane, settings: Settings, name: str) -> Demonstration:
+    """Follow a policy in steps much shorter than the camera's: a circle in long straight steps runs outwards."""
+    fine = settings.substeps
+    path = rollout(policy, start, fine * settings.steps, 1 / (fine * settings.rate), plane, name=name)
+    return path[::fine]
 
 
 def _simulated_rows(split: Split) -> list[dict[str, Any]]:

@@ -58,6 +58,10 @@ code { font-family: ui-monospace, "DejaVu Sans Mono", Menlo, Consolas, monospace
 
 # One key for several pictures: a click hides all traces of its group in them.
 SCRIPT = """
+// The first of two panels is drawn before the second is there to share the row with.
+window.addEventListener("load", function () {
+  document.querySelectorAll(".js-plotly-plot").forEach(function (plot) { Plotly.Plots.resize(plot); });
+});
 document.addEventListener("click", function (event) {
   var button = event.target.closest(".key button");
   if (!button) return;

@@ -190,13 +190,13 @@ def _rollouts(splits: list[Split]) -> str:
         "rollouts",
         panels,
         f"Each learnt policy, started where the demonstration starts (dot) and followed for {_seconds(longest, -1)} "
-        f"in steps of {_seconds(longest, 1, digits=3)} under the plate’s constraint, seen from above the plate. "
+        "under the plate’s constraint, seen from above the plate. "
         f"A policy that drifts off or falls into the middle would not wipe.{escaped}",
         keys=("observed", *figures.METHODS),
     )
 
 
-def _seconds(movement: Demonstration, at: int, digits: int = 1) -> str:
+def _seconds(movement: Demonstration, at: int) -> str:
     return f"step {at}" if movement.times is None else f"{round(movement.times[at], digits):g} s"
 
 
