@@ -98,7 +98,9 @@ def test_a_weight_is_not_negative():
         as_weights([1, -1], 2)
 
 
-@pytest.mark.parametrize("names", [[1, 1, 2], ["a", "b", "b"], np.array(["a", "b", "b"], dtype=object), [1.0, 2.0, 1.0]])
+@pytest.mark.parametrize(
+    "names", [[1, 1, 2], ["a", "b", "b"], np.array(["a", "b", "b"], dtype=object), [1.0, 2.0, 1.0]]
+)
 def test_groups_may_be_names_or_numbers(names):
     assert_array_equal(as_groups(names, 3), names)
 

@@ -285,7 +285,7 @@ def tables(draw):
 @pytest.mark.parametrize("learner", LEARNERS.values(), ids=LEARNERS)
 @pytest.mark.parametrize("kind", ["affine", "kmeans", "local"])
 @given(table=tables())
-@settings(max_examples=60)
+@settings(max_examples=25)
 def test_any_finite_data_gives_a_finite_policy(kind, learner, table):
     states, actions, groups = table
     policy = POLICIES[kind](learner)

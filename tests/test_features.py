@@ -86,7 +86,9 @@ def test_a_large_common_offset_costs_no_digits(offset):
     there, centres = np.round(states(0, 10), 3), np.round(states(1, 6), 3)
     # What the offset itself rounds away is no error of the distances.
     moved, anchors = there + offset, centres + offset
-    assert_allclose(squared_distances(moved, anchors), cdist(moved - offset, anchors - offset, "sqeuclidean"), atol=1e-6)
+    assert_allclose(
+        squared_distances(moved, anchors), cdist(moved - offset, anchors - offset, "sqeuclidean"), atol=1e-6
+    )
     assert_allclose(shares(moved, anchors, 0.3), shares(moved - offset, anchors - offset, 0.3), atol=1e-6)
 
 
@@ -163,7 +165,9 @@ def test_a_grid_that_cannot_be_is_refused(arguments, sentence):
 
 
 def test_half_a_centre_on_an_axis_is_refused():
-    with pytest.raises(SettingError, match=r"per_axis=2.5; expected low < high and a whole number of at least two centres"):
+    with pytest.raises(
+        SettingError, match=r"per_axis=2.5; expected low < high and a whole number of at least two centres"
+    ):
         NormalisedRBF.grid(0, 1, 2.5)
 
 

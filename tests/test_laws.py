@@ -65,7 +65,9 @@ def test_moments_scale_and_subtract(seed, models, factor):
 
 def test_moments_of_batches_add_up_to_moments_of_all(policy_of, data):
     policy = placed(policy_of(uc.Direct()), data)
-    halves = [clone(policy).fit(data.states[half], data.actions[half]).moments_ for half in (slice(40), slice(40, None))]
+    halves = [
+        clone(policy).fit(data.states[half], data.actions[half]).moments_ for half in (slice(40), slice(40, None))
+    ]
     assert_same_moments(halves[1] + halves[0], clone(policy).fit(data.states, data.actions).moments_)
 
 
@@ -76,7 +78,9 @@ def test_taking_a_fold_away_is_fitting_without_it(policy, data):
     fold = clone(policy).fit(data.states[out], data.actions[out]).moments_
     rest = clone(policy).fit(data.states[~out], data.actions[~out]).moments_
     assert_same_moments(whole - fold, rest)
-    subtracted, refitted = (policy.learner.solve(FoldedMoments((moments,), range(1))) for moments in (whole - fold, rest))
+    subtracted, refitted = (
+        policy.learner.solve(FoldedMoments((moments,), range(1))) for moments in (whole - fold, rest)
+    )
     assert_same(subtracted.weights, refitted.weights, 1e-4)
 
 
@@ -132,7 +136,11 @@ def naive_solution(learner, features, actions, weights=None):
         H, g = H + learner.softness * M, g + learner.softness * m
     eigenvalues = np.linalg.eigvalsh(H)
     undetermined = int((eigenvalues <= max(learner.threshold, 1e-10) * eigenvalues[-1]).sum())
-    w = naive.hybrid(H, g, M, m, undetermined) if isinstance(learner, uc.Hybrid) else naive.truncated(H, g, undetermined)
+    w = (
+        naive.hybrid(H, g, M, m, undetermined)
+        if isinstance(learner, uc.Hybrid)
+        else naive.truncated(H, g, undetermined)
+    )
     return naive.as_matrix(w, actions.shape[1])
 
 

@@ -17,7 +17,9 @@ def demonstrations(seed=0, noise=0.0, groups=3):
     data = draw(seed, samples=30, noise=noise)
     pick = [data.groups % groups == g for g in range(groups)]
     return [
-        uc.Demonstration(data.states[r], data.actions[r], truth=uc.Truth(data.policy[r], data.projections[r]), name=f"d{g}")
+        uc.Demonstration(
+            data.states[r], data.actions[r], truth=uc.Truth(data.policy[r], data.projections[r]), name=f"d{g}"
+        )
         for g, r in enumerate(pick)
     ]
 
@@ -123,7 +125,9 @@ def test_actions_of_another_shape_are_refused_and_never_reshaped(predict):
 def test_errors_that_need_the_truth_say_so():
     (known,) = demonstrations(groups=1)
     unknown = uc.Demonstration(known.states, known.actions, name="log")
-    with pytest.raises(InvalidDataError, match=r"demonstration 1 \('log'\) has no truth, and this error needs the true"):
+    with pytest.raises(
+        InvalidDataError, match=r"demonstration 1 \('log'\) has no truth, and this error needs the true"
+    ):
         uc.nupe(guess, [known, unknown])
     with pytest.raises(InvalidDataError, match=r"'log' has no truth that tells how it was constrained"):
         uc.ncpe(guess, unknown)

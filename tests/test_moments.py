@@ -48,9 +48,7 @@ def test_sums_are_those_of_the_design_table():
         assert_allclose(moments.energy[m], sum(w[n] * actions[n] @ actions[n] for n in range(20)))
         assert_allclose(moments.cross[m], sum(w[n] * np.outer(actions[n], features[n]) for n in range(20)))
         assert_allclose(moments.gram[m], sum(w[n] * np.outer(features[n], features[n]) for n in range(20)))
-        pairs = (
-            w[n] * np.kron(np.outer(features[n], features[n]), np.outer(unit[n], unit[n])) for n in range(20)
-        )
+        pairs = (w[n] * np.kron(np.outer(features[n], features[n]), np.outer(unit[n], unit[n])) for n in range(20))
         assert_allclose(moments.consistent[m], sum(pairs), atol=1e-14)
 
 

@@ -76,7 +76,9 @@ def test_whole_demonstrations_can_be_left_out_of_a_cross_validation(data):
 
 
 def test_it_works_inside_a_target_transformer(data):
-    scaled = TransformedTargetRegressor(uc.ParametricPolicy(uc.Affine(), uc.Direct()), func=lambda y: 2 * y, inverse_func=lambda y: y / 2)
+    scaled = TransformedTargetRegressor(
+        uc.ParametricPolicy(uc.Affine(), uc.Direct()), func=lambda y: 2 * y, inverse_func=lambda y: y / 2
+    )
     plain = uc.ParametricPolicy(uc.Affine(), uc.Direct()).fit(data.states, data.actions)
     assert_allclose(scaled.fit(data.states, data.actions).predict(data.states), plain.predict(data.states), atol=1e-9)
 
@@ -98,7 +100,11 @@ def test_a_clone_has_the_settings_and_nothing_learnt(policy, data):
 
 def test_fitting_again_forgets(policy, data):
     other = draw(seed=9, dimensions=2)
-    twice = clone(policy).fit(other.states[:, :1], other.actions[:, 0]) if policy.__class__ is uc.LocallyLinearPolicy else clone(policy).fit(other.states, other.actions)
+    twice = (
+        clone(policy).fit(other.states[:, :1], other.actions[:, 0])
+        if policy.__class__ is uc.LocallyLinearPolicy
+        else clone(policy).fit(other.states, other.actions)
+    )
     fresh = clone(policy).fit(data.states, data.actions)
     assert_array_equal(twice.fit(data.states, data.actions).predict(data.states), fresh.predict(data.states))
 
@@ -223,9 +229,17 @@ class NoFeatures:
 @pytest.mark.parametrize(
     ("policy", "error", "sentence"),
     [
-        (uc.ParametricPolicy(NoFeatures()), SettingError, r"features: got NoFeatures\(\), expected a function of states"),
+        (
+            uc.ParametricPolicy(NoFeatures()),
+            SettingError,
+            r"features: got NoFeatures\(\), expected a function of states",
+        ),
         (uc.ParametricPolicy(lambda x: x[:, 0]), SettingError, r"features: got an array of shape \(1,\) for 1 states"),
-        (uc.ParametricPolicy(lambda x: np.ones((7, 2))), SettingError, r"features: got an array of shape \(7, 2\) for 1"),
+        (
+            uc.ParametricPolicy(lambda x: np.ones((7, 2))),
+            SettingError,
+            r"features: got an array of shape \(7, 2\) for 1",
+        ),
         (uc.ParametricPolicy(lambda x: x / 0), InvalidDataError, "features: found .*inf at row 0, column 0"),
         (uc.ParametricPolicy(uc.NormalisedRBF([[0.0]], 1.0)), InvalidDataError, "states: got 2 columns, expected 1 as"),
         (uc.LocallyLinearPolicy(centres=[[0, 0, 0]]), InvalidDataError, "states: got 2 columns, expected 3 as"),

@@ -17,7 +17,9 @@ def least_squares(A, b):
 
 
 def stacked(*quadratics):
-    return Quadratic(*(np.concatenate([getattr(q, name) for q in quadratics]) for name in ("hessian", "linear", "constant")))
+    return Quadratic(
+        *(np.concatenate([getattr(q, name) for q in quadratics]) for name in ("hessian", "linear", "constant"))
+    )
 
 
 def draw(seed, rows, size):

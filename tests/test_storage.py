@@ -17,10 +17,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
-from samples import draw
 from sklearn.base import clone
 
 import unconstrain as uc
+from samples import draw
 from unconstrain import storage
 from unconstrain.errors import ModelFileError
 

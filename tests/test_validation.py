@@ -97,7 +97,9 @@ def test_demonstrations_are_dealt_in_turn_as_they_are_first_seen():
     assert_array_equal(split.assign(states[:3], ["e", "b", "a"]), [1, 2, 1])
 
 
-@pytest.mark.parametrize(("share", "held"), [(0.5, [0, 2, 4]), (0.2, [0, 5]), (0.34, [0, 2, 5]), (0.9, [0, 1, 2, 3, 4, 5, 6, 7, 8])])
+@pytest.mark.parametrize(
+    ("share", "held"), [(0.5, [0, 2, 4]), (0.2, [0, 5]), (0.34, [0, 2, 5]), (0.9, [0, 1, 2, 3, 4, 5, 6, 7, 8])]
+)
 def test_the_first_and_then_evenly_many_demonstrations_are_held_out(share, held):
     validation = HeldOut(share)
     parts = [validation.deal_in_turn(i) for i in range(10)]
@@ -196,6 +198,8 @@ def test_settings_out_of_range_are_named(make, sentence):
 @pytest.mark.parametrize("groups", [1, 2, 6])
 def test_more_folds_than_demonstrations_and_a_single_one_still_fit(validation, groups):
     data = draw(groups=groups)
-    policy = ParametricPolicy(learner=Hybrid(), validation=validation).fit(data.states, data.actions, groups=data.groups)
+    policy = ParametricPolicy(learner=Hybrid(), validation=validation).fit(
+        data.states, data.actions, groups=data.groups
+    )
     assert np.isfinite(policy.predict(data.states)).all()
     assert np.isfinite(policy.solution_.scores).all()

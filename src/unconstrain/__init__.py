@@ -49,7 +49,7 @@ _HOME = {
 }
 _ROOMS = ("constraints", "datasets", "errors", "experiments", "preparation", "readers", "systems")
 
-__all__ = sorted([*_HOME, *_ROOMS])  # noqa: PLE0605
+__all__ = sorted([*_HOME, *_ROOMS])
 
 
 def __getattr__(name: str) -> Any:

@@ -8,7 +8,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array, as_table, check_at_least
+from .arrays import LARGEST, Array, as_table, check_at_least
 from .demonstration import Demonstration, Truth
 from .errors import InvalidDataError, SettingError
 from .projection import null_space_projection, project
@@ -105,7 +105,7 @@ def rollout(
         actions[:, step] = project(projections[:, step], wanted[:, step])
         with np.errstate(over="ignore", invalid="ignore"):
             state = state + dt * actions[:, step]
-        if not np.isfinite(state).all():
+        if not (np.abs(state) <= LARGEST).all():
             raise InvalidDataError(
                 f"the movement left the finite numbers at step {step}: start nearer to the data or take a smaller dt."
             )

@@ -38,7 +38,10 @@ class Journal:
         head = json.dumps({"version": VERSION, **asdict(self.settings)}, sort_keys=True)
         lines = self.path.read_text(encoding="utf-8").split("\n") if self.path.exists() else []
         # What follows the last line break was being written when the run was interrupted.
-        done = dict(json.loads(line) for line in lines[1:-1]) if lines[:1] == [head] else {}
+        try:
+            done = dict(json.loads(line) for line in lines[1:-1]) if lines[:1] == [head] else {}
+        except (TypeError, ValueError):  # a damaged line: none of the others is to be trusted
+            done = {}
         self.path.parent.mkdir(parents=True, exist_ok=True)
         kept = [head, *(json.dumps([index, result]) for index, result in done.items()), ""]
         self.path.write_text("\n".join(kept), encoding="utf-8")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -144,7 +144,8 @@ def demonstrate(settings: Settings, held: int, count: int, rng: np.random.Genera
     starts = rng.uniform(-0.5, 0.5, (count, LWR3.joints)) * LWR3.limits
     constraint = JacobianRows(LWR3.jacobian, tuple(range(held)))
     policy = JointLimitAvoidance(settings.gain, settings.power)
-    return rollout(policy, starts, settings.steps, settings.dt, constraint, name=f"arm {CONSTRAINTS[held - 1]}")
+    name = f"arm {CONSTRAINTS[held - 1]}"
+    return cast("list[Demonstration]", rollout(policy, starts, settings.steps, settings.dt, constraint, name=name))
 
 
 def trial(settings: Settings, held: int, seed: np.random.SeedSequence) -> dict[str, tuple[float, ...]]:
@@ -154,7 +155,7 @@ def trial(settings: Settings, held: int, seed: np.random.SeedSequence) -> dict[s
     test = demonstrate(settings, held, settings.test_demonstrations, rng)
     methods = learners(settings)
     states, actions, groups = stack(training)
-    found = {}
+    found: dict[str, tuple[float, ...]] = {}
     for power, names in ((0.0, ("direct", "inconsistency")), (settings.speed_power, ("hybrid",))):
         policy = LocallyLinearPolicy(settings.variance, settings.at_least, None, Direct(), Folds(settings.folds))
         policy.fit(states, actions, np.linalg.norm(actions, axis=1) ** power, groups)

@@ -12,6 +12,7 @@ from ..arrays import Array
 from ..constraints import Plane
 from ..datasets import load_rim_wiping
 from ..demonstration import Demonstration
+from ..errors import InvalidDataError
 from ..learners import Direct, Hybrid, Inconsistency, Learner
 from ..metrics import cpe, ncpe, nupe
 from ..policies import LocallyLinearPolicy, Policy
@@ -63,7 +64,7 @@ class Settings:
     softness: float = 0.1
     threshold: float = 0.0
     steps: int = 300
-    substeps: int = 10
+    substeps: int = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,17 +180,21 @@ def _learn(settings: Settings, training: Sequence[Surface], held_out: Sequence[S
     policies = {name: base.with_learner(learner) for name, learner in learners(settings).items()}
     first, normal = held_out[0].demonstrations[0], held_out[0].normals[0]["plane"]
     rollouts = {
-        name: _reproduce(policy, first.states[0], Plane(normal), settings, name)
-        for name, policy in policies.items()
+        name: _reproduce(policy, first.states[0], Plane(normal), settings, name) for name, policy in policies.items()
     }
     return Split(tuple(training), tuple(held_out), policies, rollouts)
 
 
 def _reproduce(policy: Policy, start: Array, plane: Plane, settings: Settings, name: str) -> Demonstration:
     """Follow a policy in steps much shorter than the camera's: a circle in long straight steps runs outwards."""
-    fine = settings.substeps
-    path = rollout(policy, start, fine * settings.steps, 1 / (fine * settings.rate), plane, name=name)
-    return path[::fine]
+    fine, steps = settings.substeps, settings.steps
+    while True:
+        try:
+            path = rollout(policy, start, fine * steps, 1 / (fine * settings.rate), plane, name=name)
+        except InvalidDataError:  # it runs away; show how it begins to
+            steps = max(1, steps // 2)
+        else:
+            return path[::fine]
 
 
 def _simulated_rows(split: Split) -> list[dict[str, Any]]:

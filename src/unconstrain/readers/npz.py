@@ -59,7 +59,8 @@ def read_npz(path: Path, *, group: str | None = None, time: str | None = None) -
 
 def _load(path: Path) -> Contents:
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        # Opened here, since numpy leaves a damaged file open.
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             return {key: archive[key] for key in archive.files}
     # Damaged bytes make NumPy, zipfile and zlib raise a dozen unrelated types; none of them must pass this door.
     except Exception as error:

@@ -64,15 +64,14 @@ def write(result: Result, directory: str | os.PathLike[str]) -> tuple[Path, Path
     Raises
     ------
     MissingExtraError
-        If plotly is not installed; nothing is written then.
+        If plotly is not installed; the JSON is written all the same.
     """
-    html = page(result)
     rows = json.dumps(_finite(result.to_json()), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     folder = Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
     data, shown = folder / f"{result.name}.json", folder / f"{result.name}.html"
     _replace(data, rows)
-    _replace(shown, html)
+    _replace(shown, page(result))
     return data, shown
 
 

@@ -197,7 +197,7 @@ def _rollouts(splits: list[Split]) -> str:
 
 
 def _seconds(movement: Demonstration, at: int) -> str:
-    return f"step {at}" if movement.times is None else f"{round(movement.times[at], digits):g} s"
+    return f"step {at}" if movement.times is None else f"{round(movement.times[at], 1):g} s"
 
 
 def _spectra(splits: list[Split], settings: Any) -> str:

@@ -35,14 +35,13 @@ class Arm:
     alpha: Array
     d: Array
     limits: Array
-    offset: Array | None = None
+    offset: Array | float = 0.0
 
     def __post_init__(self) -> None:
         joints = np.size(self.d)
         for name in ("a", "alpha", "d", "limits"):
             object.__setattr__(self, name, as_vector(getattr(self, name), name, joints))
-        offset = np.zeros(joints) if self.offset is None else as_vector(self.offset, "offset", joints)
-        object.__setattr__(self, "offset", offset)
+        object.__setattr__(self, "offset", as_vector(np.broadcast_to(self.offset, (joints,)), "offset"))
 
     @property
     def joints(self) -> int:

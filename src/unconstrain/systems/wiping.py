@@ -175,4 +175,3 @@ def _slow_noise(rng: np.random.Generator, steps: int, dt: float, memory: float =
 
     keep = np.exp(-dt / memory)
     return np.asarray(lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.standard_normal((steps, 3)), axis=0))
-
