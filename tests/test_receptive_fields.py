@@ -106,5 +106,5 @@ def test_what_cannot_be_covered_is_said_in_a_sentence(arguments, error, sentence
 def test_fields_are_checked():
     with pytest.raises(InvalidDataError, match=r"centres: got an array of shape \(2,\)"):
         ReceptiveFields([1.0, 2.0], 1.0)
-    with pytest.raises(SettingError, match="variance: got -1.0"):
+    with pytest.raises(SettingError, match=r"variance: got -1\.0, expected a number above 1e-100"):
         ReceptiveFields([[1.0, 2.0]], -1.0)

@@ -105,12 +105,8 @@ def test_the_start_is_not_touched():
         ),
         ({"constraint": lambda x, t: np.full((1, 1, 2), np.nan)}, InvalidDataError, "constraint matrix: found NaN"),
         ({"policy": lambda x: np.full(x.shape, np.nan)}, InvalidDataError, "left the finite numbers at step 0"),
-        ({"policy": lambda x: 1e30 * x}, InvalidDataError, "found .* at row 1, column 1, expected numbers up to 1e.30"),
-        (
-            {"policy": lambda x: np.full(x.shape, 1e308)},
-            InvalidDataError,
-            "left the finite numbers at step 1: start nearer",
-        ),
+        ({"policy": lambda x: 1e10 * x}, InvalidDataError, "left the finite numbers at step 2: start nearer"),
+        ({"policy": lambda x: np.full(x.shape, 1e308)}, InvalidDataError, "left the finite numbers at step 0"),
     ],
 )
 def test_what_cannot_be_followed_is_said_in_a_sentence(change, error, sentence):

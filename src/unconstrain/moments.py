@@ -161,10 +161,10 @@ _BLOCK = 2**18
 
 
 def _products_of_one(features: Array, directions: Array, weights: Array) -> Array:
-    """``Σ w φφᵀ`` for the metrics 1 and û_k û_l (k ≤ l) of one model, shape (1, metrics, p²).
+    """``Σ w φφᵀ`` for the metrics 1 and û_k û_m (k ≤ m) of one model, shape (1, metrics, p²).
 
-    With ``F_k = diag(√w û_k) φ`` they are ``F_kᵀF_l``. Off the diagonal,
-    ``F_kᵀF_l + F_lᵀF_k = (F_k + F_l)ᵀ(F_k + F_l) − F_kᵀF_k − F_lᵀF_l`` (and
+    With ``F_k = diag(√w û_k) φ`` they are ``F_kᵀF_m``. Off the diagonal,
+    ``F_kᵀF_m + F_mᵀF_k = (F_k + F_m)ᵀ(F_k + F_m) − F_kᵀF_k − F_mᵀF_m`` (and
     both terms are equal), so that every product is of a matrix with its own
     transpose, which BLAS does at half the price. The last diagonal one
     follows from the others, since ``Σ û_k² = 1``.
@@ -178,12 +178,12 @@ def _products_of_one(features: Array, directions: Array, weights: Array) -> Arra
     own = [f.T @ f for f in pointed[:-1]]
     own.append(whole - sum(own, start=np.zeros_like(whole)))
     products = [whole + still.T @ still]
-    for k, l in zip(*np.triu_indices(len(pointed)), strict=True):
-        if k == l:
+    for k, m in zip(*np.triu_indices(len(pointed)), strict=True):
+        if k == m:
             products.append(own[k])
         else:
-            both = pointed[k] + pointed[l]
-            products.append(0.5 * (both.T @ both - own[k] - own[l]))
+            both = pointed[k] + pointed[m]
+            products.append(0.5 * (both.T @ both - own[k] - own[m]))
     return np.stack(products).reshape(1, len(products), -1)
 
 
@@ -208,6 +208,6 @@ def _unpacked(products: Array, d: int, p: int) -> tuple[Array, Array]:
         full[..., row, column] = full[..., column, row] = products
     first, second = np.triu_indices(d)
     consistent = np.empty((models, p, d, p, d))
-    for metric, (k, l) in enumerate(zip(first, second, strict=True), start=1):
-        consistent[:, :, k, :, l] = consistent[:, :, l, :, k] = full[:, metric]
+    for metric, (k, m) in enumerate(zip(first, second, strict=True), start=1):
+        consistent[:, :, k, :, m] = consistent[:, :, m, :, k] = full[:, metric]
     return full[:, 0].copy(), consistent.reshape(models, p * d, p * d)

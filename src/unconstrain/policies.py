@@ -12,6 +12,7 @@ from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from copy import deepcopy
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
@@ -220,7 +221,7 @@ class Policy(RegressorMixin, BaseEstimator):
         starts = np.searchsorted(folds[order], np.arange(len(self._folds.parts) + 1))
         empty = self._folds.parts[0]
         parts = []
-        for start, stop in zip(starts[:-1], starts[1:], strict=True):
+        for start, stop in pairwise(starts):
             blocks = (self._block(states[rows], actions[rows], weights[rows]) for rows in _chunks(order[start:stop]))
             parts.append(gather_blocks(blocks, *empty.cross.shape))
         return FoldedMoments(tuple(parts), self._folds.held_out)

@@ -156,7 +156,7 @@ def _stroke(
     """Put the sponge down somewhere and wipe: what the camera sees."""
     substeps = 10
     dt = 1.0 / (rate * substeps)
-    steps = int(round(duration * rate)) * substeps
+    steps = round(duration * rate) * substeps
     drift = iter(unsteadiness * _slow_noise(rng, steps, dt))
 
     def hand(states: Array) -> Array:
