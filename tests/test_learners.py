@@ -87,6 +87,26 @@ def test_among_equal_scores_most_is_left_to_the_standard_risk():
     assert_array_equal(solution.weights, np.zeros((1, 2, 3)))
 
 
+def test_a_direction_that_no_held_out_sample_sees_is_left_to_the_standard_risk():
+    axes = np.array([[1.0, 0.0], [0.0, 1.0]])
+    seen = gather(np.tile([[1.0, 0.0]], (2, 1)), axes)
+    unseen = gather(np.tile([[0.0, 1.0]], (2, 1)), axes)
+    for averaging in AVERAGES:
+        solution = Hybrid(alpha=0.0, averaging=averaging).solve(FoldedMoments((seen, 4 * seen + unseen), range(1)))
+        assert solution.scores[0, 0] == solution.scores[0, 1] == solution.scores[0, 2] < solution.scores[0, 3]
+        assert_array_equal(solution.determined, [2])
+        # Consistent with both actions where that was judged, and their mean where it was not.
+        assert_allclose(solution.weights[0], [[1.0, 0.5], [1.0, 0.5]])
+
+
+def test_of_a_perfect_fit_no_fold_scores_below_its_rounding():
+    data = draw(noise=0.0, policy=lambda x: x @ np.array([[1.0, 2.0], [3.0, -1.0]]))
+    folds, _, _ = folded(data)
+    scores = Hybrid(alpha=0.0).solve(folds).scores[0]
+    energy = np.prod([(p.energy[0] / p.weight[0]) ** (p.weight[0] / folds.whole.weight[0]) for p in folds.parts])
+    assert 1e-15 * energy < scores.min() < 1e-12 * energy
+
+
 def test_with_nothing_to_hold_out_the_data_judges_itself():
     data = draw(noise=0.3)
     moments = gather(features_of(data.states), data.actions)

@@ -82,6 +82,15 @@ def test_states_that_do_not_move_are_all_in_one_fold():
         assert len(set(splitter(Folds(4), states).assign(states, None))) == 1
 
 
+@given(st.integers(2, 60), st.floats(0.01, 1e6))
+def test_what_rounding_of_the_mean_leaves_does_not_scatter_states(samples, value):
+    states = np.full((samples, 2), value)
+    weights = np.random.default_rng(samples).uniform(0.1, 1, samples)
+    split = splitter(Folds(10), states, weights=weights)
+    again = value * (1 + 1e-13 * np.arange(samples))[:, None] * np.ones(2)
+    assert len(set(split.assign(again, None))) == 1
+
+
 def test_states_far_outside_the_first_batch_still_have_a_fold():
     split = splitter(Folds(4), spread(20))
     assert set(split.assign(np.array([[1e90, -1e90], [-1e100, 0.0]]), None)) <= set(range(4))

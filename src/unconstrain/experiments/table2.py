@@ -141,7 +141,7 @@ def learners(settings: Settings) -> dict[str, Learner]:
 
 def demonstrate(settings: Settings, held: int, count: int, rng: np.random.Generator) -> list[Demonstration]:
     """Record the arm while the first ``held`` coordinates of its hand are kept still."""
-    starts = rng.uniform(-0.5, 0.5, (count, LWR3.joints)) * LWR3.limits
+    starts = rng.uniform(-0.5, 0.5, (count, LWR3.joints)) * LWR3.upper
     constraint = JacobianRows(LWR3.jacobian, tuple(range(held)))
     policy = JointLimitAvoidance(settings.gain, settings.power)
     name = f"arm {CONSTRAINTS[held - 1]}"
