@@ -6,8 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from unconstrain import rollout
-from unconstrain.errors import InvalidDataError, SettingError
-from unconstrain.systems.arm import LWR3, Arm, JointLimitAvoidance
+from unconstrain.systems.arm import JointLimitAvoidance
 from unconstrain.systems.limit_cycle import LimitCycle
 from unconstrain.systems.wiping import HELD_OUT, PLATES, Plate, WipingPolicy, demonstrate
 
@@ -86,67 +85,9 @@ def test_a_seed_draws_the_same_demonstration_again():
     assert np.abs(one.states - other.states[: len(one)]).max() > 0.01
 
 
-def denavit_hartenberg(arm, posture):
-    """The chain of homogeneous matrices, each as in the textbook."""
-    frames = [np.eye(4)]
-    for q, a, alpha, d in zip(posture + arm.offset, arm.a, arm.alpha, arm.d, strict=True):
-        frames.append(
-            frames[-1]
-            @ np.array(
-                [
-                    [np.cos(q), -np.sin(q) * np.cos(alpha), np.sin(q) * np.sin(alpha), a * np.cos(q)],
-                    [np.sin(q), np.cos(q) * np.cos(alpha), -np.cos(q) * np.sin(alpha), a * np.sin(q)],
-                    [0, np.sin(alpha), np.cos(alpha), d],
-                    [0, 0, 0, 1],
-                ]
-            )
-        )
-    return np.array(frames)
-
-
-def some_arm():
-    rng = np.random.default_rng(0)
-    a, alpha, d, offset = rng.uniform(-1, 1, (4, 4))
-    return Arm(a, alpha, d, np.ones(4), offset)
-
-
-@pytest.mark.parametrize("arm", [LWR3, some_arm()], ids=["LWR-III", "some arm"])
-def test_frames_of_an_arm_are_products_of_its_matrices(arm):
-    postures = np.random.default_rng(1).uniform(-2, 2, (5, arm.joints))
-    rotations, positions = arm.frames(postures)
-    for t, posture in enumerate(postures):
-        frames = denavit_hartenberg(arm, posture)
-        assert_allclose(rotations[:, t], frames[:, :3, :3], atol=1e-12)
-        assert_allclose(positions[:, t], frames[:, :3, 3], atol=1e-12)
-
-
-@pytest.mark.parametrize("arm", [LWR3, some_arm()], ids=["LWR-III", "some arm"])
-def test_a_jacobian_is_the_derivative_of_the_tip(arm):
-    posture, h = np.random.default_rng(2).uniform(-2, 2, arm.joints), 1e-6
-    (J,) = arm.jacobian(posture[None])
-    for j in range(arm.joints):
-        ahead, behind = (denavit_hartenberg(arm, posture + s * h * np.eye(arm.joints)[j])[-1] for s in (1, -1))
-        turn = Rotation.from_matrix(ahead[:3, :3] @ behind[:3, :3].T).as_rotvec() / (2 * h)
-        assert_allclose(J[:3, j], (ahead[:3, 3] - behind[:3, 3]) / (2 * h), atol=1e-8)
-        assert_allclose(J[3:, j], turn, atol=1e-8)
-
-
-def test_the_light_weight_robot_stretches_straight_up():
-    _, positions = LWR3.frames(np.zeros((1, 7)))
-    assert_allclose(positions[-1, 0], [0, 0, 0.3105 + 0.40 + 0.39 + 0.078], atol=1e-12)
-    assert_allclose(np.degrees(LWR3.limits), [170, 120, 170, 120, 170, 120, 170])
-
-
 def test_joint_limits_are_avoided_down_the_paper_s_potential():
     x, h = np.array([[-1.0, 0.3, 0.0, 2.0]]), 1e-6
     for j in range(4):
         step = h * np.eye(4)[j]
         slope = ((np.abs(x + step) ** 1.8).sum() - (np.abs(x - step) ** 1.8).sum()) / (2 * h)
         assert JointLimitAvoidance(gain=0.05, power=1.8)(x)[0, j] == pytest.approx(-0.05 * slope, abs=1e-6)
-
-
-def test_an_arm_has_one_angle_for_each_joint():
-    with pytest.raises(SettingError, match="postures: got 6 joints, expected 7"):
-        LWR3.frames(np.zeros((1, 6)))
-    with pytest.raises(InvalidDataError, match="alpha: got 3 values, expected 2"):
-        Arm([0, 0], [0, 0, 0], [1, 1], [1, 1])

@@ -66,10 +66,11 @@ class Arm:
         limits : array_like, shape (n,)
             Largest angle to either side, rad.
         """
+        joints = np.size(d)
         lengths, twists, offsets, reach = (
-            as_vector(values, name) for values, name in ((a, "a"), (alpha, "alpha"), (d, "d"), (limits, "limits"))
+            as_vector(values, name, joints)
+            for values, name in ((a, "a"), (alpha, "alpha"), (d, "d"), (limits, "limits"))
         )
-        joints = len(offsets)
         links = np.tile(np.eye(4), (joints + 1, 1, 1))  # joint j's link stands in the origin of joint j + 1
         cosine, sine = np.cos(twists), np.sin(twists)
         links[1:, 1, 1], links[1:, 1, 2] = cosine, -sine
@@ -110,7 +111,9 @@ class Arm:
             chain.append(into[link])
             link = into[link].parent
         if base is not None and link != base:
-            raise SettingError(f"{path}: {base!r} is not on the way from the root to {tip!r}: they are on two branches.")
+            raise SettingError(
+                f"{path}: {base!r} is not on the way from the root to {tip!r}: they are on two branches."
+            )
         return _from_joints(chain[::-1], path, tip)
 
     def frames(self, postures: Array) -> tuple[Array, Array]:
