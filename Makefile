@@ -9,7 +9,7 @@ DEV_STAMP := $(VENV)/.installed-dev
 DEMO_DIR := build/demo
 DOCS_DIR := build/docs
 
-.PHONY: help demo test check docs clean
+.PHONY: help demo test check docs bench clean
 .DELETE_ON_ERROR:
 
 help: ## show this list
@@ -32,6 +32,9 @@ check: $(DEV_STAMP) ## lint, formatting, types, import order
 docs: $(DEV_STAMP) ## build the documentation; warnings are errors
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs $(DOCS_DIR)
 	@echo "The documentation is in $(CURDIR)/$(DOCS_DIR)/index.html"
+
+bench: $(DEV_STAMP) ## time the sums, the solves and the kinematics
+	@$(BIN)/python benchmarks/arm.py
 
 clean: ## remove everything built; .venv stays
 	rm -rf build dist htmlcov .coverage .coverage.* docs/_build docs/auto_examples docs/generated docs/sg_execution_times.rst

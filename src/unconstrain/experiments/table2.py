@@ -83,7 +83,7 @@ class Settings:
     seed: int = 0
     demonstrations: int = 100
     steps: int = 100
-    test_demonstrations: int = 20
+    test_demonstrations: int = 100
     gain: float = 0.05
     power: float = 1.8
     variance: float = 3.0
@@ -91,8 +91,8 @@ class Settings:
     # ---- the paper is silent on these; chosen on other seeds than the reported ones
     dt: float = 0.5
     folds: int = 10
-    alpha: float = 1e-4
-    softness: float = 3e-5
+    alpha: float = 1e-5
+    softness: float = 6e-5
     speed_power: float = 0.5
 
 

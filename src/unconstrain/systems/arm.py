@@ -111,9 +111,7 @@ class Arm:
             chain.append(into[link])
             link = into[link].parent
         if base is not None and link != base:
-            raise SettingError(
-                f"{path}: {base!r} is not on the way from the root to {tip!r}: they are on two branches."
-            )
+            raise SettingError(f"{path}: {base!r} is not on the way from the root to {tip!r}, but on another branch.")
         return _from_joints(chain[::-1], path, tip)
 
     def frames(self, postures: Array) -> tuple[Array, Array]:

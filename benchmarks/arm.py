@@ -1,0 +1,58 @@
+"""How long the parts of one trial of Table II take: run with ``make bench``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from unconstrain.demonstration import stack
+from unconstrain.experiments import table2
+from unconstrain.learners import Hybrid
+from unconstrain.moments import gather
+from unconstrain.policies import LocallyLinearPolicy
+from unconstrain.systems.arm import LWR3
+from unconstrain.validation import Folds
+
+REPEATS = 7
+
+
+def median_ms(call: Callable[[], object]) -> float:
+    """Median time of a call, ms."""
+    times = []
+    for _ in range(REPEATS):
+        start = perf_counter()
+        call()
+        times.append(1e3 * (perf_counter() - start))
+    return float(np.median(times))
+
+
+def main() -> None:
+    """Print the table."""
+    settings = table2.Settings()
+    rng = np.random.default_rng(0)
+    states, actions, groups = stack(table2.demonstrate(settings, 3, settings.demonstrations, rng))
+    policy = LocallyLinearPolicy(settings.variance, validation=Folds(settings.folds))
+    policy.fit(states, actions, groups=groups)
+    features, weights = policy.features_(states), policy.fields_.weights(states)
+    learner = Hybrid(settings.alpha, softness=settings.softness)
+    postures = rng.uniform(LWR3.lower, LWR3.upper, (10_000, LWR3.joints))
+    rows = [
+        (
+            f"sums, {len(states):,} samples × {weights.shape[1]} fields × 7-DOF",
+            lambda: gather(features, actions, weights),
+        ),
+        (f"hybrid, all thresholds of each field, {settings.folds} folds", lambda: policy.with_learner(learner)),
+        ("whole fit: fields, sums in folds, hybrid", lambda: policy.set_params(learner=learner).fit(states, actions)),
+        ("10,000 Jacobians", lambda: LWR3.jacobian(postures)),
+    ]
+    print(f"{'one thread, median of ' + str(REPEATS):60} ms")
+    with threadpool_limits(1):
+        for name, call in rows:
+            print(f"{name:60} {median_ms(call):.1f}")
+
+
+if __name__ == "__main__":
+    main()
