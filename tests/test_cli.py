@@ -5,6 +5,7 @@ import io
 import json
 import os
 import pickle
+import re
 import subprocess
 import sys
 from functools import partial
@@ -274,10 +275,13 @@ def test_fit_says_what_it_did(files, tmp_path):
     assert lines[:3] == [
         "Learnt from x, y as states and vx, vy as actions.",
         "8 demonstrations, 320 samples.",
-        "The inconsistency determined 100% of 6 weight directions; the rest follows the standard risk.",
+        "The inconsistency determined 100% of 6 weight directions.",
     ]
-    assert lines[3].startswith("normalised inconsistency on the training data: ")
-    assert float(lines[3].split(": ")[1]) < 1e-12
+    missed = re.fullmatch(
+        r"share of the observed motion .*: (\S+) on the training data, (\S+) where held out\.", lines[3]
+    )
+    assert float(missed[1]) < 1e-12
+    assert float(missed[2]) < 1e-12
     assert lines[4] == f"policy: {tmp_path / 'p.npz'}"
 
 
@@ -288,6 +292,24 @@ def test_each_model_takes_each_learner(files, tmp_path, model, learner):
     assert ("local models" in said) == (model == "local")
     assert ("The inconsistency determined" in said) == (learner != "direct")
     assert type(storage.load(tmp_path / "p.npz").learner).__name__.lower() == learner
+
+
+def test_what_is_missed_where_held_out_is_said_in_a_note(tmp_path):
+    rng = np.random.default_rng(0)
+    for k in range(4):  # nothing in common: each its own random walk
+        walk = rng.standard_normal((60, 2)).cumsum(axis=0)
+        write(
+            tmp_path / f"{k}.csv", "t,x,y,vx,vy", np.column_stack([np.arange(60), walk, rng.standard_normal((60, 2))])
+        )
+    result = CliRunner().invoke(cli.main, ["fit", str(tmp_path / "*.csv"), "-o", str(tmp_path / "p.npz")])
+    assert result.exit_code == 0
+    assert "Note: much is missed where held out." in result.stderr
+
+
+def test_a_policy_is_no_recording(policy, tmp_path):
+    assert refused("fit", policy, "-o", tmp_path / "p.npz").endswith(
+        "is a policy that was saved, not recordings to learn from."
+    )
 
 
 def test_settings_reach_the_policy(files, tmp_path):
@@ -652,7 +674,7 @@ def test_a_recording_is_never_overwritten_by_its_policy(files, tmp_path):
 
 def test_a_place_that_cannot_be_written_to_is_named(files, policy, tmp_path):
     away = tmp_path / "none" / "x"
-    assert refused("fit", files[0], "-o", away) == f"{away}: cannot be written (No such file or directory)."
+    assert refused("fit", files[0], "-o", away) == f"{away}: cannot be written, its folder does not exist."
     assert refused("rollout", policy, "--start", "0,0", "-o", away) == f"{away}: No such file or directory."
     assert "is a directory" in refused("rollout", policy, "--start", "0,0", "-o", tmp_path)
     assert "is a directory" in refused("fit", files[0], "-o", tmp_path)

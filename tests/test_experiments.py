@@ -517,8 +517,9 @@ Hybrid    1         10.54 ± 4.56      6.98 ± 3.90
 def test_table2_has_the_printed_values_beside_ours_in_plain_units(small_table2):
     constraints = ["1", "1-2", "1-2-3", "1-...-4", "1-...-5", "1-...-6"]
     names = [(row["method"], row["constraint"]) for row in small_table2.rows]
-    assert names == [(method, constraint) for method in METHODS for constraint in constraints]
-    for row, line in zip(small_table2.rows, PRINTED_TABLE2.strip().splitlines(), strict=True):
+    others = ["hybrid, unweighted", "direct, weighted", "inconsistency, weighted"]
+    assert names == [(method, constraint) for method in METHODS + others for constraint in constraints]
+    for row, line in zip(small_table2.rows[:18], PRINTED_TABLE2.strip().splitlines(), strict=True):
         printed = [float(number) / 100 for number in re.findall(r"\d+\.\d+", line)]
         assert list(row) == ["method", "constraint", *MEASURES, *(f"paper_{name}" for name in MEASURES[:4])]
         assert_allclose([row[f"paper_{name}"] for name in MEASURES[:4]], printed)

@@ -1,6 +1,7 @@
 """The estimators, as scikit-learn sees them and as a person does."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -19,6 +20,7 @@ import unconstrain as uc
 from samples import draw
 from unconstrain.errors import InvalidDataError, SettingError, UnconstrainError
 from unconstrain.policies import PLACING_SAMPLES
+from unconstrain.systems.limit_cycle import LimitCycle
 
 POLICIES = [uc.ParametricPolicy, uc.LocallyLinearPolicy]
 LEARNERS = [uc.Direct(), uc.Inconsistency(), uc.Inconsistency(None), uc.Hybrid(), uc.Hybrid(softness=0.1, threshold=0)]
@@ -289,3 +291,63 @@ def test_a_batch_that_is_refused_changes_nothing(data):
         policy.partial_fit(data.states, np.full((90, 2), np.nan))
     policy.with_learner(uc.Direct())
     assert_array_equal(policy.predict(data.states), before)
+
+
+def test_the_held_out_score_is_that_of_refitting_without_each_demonstration():
+    data = draw(noise=0.2, groups=4)
+    policy = uc.ParametricPolicy(uc.Affine(), uc.Inconsistency(), uc.Folds(4)).fit(
+        data.states, data.actions, groups=data.groups
+    )
+    missed = 0.0
+    for group in range(4):
+        out = data.groups == group
+        other = uc.ParametricPolicy(uc.Affine(), uc.Inconsistency()).fit(data.states[~out], data.actions[~out])
+        r = np.linalg.norm(data.actions[out], axis=1)
+        along = (data.actions[out] / r[:, None] * other.predict(data.states[out])).sum(axis=1)
+        missed += ((r - along) ** 2).sum()
+    assert_allclose(policy.held_out_score(), 1 - missed / (data.actions**2).sum())
+
+
+def test_there_is_no_held_out_score_of_a_single_sample():
+    assert np.isnan(uc.LocallyLinearPolicy().fit([[0.0, 1.0]], [[1.0, 2.0]]).held_out_score())
+
+
+def test_speed_power_is_a_sample_weight():
+    demos = uc.rollout(LimitCycle(), [[0.1, 0.9], [0.5, -0.5], [-1.0, 0.2]], 30, 0.05)
+    states, actions, groups = uc.stack(demos)
+    weighted = uc.LocallyLinearPolicy().fit_demonstrations(demos, speed_power=2.0)
+    by_hand = uc.LocallyLinearPolicy().fit(states, actions, (actions**2).sum(axis=1), groups)
+    assert_allclose(weighted.predict(states), by_hand.predict(states), rtol=1e-6, atol=1e-9)
+
+
+def test_movements_that_are_fully_held_do_not_vote():
+    true = np.array([[0.0, 1.0, 0.2], [-1.0, 0.1, 0.0], [0.3, 0.0, -0.5]])
+    rng = np.random.default_rng(0)
+    free = [
+        uc.rollout(lambda x: x @ true.T, rng.normal(size=3), 30, 0.05, uc.constraints.Plane(rng.normal(size=3)))
+        for _ in range(20)
+    ]
+    held = [
+        uc.rollout(lambda x: x @ true.T, rng.normal(size=3), 30, 0.05, lambda x, t: np.eye(3)[None]) for _ in range(8)
+    ]
+    nearly = [replace(demo, actions=demo.actions + 1e-17 * rng.normal(size=demo.actions.shape)) for demo in held]
+    for learner in (uc.Inconsistency(), uc.Hybrid()):
+        for demos in (free + held, free + nearly):
+            assert uc.nupe(uc.ParametricPolicy(uc.Affine(), learner).fit_demonstrations(demos), free) < 1e-12
+
+
+def test_a_stream_of_one_demonstration_at_a_time_holds_demonstrations_out():
+    data = draw(noise=0.2, groups=4)
+    whole = uc.ParametricPolicy(uc.Affine()).fit(data.states, data.actions, groups=data.groups)
+    stream = uc.ParametricPolicy(whole.features_)
+    for group in range(4):
+        of = data.groups == group
+        stream.partial_fit(data.states[of], data.actions[of], groups=data.groups[of])
+    assert_allclose(stream.predict(data.states), whole.predict(data.states))
+
+
+def test_a_first_batch_that_does_not_move_leaves_folds_for_the_next():
+    data = draw(noise=0.2)
+    policy = uc.ParametricPolicy(uc.Affine()).partial_fit(np.ones((1, data.states.shape[1])), data.actions[:1])
+    policy.partial_fit(data.states, data.actions)
+    assert sum(part.weight.any() for part in policy._folds.parts) > 5

@@ -131,7 +131,7 @@ def test_automatic_means_demonstrations_where_there_are_several(by, groups, expe
 
 
 def test_demonstrations_that_are_not_named_cannot_be_held_out():
-    with pytest.raises(SettingError, match="validation by demonstration: expected groups, one name or number"):
+    with pytest.raises(SettingError, match="validation by demonstration: expected groups=, one name or number"):
         splitter(Folds(2, by="demonstration"), spread(3)).assign(spread(3), None)
 
 

@@ -130,7 +130,7 @@ class Hybrid:
         goes over from one objective to the other by degrees.
     """
 
-    alpha: float = 0.2
+    alpha: float = 0.1
     threshold: float | None = None
     softness: float = 0.0
     averaging: Averaging = "geometric"
@@ -184,9 +184,10 @@ def _average(judged: Array, parts: Sequence[Moments], averaging: Averaging) -> A
     counts = np.where(weight > 0, weight, 1.0)  # a fold that a field does not see scores 0 with weight 0
     scores = judged / counts
     if averaging == "geometric":
-        # Of a perfect fit rounding is left, and the logarithm of that must not decide.
-        rounding = 1e-14 * np.stack([part.energy for part in parts])[..., None] / counts
-        scores = np.log(np.maximum(scores + rounding, np.finfo(float).tiny))
+        # Of a perfect fit, or of a demonstration at rest, rounding is left, and its logarithm must not decide.
+        energy = np.stack([part.energy for part in parts])[..., None].sum(axis=0)
+        floor = 1e-9 * energy / np.maximum(weight.sum(axis=0), np.finfo(float).tiny)
+        scores = np.log(np.maximum(scores + floor, np.finfo(float).tiny))
     total = np.where(weight > 0, weight * scores, 0.0).sum(axis=0)
     mean = total / np.maximum(weight.sum(axis=0), np.finfo(float).tiny)
     return np.exp(mean) if averaging == "geometric" else mean

@@ -11,7 +11,8 @@ say everything about a data set.
 
 A zero action has no direction: it counts in weight, gram (and, adding
 nothing, in energy and cross), but not in ``consistent``. This is the one place
-where that is decided.
+where that is decided. What is zero is for the caller to say (``at_rest``):
+the direction of rounding would claim that the policy is zero along it.
 """
 
 from __future__ import annotations
@@ -118,7 +119,7 @@ def total(parts: Iterable[Moments]) -> Moments:
     return reduce(add, parts)
 
 
-def gather(features: Array, actions: Array, weights: Array | None = None) -> Moments:
+def gather(features: Array, actions: Array, weights: Array | None = None, at_rest: float = 0.0) -> Moments:
     """Sum over samples. The matrix V = φ ⊗ û of all samples (N × d p) never exists.
 
     Parameters
@@ -128,16 +129,21 @@ def gather(features: Array, actions: Array, weights: Array | None = None) -> Mom
     weights : ndarray, shape (N, M), optional
         How much each sample counts in each model, not negative; ones for a
         single model if None.
+    at_rest : float
+        Actions of at most this length have no direction.
 
     Returns
     -------
     Moments
     """
     counts = np.ones((len(features), 1)) if weights is None else weights
-    return gather_blocks([(features, actions, counts)], counts.shape[1], actions.shape[1], features.shape[1])
+    block = features, actions, counts
+    return gather_blocks([block], counts.shape[1], actions.shape[1], features.shape[1], at_rest)
 
 
-def gather_blocks(blocks: Iterable[tuple[Array, Array, Array]], models: int, actions: int, features: int) -> Moments:
+def gather_blocks(
+    blocks: Iterable[tuple[Array, Array, Array]], models: int, actions: int, features: int, at_rest: float = 0.0
+) -> Moments:
     """Sum over blocks of samples, each (features, actions, weights) as in :func:`gather`."""
     single = models == 1
     pairs = features**2 if single else features * (features + 1) // 2
@@ -149,6 +155,7 @@ def gather_blocks(blocks: Iterable[tuple[Array, Array, Array]], models: int, act
         for start in range(0, len(block[0]), rows):
             phi, u, w = (part[start : start + rows] for part in block)
             directions, lengths = unit_actions(u)
+            directions[lengths <= at_rest] = 0.0
             products += (_products_of_one if single else _products_of_many)(phi, directions, w)
             weight += w.sum(axis=0)
             energy += w.T @ lengths**2
@@ -166,7 +173,7 @@ def _products_of_one(features: Array, directions: Array, weights: Array) -> Arra
     With ``F_k = diag(√w û_k) φ`` they are ``F_kᵀF_m``. Off the diagonal,
     ``F_kᵀF_m + F_mᵀF_k = (F_k + F_m)ᵀ(F_k + F_m) − F_kᵀF_k − F_mᵀF_m`` (and
     both terms are equal), so that every product is of a matrix with its own
-    transpose, which BLAS does at half the price. The last diagonal one
+    transpose, which BLAS does at half the price. The largest diagonal one
     follows from the others, since ``Σ û_k² = 1``.
     """
     rooted = np.sqrt(weights) * features
@@ -175,8 +182,9 @@ def _products_of_one(features: Array, directions: Array, weights: Array) -> Arra
     seen = rooted if moving.all() else rooted[moving]
     pointed = [seen * directions[moving, k, None] for k in range(directions.shape[1])]
     whole = seen.T @ seen
-    own = [f.T @ f for f in pointed[:-1]]
-    own.append(whole - sum(own, start=np.zeros_like(whole)))
+    largest = int(np.argmax([(f**2).sum() for f in pointed]))  # subtracting for a small one would leave rounding
+    own = [np.zeros_like(whole) if k == largest else f.T @ f for k, f in enumerate(pointed)]
+    own[largest] = whole - sum(own, start=np.zeros_like(whole))
     products = [whole + still.T @ still]
     for k, m in zip(*np.triu_indices(len(pointed)), strict=True):
         if k == m:

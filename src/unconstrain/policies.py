@@ -20,12 +20,13 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from .arrays import Array, as_groups, as_matrix, as_table, as_weights
+from .arrays import Array, as_groups, as_matrix, as_table, as_weights, check_at_least
 from .demonstration import Demonstration, stack
 from .errors import InvalidDataError, SettingError
 from .features import Affine, FeatureMap, KMeansRBF, Placeable
 from .learners import Hybrid, Learner, Solution
 from .moments import Moments, gather_blocks
+from .objectives import inconsistency, vec
 from .projection import unit_actions
 from .receptive_fields import ReceptiveFields, choose_variance, cover
 from .validation import FoldedMoments, Folds, Groups, Splitter, Validation
@@ -34,6 +35,9 @@ __all__ = ["LocallyLinearPolicy", "ParametricPolicy", "Policy"]
 
 PLACING_SAMPLES = 20_000
 """Features and fields are placed on at most this many samples, evenly spaced in the first batch."""
+
+AT_REST = 1e-12
+"""Actions shorter than this share of the largest in the first batch are rounding around rest."""
 
 _ROWS = 4096
 
@@ -95,16 +99,22 @@ class Policy(RegressorMixin, BaseEstimator):
         """
         for fitted in ("_folds", "_splitter", "n_features_in_", "solution_"):
             self.__dict__.pop(fitted, None)
-        return self.partial_fit(X, y, sample_weight, groups)
+        return self._learn(X, y, sample_weight, groups, more=False)
 
     def partial_fit(
         self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, groups: Groups | None = None
     ) -> Self:
-        """Learn from a further batch, as if all batches had come at once.
+        """Learn from a further batch; the sums are those of all batches at once.
 
-        Features, fields and action dimensions are fixed by the first batch.
+        The first batch fixes features, fields, action dimensions, and the
+        spread by which samples are dealt into folds; it should be typical.
         Parameters, result and errors as in :meth:`fit`.
         """
+        return self._learn(X, y, sample_weight, groups, more=True)
+
+    def _learn(
+        self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None, groups: Groups | None, *, more: bool
+    ) -> Self:
         first = not hasattr(self, "_folds")
         states, actions = self._checked(X, y, reset=first)
         weights = as_weights(sample_weight, len(states))
@@ -116,15 +126,52 @@ class Policy(RegressorMixin, BaseEstimator):
             states, actions, weights = states[counting], actions[counting], weights[counting]
             names = None if names is None else names[counting]
         if first:
-            self._begin(states, weights, names)
+            self._at_rest = AT_REST * float(np.abs(actions).max())
+            self._begin(states, weights, names, more)
         self._folds = self._folds + self._gather(states, actions, weights, names)
         self._conclude()
         return self
 
-    def fit_demonstrations(self, demonstrations: Demonstration | Sequence[Demonstration]) -> Self:
-        """Learn from demonstrations, each its own group; see :meth:`fit`."""
+    def fit_demonstrations(
+        self, demonstrations: Demonstration | Sequence[Demonstration], speed_power: float = 0.0
+    ) -> Self:
+        """Learn from demonstrations, each its own group.
+
+        Parameters
+        ----------
+        demonstrations : Demonstration or sequence of Demonstration
+        speed_power : float
+            Samples count by this power of their speed. 0 is the paper; 2
+            helps on noisy recordings, since the direction of a slow movement
+            is mostly noise.
+
+        Returns
+        -------
+        self
+        """
+        check_at_least("speed_power", speed_power, 0.0)
         states, actions, groups = stack(demonstrations)
-        return self.fit(states, actions, groups=groups)
+        speed = np.linalg.norm(actions, axis=1)
+        if speed_power == 0.0 or not speed.any():
+            return self.fit(states, actions, groups=groups)
+        return self.fit(states, actions, (speed / speed.max()) ** speed_power, groups)
+
+    def held_out_score(self) -> float:
+        """:meth:`score` on each fold by what is learnt from the others, from the moments alone.
+
+        Of local models each is judged by itself in its own field. NaN where
+        there is nothing to hold out.
+        """
+        check_is_fitted(self, "solution_")
+        parts, learner = self._folds.parts, self._learner()
+        filled = [i for i, part in enumerate(parts) if part.weight.any()]
+        missed = moved = 0.0
+        for i in filled if len(filled) > 1 else ():
+            others = tuple(parts[j] for j in filled if j != i)
+            weights = self._solve(learner, FoldedMoments(others, range(len(others)))).weights
+            missed += float(inconsistency(parts[i])(vec(weights)).sum())
+            moved += float(parts[i].energy.sum())
+        return 1.0 - missed / moved if moved > 0 else float("nan")
 
     def predict(self, X: ArrayLike) -> Array:
         """Predict the unconstrained policy.
@@ -206,10 +253,11 @@ class Policy(RegressorMixin, BaseEstimator):
             raise InvalidDataError(str(error)) from error
         return as_matrix(table, "states")
 
-    def _begin(self, states: Array, weights: Array, groups: Groups | None) -> None:
+    def _begin(self, states: Array, weights: Array, groups: Groups | None, more: bool) -> None:
         validation = self.validation if self.validation is not None else Folds()
-        self._splitter = Splitter(validation, states, weights, groups)
-        # Different states in a fixed order: repetition and order must not move the features.
+        self._splitter = Splitter(validation, states, weights, groups, more)
+        # Different states in a fixed order: repetition and order must not move the features
+        # (beyond PLACING_SAMPLES they may).
         self._place(np.unique(states[:: -(-len(states) // PLACING_SAMPLES)], axis=0))
         features, actions, in_models = self._block(states[:1], np.zeros((1, self.n_outputs_)), weights[:1])
         empty = Moments.zero(in_models.shape[1], actions.shape[1], features.shape[1])
@@ -219,11 +267,11 @@ class Policy(RegressorMixin, BaseEstimator):
         folds = self._splitter.assign(states, groups)
         order = np.argsort(folds, kind="stable")
         starts = np.searchsorted(folds[order], np.arange(len(self._folds.parts) + 1))
-        empty = self._folds.parts[0]
+        models, d, p = self._folds.parts[0].cross.shape
         parts = []
         for start, stop in pairwise(starts):
             blocks = (self._block(states[rows], actions[rows], weights[rows]) for rows in _chunks(order[start:stop]))
-            parts.append(gather_blocks(blocks, *empty.cross.shape))
+            parts.append(gather_blocks(blocks, models, d, p, self._at_rest))
         return FoldedMoments(tuple(parts), self._folds.held_out)
 
     def _block(self, states: Array, actions: Array, weights: Array) -> tuple[Array, Array, Array]:
@@ -233,7 +281,10 @@ class Policy(RegressorMixin, BaseEstimator):
         return self._features(states), actions, column if in_models is None else column * in_models
 
     def _conclude(self) -> None:
-        self.solution_ = self._solve(self.learner if self.learner is not None else Hybrid(), self._folds)
+        self.solution_ = self._solve(self._learner(), self._folds)
+
+    def _learner(self) -> Learner:
+        return self.learner if self.learner is not None else Hybrid()
 
     def _predict_block(self, states: Array) -> Array:
         weights, models = self.solution_.weights, self._shares(states)

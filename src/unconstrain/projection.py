@@ -10,10 +10,13 @@ import numpy as np
 from .arrays import Array
 from .errors import InvalidDataError
 
-__all__ = ["RANK_TOLERANCE", "action_projection", "null_space_projection", "project", "unit_actions"]
+__all__ = ["RANK_TOLERANCE", "ROW_TOLERANCE", "action_projection", "null_space_projection", "project", "unit_actions"]
 
 RANK_TOLERANCE = 1e-9
 """Singular values below this share of the largest count as zero."""
+
+ROW_TOLERANCE = 1e-12
+"""Rows shorter than this share of the longest are rounding, as in a Jacobian at a singular posture."""
 
 
 def null_space_projection(constraint_matrix: Array, tolerance: float = RANK_TOLERANCE) -> Array:
@@ -24,8 +27,9 @@ def null_space_projection(constraint_matrix: Array, tolerance: float = RANK_TOLE
     constraint_matrix : ndarray, shape (..., k, d)
         One constraint in each row; rows may be zero or dependent.
     tolerance : float
-        Singular values below ``tolerance`` times the largest count as zero,
-        so that a nearly dependent row constrains nothing new.
+        Of the rows scaled to unit length, singular values below ``tolerance``
+        times the largest count as zero, so that a nearly dependent row
+        constrains nothing new.
 
     Returns
     -------
@@ -45,11 +49,17 @@ def null_space_projection(constraint_matrix: Array, tolerance: float = RANK_TOLE
         )
     if not np.isfinite(constraint_matrix).all():
         raise InvalidDataError("constraint matrix: found NaN or infinity, expected finite numbers.")
+    d = constraint_matrix.shape[-1]
+    # A u = 0 says the same whatever the length of a row, so none counts less than another unless it is rounding.
+    directions, lengths = unit_actions(constraint_matrix)
+    directions[lengths <= ROW_TOLERANCE * lengths.max(axis=-1, initial=0.0, keepdims=True)] = 0.0
     # By rows of Vᵀ rather than by A⁺: the rank decision is explicit and N is symmetric by construction.
-    _, singular, rows = np.linalg.svd(constraint_matrix, full_matrices=False)
+    _, singular, rows = np.linalg.svd(directions, full_matrices=False)
     active = singular > tolerance * singular.max(axis=-1, initial=0.0, keepdims=True)
     rows = rows * active[..., None]
-    return np.eye(constraint_matrix.shape[-1]) - np.swapaxes(rows, -1, -2) @ rows
+    free = np.eye(d) - np.swapaxes(rows, -1, -2) @ rows
+    # Where nothing is left free, rounding must not look like a direction.
+    return np.where((active.sum(axis=-1) == d)[..., None, None], 0.0, free)
 
 
 def unit_actions(actions: Array) -> tuple[Array, Array]:

@@ -102,7 +102,7 @@ def rollout(
         else:
             rows = [_matrix(one, state[k : k + 1], now[k : k + 1]) for k, one in enumerate(apart)]
             projections[:, step] = null_space_projection(np.concatenate(rows))
-        actions[:, step] = project(projections[:, step], wanted[:, step])
+        actions[:, step] = _without_rounding(project(projections[:, step], wanted[:, step]), wanted[:, step])
         with np.errstate(over="ignore", invalid="ignore"):
             state = state + dt * actions[:, step]
         if not (np.abs(state) <= LARGEST).all():
@@ -116,6 +116,12 @@ def rollout(
         for k in range(runs)
     ]
     return demos[0] if single else demos
+
+
+def _without_rounding(actions: Array, wanted: Array) -> Array:
+    """Exactly no motion where the constraint takes all of it: rounding has a direction, rest has none."""
+    rounding = np.abs(actions).max(axis=1, keepdims=True) <= 1e-12 * np.abs(wanted).max(axis=1, keepdims=True)
+    return np.where(rounding, 0.0, actions)
 
 
 def _action(policy: Callable[[Array], Array], state: Array) -> Array:

@@ -31,7 +31,7 @@ class Folds:
         demonstration out at a time.
     by : {"auto", "demonstration", "sample"}
         What stays together. "auto" holds out demonstrations where ``groups``
-        names at least two, and samples otherwise.
+        names at least two (in a stream: where it is given), and samples otherwise.
     seed : int
         Of the draw, where samples are held out.
     """
@@ -109,7 +109,7 @@ class Splitter:
 
     A demonstration's fold depends on the order in which demonstrations are
     first seen. A sample's fold is a hash of its state, to a thousandth of the
-    spread: it depends neither on order nor on batches nor on units, equal
+    first batch's spread: it depends neither on order nor on units, equal
     samples stay together, and so a weight of two is the same as a repetition.
 
     Parameters
@@ -121,18 +121,24 @@ class Splitter:
         How much each of them counts.
     groups : sequence, optional
         The first batch's; decides what "auto" means.
+    more : bool
+        Whether further batches may come. Then a single demonstration is the
+        first of several.
     """
 
-    def __init__(self, validation: Validation, states: Array, weights: Array, groups: Groups | None) -> None:
+    def __init__(
+        self, validation: Validation, states: Array, weights: Array, groups: Groups | None, more: bool = False
+    ) -> None:
         self.validation = validation
-        several = groups is not None and len(np.unique(np.asarray(groups))) > 1
+        several = groups is not None and (more or len(np.unique(np.asarray(groups))) > 1)
         automatic: Unit = "demonstration" if several else "sample"
         self.by = automatic if validation.by == "auto" else validation.by
         counts = weights / weights.sum()
         self._origin = counts @ states
         spread = np.sqrt(counts @ (states - self._origin) ** 2)
-        still = spread <= 1e-9 * np.abs(states).max(axis=0)
-        self._scale = np.where(still, np.inf, spread)
+        size = np.abs(states).max(axis=0)
+        # A coordinate that has not moved yet may do so later; its size is all that is known of it.
+        self._scale = np.where(spread > 1e-9 * size, spread, np.where(size > 0, size, 1.0))
         self._fold_of: dict[Hashable, int] = {}
 
     def assign(self, states: Array, groups: Groups | None) -> NDArray[np.intp]:
@@ -146,7 +152,9 @@ class Splitter:
         if self.by == "sample":
             return self.validation.deal(_scatter((states - self._origin) / self._scale, self.validation.seed))
         if groups is None:
-            raise SettingError("validation by demonstration: expected groups, one name or number for each sample.")
+            raise SettingError(
+                "validation by demonstration: expected groups=, one name or number for each sample, in every batch."
+            )
         names, first, places = np.unique(np.asarray(groups), return_index=True, return_inverse=True)
         for name in names[np.argsort(first)].tolist():
             if name not in self._fold_of:

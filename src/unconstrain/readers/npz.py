@@ -68,6 +68,8 @@ def _load(path: Path) -> Contents:
 
 
 def _check_keys(path: Path, contents: Contents, needed: set[str], optional: set[str]) -> None:
+    if "header" in contents and "array0" in contents:
+        raise ReadError(f"{path}: is a policy that was saved, not recordings to learn from.")
     if not needed <= set(contents) <= needed | optional:
         held = ", ".join(f"{key} {array.shape}" for key, array in contents.items()) or "nothing"
         raise ReadError(f"{path}: holds {held}. {_EXPECTED}; needed are {', '.join(sorted(needed))}.")

@@ -185,7 +185,7 @@ def _rollouts(splits: list[Split]) -> str:
             lines[name] = path[: outside[0] + 1] if len(outside) else path
         panels.append(figures.paths(lines, reach=reach, title=case.title, labels=_axis_labels(case), height=480))
     longest = next(iter(splits[0].rollouts.values()))
-    escaped = f" These left the picture: {'; '.join(left)}." if left else " None left the picture."
+    escaped = f" These left the picture: {'; '.join(left)}." if left else ""
     return html.picture(
         "rollouts",
         panels,

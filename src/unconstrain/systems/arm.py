@@ -97,8 +97,8 @@ class Arm:
         ReadError
             If the file is no URDF.
         SettingError
-            If a link does not exist, the base is not on the way to the tip, or
-            a joint on the way floats or moves in a plane.
+            If a link does not exist, the base is not on the way to the tip, a
+            joint on the way floats or moves in a plane, or one mimics another.
         """
         links, joints = _urdf(path)
         for link in (tip, base):
@@ -233,6 +233,8 @@ def _urdf(path: str | os.PathLike[str]) -> tuple[set[str], list[_Joint]]:
         raise ReadError(f"{path}: is no URDF that can be read ({type(error).__name__}: {error}).") from error
     joints = []
     for one in robot.joints:
+        if one.mimic is not None:
+            raise SettingError(f"{path}: joint {one.name!r} mimics another one, which a serial chain cannot say.")
         ends = (-np.inf, np.inf)
         if one.limit is not None and one.type != "continuous":
             ends = (one.limit.lower or 0.0, one.limit.upper or 0.0)

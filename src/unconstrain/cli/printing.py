@@ -1,0 +1,156 @@
+"""What goes to the terminal: tables, progress, notes, errors in one sentence."""
+
+from __future__ import annotations
+
+import errno
+import sys
+import warnings
+from collections.abc import Sequence
+from contextlib import contextmanager
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..errors import UnconstrainError
+
+if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
+    from collections.abc import Iterator
+
+    from ..demonstration import Demonstration
+    from ..experiments.trials import Progress, Result
+    from ..policies import Policy
+
+__all__ = ["Group", "deliver", "number", "print_table", "progress_bar", "say_fit", "show_warning"]
+
+
+class Group(click.Group):
+    """Turns our errors, and those of the file system, into one sentence and exit code 2."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command."""
+        said, result = "", None
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("default", UserWarning)
+                warnings.showwarning = show_warning  # type: ignore[assignment]
+                result = super().invoke(ctx)
+        except UnconstrainError as error:
+            said = str(error)
+        except OSError as error:
+            if error.errno == errno.EPIPE:  # whoever read our output has seen enough; click leaves quietly
+                raise
+            said = f"{error.filename}: {error.strerror}." if error.filename and error.strerror else str(error)
+        if said:
+            click.echo(f"Error: {said}", err=True)
+            ctx.exit(2)
+        return result
+
+
+def deliver(result: Result, headlines: Sequence[str], out: str) -> bool:
+    """Print and write a result; False where it could not be written."""
+    from .. import report
+    from ..errors import MissingExtraError
+
+    _print_result(result)
+    for line in headlines:
+        click.echo(line)
+    try:
+        data, page = report.write(result, Path(out))
+    except MissingExtraError as error:
+        click.echo(f"No report: {error}", err=True)
+        return False
+    click.echo(f"numbers: {data}\nreport:  {page}")
+    return True
+
+
+def _print_result(result: Result) -> None:
+    """The paper's values stay in the files: mean and s.d. fill the 80 columns of a terminal."""
+    from ..experiments.trials import LABELS
+
+    titles = {"constraint": "constr.", "theta_max": "θmax", "ninc": "norm. incon."} | {
+        name: LABELS[name] for name in ("nupe", "ncpe")
+    }
+    first = result.rows[0]
+    names = [name.removesuffix("_mean") for name in first if not name.startswith("paper_") and not name.endswith("_sd")]
+    rows = [
+        [_cell(row[name]) if name in row else f"{row[f'{name}_mean']:.2g} ± {row[f'{name}_sd']:.2g}" for name in names]
+        for row in result.rows
+    ]
+    print_table([titles.get(name, name) for name in names], rows)
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def say_fit(policy: Policy, demonstrations: Sequence[Demonstration], learner: str) -> None:
+    """Say what was learnt, how much the data determined, and how well it holds where held out."""
+    from ..demonstration import stack
+
+    solution = policy.solution_
+    samples = sum(map(len, demonstrations))
+    click.echo(
+        f"{len(demonstrations)} demonstrations, {samples} samples, {len(solution.weights)} local models."
+        if len(solution.weights) > 1
+        else f"{len(demonstrations)} demonstrations, {samples} samples."
+    )
+    if learner != "direct":
+        rest = "; the rest follows the standard risk." if learner == "hybrid" and solution.determined_share < 1 else "."
+        click.echo(
+            f"The inconsistency determined {solution.determined_share:.0%} of {solution.directions} weight directions"
+            + (" of each model" if len(solution.weights) > 1 else "")
+            + rest
+        )
+        if solution.determined_share == 0.0:
+            click.echo("Note: nothing was determined, so this is the same as --learner direct.", err=True)
+    training, held_out = 1.0 - policy.score(*stack(demonstrations)[:2]), 1.0 - policy.held_out_score()
+    click.echo(
+        f"share of the observed motion that it misses (inconsistency): {training:.4g} on the training data"
+        + (f", {held_out:.4g} where held out." if isfinite(held_out) else "; nothing could be held out.")
+    )
+    if held_out > 0.05 + 2.0 * training:
+        click.echo(
+            "Note: much is missed where held out. Against noise at low speed a wider --window, --speed-power 2 or "
+            "--still help; otherwise the demonstrations may have too little in common.",
+            err=True,
+        )
+
+
+def number(value: Any, form: str) -> str:
+    """A value as text, or a dash."""
+    return "-" if value is None else form.format(value)
+
+
+def print_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table that fits the terminal."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(*head, box=None, pad_edge=False)
+    for row in rows:
+        table.add_row(*row)
+    # Piped output is for programs and files: no wrapping there.
+    console = Console(width=None if sys.stdout.isatty() else 10_000)
+    console.print(table)
+
+
+@contextmanager
+def progress_bar(title: str) -> Iterator[Progress]:
+    """Show a bar on stderr while the block runs; yields what to call with (done, of)."""
+    from rich.console import Console
+    from rich.progress import Progress as Bar
+
+    with Bar(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as bar:
+        job = bar.add_task(title, total=None)
+        yield lambda done, of: bar.update(job, completed=done, total=of)
+
+
+def show_warning(message: Warning | str, *_: Any) -> None:
+    """Print a warning as a note, without where it came from."""
+    click.echo(f"Note: {message}", err=True)

@@ -1,0 +1,135 @@
+"""What the options say about files: patterns, columns, how to prepare them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..errors import SettingError
+
+if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
+    from ..demonstration import Recording
+    from ..preparation import Recipe
+
+__all__ = [
+    "Names",
+    "Numbers",
+    "complete",
+    "expanded",
+    "options_for_reading",
+    "recipe_of",
+    "recordings_in",
+    "said_recipe",
+]
+
+
+class Names(click.ParamType):  # type: ignore[type-arg]  # generic in the newest click only
+    """Names separated by commas."""
+
+    name = "names"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:
+        """Split at the commas."""
+        return tuple(part.strip() for part in str(value).split(",") if part.strip())
+
+
+class Numbers(click.ParamType):  # type: ignore[type-arg]
+    """Finite numbers separated by commas."""
+
+    name = "numbers"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
+        """Split at the commas."""
+        try:
+            numbers = tuple(float(part) for part in str(value).split(","))
+        except ValueError:
+            numbers = ()
+        if not numbers or not all(map(math.isfinite, numbers)):
+            self.fail(f"got {value!r}, expected finite numbers separated by commas, such as 0.1,0,-2.", param, ctx)
+        return numbers
+
+
+def options_for_reading(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options that say how files are to be understood."""
+    for option in reversed(
+        [
+            click.argument("files", nargs=-1, required=True, metavar="FILE..."),
+            click.option("--state", type=Names(), help="Columns that make the state, such as x,y,z."),
+            click.option("--action", type=Names(), help="Columns that make the action, such as vx,vy,vz."),
+            click.option("--differentiate", is_flag=True, help="Take the velocity of the state as the action."),
+            click.option(
+                "--by",
+                type=click.Choice(["savgol", "central"]),
+                help="How to differentiate, savgol by default; implies --differentiate.",
+            ),
+            click.option("--window", type=float, help="Smoothing window of savgol, seconds."),
+            click.option("--still", type=float, help="Leave out what is slower than this at start and end."),
+            click.option("--rate", type=float, help="Resample to this many samples a second."),
+            click.option("--centre", is_flag=True, help="States relative to the mean of each demonstration."),
+            click.option("--group", help="Column that names the demonstration."),
+            click.option("--time", help="Column with the time in seconds."),
+        ]
+    ):
+        command = option(command)
+    return command
+
+
+def recipe_of(
+    state: tuple[str, ...] | None = None,
+    action: tuple[str, ...] | None = None,
+    differentiate: bool = False,
+    by: str | None = None,
+    window: float | None = None,
+    rate: float | None = None,
+    centre: bool = False,
+    still: float | None = None,
+    **_: Any,
+) -> Recipe:
+    """How the options say that recordings are to be prepared."""
+    from ..preparation import Recipe
+
+    if differentiate or by:
+        if action is not None:
+            raise SettingError("--action: got columns, and --differentiate or --by too; give one or the other.")
+        by = by or "savgol"
+    recipe = Recipe(state, action, by, rate=rate, centre=centre, still=still)
+    return recipe if window is None else replace(recipe, window_s=window)
+
+
+def complete(recipe: Recipe, recording: Recording) -> Recipe:
+    """Guess what was not said; what was said has to be there."""
+    from ..preparation.recipes import complete_recipe
+
+    recording.select([*(recipe.states or ()), *(recipe.actions or ())])
+    return complete_recipe(recipe, recording)
+
+
+def said_recipe(recipe: Recipe) -> str:
+    """A recipe in words."""
+    states = ", ".join(recipe.states or ())
+    smoothed = f"savgol, {recipe.window_s:g} s" if recipe.differentiate == "savgol" else "central differences"
+    actions = f"their velocity ({smoothed})" if recipe.actions is None else f"{', '.join(recipe.actions)} as actions"
+    return f"{states} as states and {actions}" + ("" if recipe.actions else " as actions")
+
+
+def expanded(files: Sequence[str]) -> list[str]:
+    """Expand patterns where the shell did not."""
+    from glob import glob
+
+    # A pattern may be absolute, which Path.glob refuses.
+    return [
+        path
+        for name in files
+        for path in (sorted(glob(name)) if any(c in name for c in "*?[") else []) or [name]  # noqa: PTH207
+    ]
+
+
+def recordings_in(paths: Sequence[str], group: str | None = None, time: str | None = None, **_: Any) -> list[Recording]:
+    """Read files as the options say."""
+    from ..readers import read
+
+    return read(paths, group=group, time=time)
