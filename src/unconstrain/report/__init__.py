@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..experiments.trials import Result
-from . import figure4, figure5, plain, table1, washing
+from . import figure4, figure5, plain, table1, table2, washing
 from .fit import policy_page
 
 __all__ = ["page", "policy_page", "write"]
@@ -24,6 +24,7 @@ _PAGES = {
     "table1": table1.page,
     "figure4": figure4.page,
     "figure5": figure5.page,
+    "table2": table2.page,
     "washing": washing.page,
 }
 

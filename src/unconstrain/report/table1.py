@@ -8,7 +8,7 @@ from .. import figures
 from ..experiments.trials import METRICS, Result
 from . import html
 
-__all__ = ["page"]
+__all__ = ["dots", "page", "table"]
 
 WORDS = {"none": "free", "random": "constrained"}
 TITLES = {"nupe": "nUPE", "ncpe": "nCPE", "ninc": "inconsistency"}
@@ -24,13 +24,14 @@ def page(result: Result) -> str:
         "back, and <b>nCPE</b> how far after the rail has taken its share; both are squared errors as a share of the "
         "policy’s variance, so 1 is as bad as always answering the mean. Direct learning fails on constrained "
         "data and inconsistency alone on free data; the hybrid should be good at both.",
-        html.section("Errors", _table(result)),
-        html.section("The same, to compare at a glance", _dots(result)),
+        html.section("Errors", table(result, 100)),
+        html.section("The same, to compare at a glance", dots(result)),
         html.settings_table(result.settings),
     )
 
 
-def _table(result: Result) -> str:
+def table(result: Result, trials_of_paper: int) -> str:
+    """Ours beside the paper's, row by row."""
     header = ["method", "data"]
     for metric in METRICS:
         header += [f"{TITLES[metric]}<br>ours", f"{TITLES[metric]}<br>paper"]
@@ -43,11 +44,12 @@ def _table(result: Result) -> str:
             cells += [html.mean_sd(*_pair(row, metric)), html.mean_sd(*_pair(row, f"paper_{metric}"))]
         rows.append(cells)
     trials = getattr(result.settings, "trials", 1)
-    note = f"Mean ± standard deviation over {trials} data sets, all × 10⁻². The paper’s numbers are over 100 data sets."
+    note = f"Mean ± standard deviation over {trials} data sets, all × 10⁻². The paper’s are over {trials_of_paper}."
     return html.table(header, rows, left=2, note=note, rules=rules)
 
 
-def _dots(result: Result) -> str:
+def dots(result: Result) -> str:
+    """Means of both, method by method, on logarithmic axes."""
     constraints = list(dict.fromkeys(row["constraint"] for row in result.rows))
     found = {(row["method"], row["constraint"]): row for row in result.rows}
     panels = []
