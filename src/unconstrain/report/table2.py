@@ -22,7 +22,7 @@ def page(result: Result) -> str:
         "then orientation) are kept still. Nobody tells the learner that, and it has to find how the joints would move "
         "if the hand were free. <b>nUPE</b> says how far it is from that, <b>nCPE</b> how far once the hand is held "
         "again; both as a share of the policy’s variance. The more is held, the less direct learning sees; "
-        "inconsistency alone loses its footing where only one direction is left. The hybrid should stay low everywhere.",
+        "inconsistency alone loses its footing where one direction is left. The hybrid should stay low everywhere.",
         html.section("Errors against the constraint", _curves(result)),
         html.section("Beside the paper", table1.table(result, 50)),
         html.section("The same, to compare at a glance", table1.dots(result)),
