@@ -102,3 +102,8 @@ def test_rows_of_a_jacobian_are_picked():
     J = np.random.default_rng(0).standard_normal((4, 6, 7))
     held = JacobianRows(lambda states: J, (0, 2))
     assert_array_equal(held(np.zeros((4, 7)), np.zeros(4)), J[:, [0, 2]])
+
+
+def test_a_row_that_the_jacobian_does_not_have_is_refused():
+    with pytest.raises(SettingError, match=r"rows: got \(0, 6\), expected rows of the Jacobian, 0 to 5"):
+        JacobianRows(lambda x: np.ones((len(x), 6, 7)), (0, 6))(np.zeros((2, 7)), np.zeros(2))

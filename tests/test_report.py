@@ -17,7 +17,7 @@ import pytest
 import unconstrain as uc
 from unconstrain import report
 from unconstrain.errors import MissingExtraError
-from unconstrain.experiments import figure4, figure5, table1, toy, washing
+from unconstrain.experiments import figure4, figure5, table1, table2, toy, washing
 from unconstrain.experiments.trials import Result
 from unconstrain.report import html
 from unconstrain.systems.wiping import PLATES, demonstrate
@@ -26,6 +26,7 @@ DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shar
 SMALL = {"demonstrations": 8, "steps": 10, "per_axis": 4, "folds": 4}
 RESULTS = {
     "table1": lambda: table1.run(table1.Settings(**SMALL, trials=2)),
+    "table2": lambda: table2.run(table2.Settings(trials=2, demonstrations=6, steps=20, test_demonstrations=2, folds=2)),
     "figure4": lambda: figure4.run(figure4.Settings(**SMALL, arrows=5)),
     "figure5": lambda: figure5.run(figure5.Settings(**SMALL, widest=(0.0, 0.5, 1.5), trials=2)),
     "washing": lambda: washing.run(washing.Settings(duration=4.0, steps=40)),
@@ -318,7 +319,8 @@ def opened(browser, page, folder):
 
 class TestInABrowser:
     @pytest.mark.parametrize(
-        ("name", "count"), [("table1", 2), ("figure4", 2), ("figure5", 5), ("washing", 8), ("of another kind", 0)]
+        ("name", "count"),
+        [("table1", 2), ("table2", 4), ("figure4", 2), ("figure5", 5), ("washing", 8), ("of another kind", 0)],
     )
     def test_a_page_draws_all_its_pictures(self, results, browser, tmp_path, name, count):
         assert len(opened(browser, report.page(results(name)), tmp_path)) == count

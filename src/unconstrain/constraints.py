@@ -138,4 +138,7 @@ class JacobianRows:
 
     def __call__(self, states: Array, times: Array) -> Array:
         """Return A, shape (T, len(rows), n)."""
-        return self.jacobian(states)[:, list(self.rows), :]
+        jacobian = np.asarray(self.jacobian(states))
+        if any(not 0 <= row < jacobian.shape[1] for row in self.rows):
+            raise SettingError(f"rows: got {self.rows}, expected rows of the Jacobian, 0 to {jacobian.shape[1] - 1}.")
+        return jacobian[:, list(self.rows), :]

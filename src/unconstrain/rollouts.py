@@ -94,14 +94,7 @@ def rollout(
     for step in range(steps):
         states[:, step] = state
         wanted[:, step] = _action(policy, state)
-        now = np.full(runs, times[step])
-        if constraint is None:
-            projections[:, step] = np.eye(n)
-        elif apart is None:
-            projections[:, step] = null_space_projection(_matrix(constraint, state, now))
-        else:
-            rows = [_matrix(one, state[k : k + 1], now[k : k + 1]) for k, one in enumerate(apart)]
-            projections[:, step] = null_space_projection(np.concatenate(rows))
+        projections[:, step] = _projections(constraint, apart, state, times[step])
         actions[:, step] = _without_rounding(project(projections[:, step], wanted[:, step]), wanted[:, step])
         with np.errstate(over="ignore", invalid="ignore"):
             state = state + dt * actions[:, step]
@@ -116,6 +109,18 @@ def rollout(
         for k in range(runs)
     ]
     return demos[0] if single else demos
+
+
+def _projections(constraint: object, apart: Sequence[ConstraintLike] | None, states: Array, time: float) -> Array:
+    """What the constraint, or that of each run, leaves free, shape (K, n, n)."""
+    runs, n = states.shape
+    if constraint is None:
+        return np.broadcast_to(np.eye(n), (runs, n, n))
+    now = np.full(runs, time)
+    if apart is None:
+        return null_space_projection(_matrix(constraint, states, now))
+    rows = [_matrix(one, states[k : k + 1], now[k : k + 1]) for k, one in enumerate(apart)]
+    return null_space_projection(np.concatenate(rows))
 
 
 def _without_rounding(actions: Array, wanted: Array) -> Array:

@@ -1,17 +1,10 @@
-"""Policies as scikit-learn estimators.
-
-Both are one model with a leading axis of M: features φ(x), shared by all
-models, and how much each sample counts in each model. A parametric policy has
-M = 1. The steps are those of the paper: fix features and fields, sum over the
-samples, solve.
-"""
+"""What all policies share: sums from a stream, a learner, prediction."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from copy import deepcopy
-from dataclasses import replace
 from itertools import pairwise
 from typing import Any, Self
 
@@ -20,18 +13,16 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from .arrays import Array, as_groups, as_matrix, as_table, as_weights, check_at_least
-from .demonstration import Demonstration, stack
-from .errors import InvalidDataError, SettingError
-from .features import Affine, FeatureMap, KMeansRBF, Placeable
-from .learners import Hybrid, Learner, Solution
-from .moments import Moments, gather_blocks
-from .objectives import inconsistency, vec
-from .projection import unit_actions
-from .receptive_fields import ReceptiveFields, choose_variance, cover
-from .validation import FoldedMoments, Folds, Groups, Splitter, Validation
+from ..arrays import Array, as_groups, as_matrix, as_table, as_weights, check_at_least
+from ..demonstration import Demonstration, stack
+from ..errors import InvalidDataError
+from ..learners import Hybrid, Learner, Solution
+from ..moments import Moments, gather_blocks
+from ..objectives import inconsistency, vec
+from ..projection import unit_actions
+from ..validation import FoldedMoments, Folds, Groups, Splitter, Validation
 
-__all__ = ["LocallyLinearPolicy", "ParametricPolicy", "Policy"]
+__all__ = ["PLACING_SAMPLES", "Policy"]
 
 PLACING_SAMPLES = 20_000
 """Features and fields are placed on at most this many samples, evenly spaced in the first batch."""
@@ -298,150 +289,6 @@ class Policy(RegressorMixin, BaseEstimator):
         tags = super().__sklearn_tags__()
         tags.target_tags.multi_output = True
         return tags
-
-
-class ParametricPolicy(Policy):
-    """A policy that is linear in fixed features, ``π̃(x) = W b(x)`` (section III-C).
-
-    Parameters
-    ----------
-    features : callable, optional
-        A feature map, such as :class:`~unconstrain.NormalisedRBF` or
-        :class:`~unconstrain.Affine`, or anything that maps (N, n) to (N, p).
-        By default 25 normalised RBFs placed on the data.
-    learner : Learner, optional
-        :class:`~unconstrain.Hybrid` by default.
-    validation : Folds or HeldOut, optional
-        What the learner chooses its threshold on; ten folds by default.
-
-    Attributes
-    ----------
-    solution_ : Solution
-        Weights (1, d, p) and what the data determined.
-    features_ : callable
-        The features in use.
-    """
-
-    def __init__(
-        self,
-        features: FeatureMap | Placeable | None = None,
-        learner: Learner | None = None,
-        validation: Validation | None = None,
-    ) -> None:
-        self.features = features
-        self.learner = learner
-        self.validation = validation
-
-    def _place(self, states: Array) -> None:
-        features = self.features if self.features is not None else KMeansRBF()
-        if not callable(features) and not isinstance(features, Placeable):
-            raise SettingError(f"features: got {features!r}, expected a function of states such as NormalisedRBF.")
-        self.features_ = features.place(states) if isinstance(features, Placeable) else features
-
-    def _features(self, states: Array) -> Array:
-        features = self.features_(states)
-        if np.ndim(features) != 2 or len(features) != len(states):
-            raise SettingError(
-                f"features: got an array of shape {np.shape(features)} for {len(states)} states, "
-                "expected (samples, features)."
-            )
-        return as_matrix(features, "features")
-
-    def _weights(self, states: Array) -> None:
-        return None
-
-    _shares = _weights
-
-    def _solve(self, learner: Learner, folds: FoldedMoments) -> Solution:
-        return learner.solve(folds)
-
-    def support(self, states: ArrayLike) -> Array:
-        """How near to the features' kernels each state is, from 1 to 0, shape (N,).
-
-        Raises
-        ------
-        SettingError
-            If the feature map has no place in state space, and so no ``support``.
-        """
-        check_is_fitted(self, "solution_")
-        if not hasattr(self.features_, "support"):
-            raise SettingError(f"support: {type(self.features_).__name__} does not say where its data was.")
-        return np.asarray(self.features_.support(self._checked_states(states)))
-
-
-class LocallyLinearPolicy(Policy):
-    """Linear models in Gaussian receptive fields, averaged by their weights (section III-D).
-
-    Each local model is learnt on its own, its threshold too. Its regressors
-    are ``((x − c_m) / σ, 1)``: centred on the field and free of units.
-
-    Parameters
-    ----------
-    variance : float, optional
-        The fields' σ², in squared units of the state. By default a quarter of
-        the states' total variance, more where that takes over 100 fields.
-    at_least : float
-        Fields are added until every sample has at least this weight in one.
-    centres : array_like, shape (M, n), optional
-        Use these instead.
-    learner : Learner, optional
-        :class:`~unconstrain.Hybrid` by default.
-    validation : Folds or HeldOut, optional
-        What the learner chooses its thresholds on; ten folds by default.
-
-    Attributes
-    ----------
-    solution_ : Solution
-        Weights (M, d, n + 1) over ``((x − origin) / σ, 1)``, with one origin
-        for all fields, and what the data determined.
-    fields_ : ReceptiveFields
-        The fields in use.
-    """
-
-    def __init__(
-        self,
-        variance: float | None = None,
-        at_least: float = 0.7,
-        centres: ArrayLike | None = None,
-        learner: Learner | None = None,
-        validation: Validation | None = None,
-    ) -> None:
-        self.variance = variance
-        self.at_least = at_least
-        self.centres = centres
-        self.learner = learner
-        self.validation = validation
-
-    def _place(self, states: Array) -> None:
-        variance = self.variance if self.variance is not None else choose_variance(states, self.at_least)
-        if self.centres is None:
-            self.fields_ = cover(states, variance, self.at_least)
-        else:
-            self.fields_ = ReceptiveFields(as_matrix(self.centres, "centres"), variance)
-        self.features_ = Affine(self.fields_.centres.mean(axis=0), np.sqrt(variance))
-
-    def _features(self, states: Array) -> Array:
-        return as_matrix(self.features_(states), "features")
-
-    def _weights(self, states: Array) -> Array:
-        return self.fields_.weights(states)
-
-    def _shares(self, states: Array) -> Array:
-        return self.fields_.shares(states)
-
-    def _solve(self, learner: Learner, folds: FoldedMoments) -> Solution:
-        # Gathering over common features is one product; centring each field afterwards is exact.
-        offsets = -self.features_(self.fields_.centres)[:, :-1]
-        models, n = offsets.shape
-        centring = np.tile(np.eye(n + 1), (models, 1, 1))
-        centring[:, :n, n] = offsets
-        solution = learner.solve(folds.in_features(centring))
-        return replace(solution, weights=solution.weights @ centring)
-
-    def support(self, states: ArrayLike) -> Array:
-        """Weight in the nearest field, from 1 at its centre to 0 far from all data, shape (N,)."""
-        check_is_fitted(self, "solution_")
-        return self.fields_.support(self._checked_states(states))
 
 
 def _chunks(rows: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
