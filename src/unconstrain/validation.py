@@ -182,9 +182,14 @@ class FoldedMoments:
         """Moments of everything."""
         return total(self.parts)
 
+    @property
+    def filled(self) -> list[int]:
+        """Indices of the parts that hold anything."""
+        return [i for i, part in enumerate(self.parts) if part.weight.any()]
+
     def rounds(self) -> list[tuple[Moments, Moments]]:
         """Pairs of training and held-out moments; empty if nothing can be held out."""
-        filled = [i for i, part in enumerate(self.parts) if part.weight.any()]
+        filled = self.filled
         if len(filled) < 2:
             return []
         # Everything but one from the sums before and after it: subtracting would leave rounding behind.

@@ -17,6 +17,7 @@ from .printing import Group, deliver, number, print_table, progress_bar, say_fit
 from .reading import Numbers, complete, expanded, options_for_reading, recipe_of, recordings_in, said_recipe
 
 if TYPE_CHECKING:  # everything heavy is imported by the command that needs it
+    from ..constraints import Plane
     from ..demonstration import Demonstration
     from ..policies import Policy
 
@@ -166,15 +167,12 @@ def score(policy: str, files: Sequence[str], plane: tuple[float, ...] | None, as
     They are prepared as those were that it learnt from.
     """
     from .. import metrics, preparation, storage
-    from ..constraints import Plane
 
     learnt, notes = _fitted(policy), storage.load_notes(policy)
     recipe = preparation.Recipe.from_dict(notes.get("recipe", {}))
     recordings = recordings_in(expanded(files), group=notes.get("group"), time=notes.get("time"))
     demonstrations = preparation.prepare(recordings, recipe)
-    constraint = None if plane is None else Plane(plane)  # type: ignore[arg-type]
-    if plane is not None and len(plane) != learnt.n_outputs_:
-        raise SettingError(f"--plane: got {len(plane)} numbers, expected {learnt.n_outputs_}, one for each action.")
+    constraint = _plane(plane, learnt.n_outputs_, "one for each action")
 
     def scores(of: Demonstration | Sequence[Demonstration], name: str, samples: int) -> dict[str, Any]:
         found = {"demonstration": name, "samples": samples, "ninc": metrics.ninconsistency(learnt, of)}
@@ -209,14 +207,11 @@ def rollout(
 ) -> None:
     """Follow POLICY, freely or on a plane, and write it as CSV."""
     from .. import rollouts, storage
-    from ..constraints import Plane
 
     learnt, recipe = _fitted(policy), storage.load_notes(policy).get("recipe", {})
     if len(start) != learnt.n_features_in_:
         raise SettingError(f"--start: got {len(start)} numbers, expected {learnt.n_features_in_}, one for each state.")
-    if plane is not None and len(plane) != len(start):
-        raise SettingError(f"--plane: got {len(plane)} numbers, expected {len(start)}, as many as states.")
-    constraint = None if plane is None else Plane(plane)  # type: ignore[arg-type]
+    constraint = _plane(plane, len(start), "as many as states")
     path = rollouts.rollout(learnt, list(start), steps, dt, constraint)
     states = recipe.get("states") or [f"x{i + 1}" for i in range(len(start))]
     try:
@@ -307,6 +302,18 @@ def _fitted(path: str) -> Policy:
     if not hasattr(policy, "solution_"):
         raise ModelFileError(f"{path}: holds a policy that has learnt nothing yet. Fit it before saving.")
     return policy
+
+
+def _plane(normal: tuple[float, ...] | None, dimensions: int, meaning: str) -> Plane | None:
+    import numpy as np
+
+    from ..constraints import Plane
+
+    if normal is None:
+        return None
+    if len(normal) != dimensions:
+        raise SettingError(f"--plane: got {len(normal)} numbers, expected {dimensions}, {meaning}.")
+    return Plane(np.array(normal))
 
 
 def _learner(name: str, alpha: float | None, softness: float | None) -> Any:

@@ -154,8 +154,7 @@ class Policy(RegressorMixin, BaseEstimator):
         there is nothing to hold out.
         """
         check_is_fitted(self, "solution_")
-        parts, learner = self._folds.parts, self._learner()
-        filled = [i for i, part in enumerate(parts) if part.weight.any()]
+        parts, filled, learner = self._folds.parts, self._folds.filled, self._learner()
         missed = moved = 0.0
         for i in filled if len(filled) > 1 else ():
             others = tuple(parts[j] for j in filled if j != i)
