@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check
-USER_STAMP := $(VENV)/.installed-viz
+USER_STAMP := $(VENV)/.installed-user
 DEV_STAMP := $(VENV)/.installed-dev
 DEMO_DIR := build/demo
 DOCS_DIR := build/docs
@@ -17,11 +17,12 @@ help: ## show this list
 		sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1  \2/p' $(MAKEFILE_LIST)
 
 demo: $(USER_STAMP) ## learn a wiping movement end to end and write a report to look at
+	@scripts/install-system graphics || echo "make demo: going on; the arm will be drawn as lines." >&2
 	@$(BIN)/unconstrain demo --out $(DEMO_DIR)
 	@echo "The report is in $(CURDIR)/$(DEMO_DIR); open its .html file in a browser."
 
 test: $(DEV_STAMP) ## run all tests, in parallel, with coverage
-	@scripts/install-browser || echo "make test: going on; tests that need a browser will fail." >&2
+	@scripts/install-system browser graphics || echo "make test: going on; tests that need them will fail." >&2
 	@$(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --cov --cov-report=term-missing:skip-covered
 
 check: $(DEV_STAMP) ## lint, formatting, types, import order
@@ -49,8 +50,8 @@ $(BIN)/pip:
 		echo "Python could not create a virtual environment. On Debian: apt-get install python3-venv" >&2; exit 1; }
 
 $(USER_STAMP): pyproject.toml | $(BIN)/pip
-	@echo "Installing unconstrain and its plots into $(VENV)"
-	@$(PIP) --editable '.[viz]'
+	@echo "Installing unconstrain, its plots and the physics engine into $(VENV)"
+	@$(PIP) --editable '.[viz,sim]'
 	@touch $@
 
 $(DEV_STAMP): pyproject.toml | $(BIN)/pip

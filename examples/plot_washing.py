@@ -3,8 +3,9 @@ Wash a plate that nobody demonstrated
 =====================================
 
 Someone wipes five plates, all tilted about one axis, in front of a camera. What is learnt has to work on plates that
-are tilted about the other axis (section IV-C of the paper). Everything here is simulated, with millimetres of noise
-on the tracked sponge; ``unconstrain reproduce washing --real`` does the same with recordings of a robot arm.
+are tilted about the other axis (section IV-C of the paper). Everything here is a kinematic simulation, with
+millimetres of noise on the tracked sponge; ``unconstrain demo`` does the same with contact and an arm, and
+``unconstrain demo --real`` with recordings of a robot arm.
 """
 
 # %%
@@ -41,11 +42,11 @@ plt.show()
 # Learn
 # -----
 #
-# The fields' width is the paper's. The policy is fitted once; other learners solve from the same sums, without a
+# The fields are half as wide as the circle. The policy is fitted once; other learners solve from the same sums, without a
 # second look at the data. On noisy recordings a soft hybrid does better than the hard split of the paper: its first
 # objective is the inconsistency plus a tenth of the standard risk.
 
-hybrid = uc.LocallyLinearPolicy(variance=0.025, learner=uc.Hybrid(threshold=0, softness=0.1)).fit_demonstrations(
+hybrid = uc.LocallyLinearPolicy(variance=0.0025, learner=uc.Hybrid(threshold=0, softness=0.1)).fit_demonstrations(
     training
 )
 policies = {

@@ -2,6 +2,7 @@
 
 import json
 import re
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +15,9 @@ from unconstrain import experiments
 from unconstrain.errors import SettingError
 from unconstrain.experiments import figure4, figure5, table1, table2, toy, trials, washing
 from unconstrain.experiments.journal import Journal
+from unconstrain.experiments.washing.surfaces import simulated_split
 from unconstrain.systems.limit_cycle import LimitCycle
-from unconstrain.systems.wiping import HELD_OUT, PLATES, Plate, WipingPolicy
+from unconstrain.systems.wiping import HELD_OUT, PLATES, Plate, Strokes, WipingPolicy
 from unconstrain.systems.wiping import demonstrate as wipe
 
 METHODS = ["direct", "inconsistency", "hybrid"]
@@ -45,7 +47,7 @@ def figure5_of_three():
 @pytest.fixture(scope="module", params=[0, 1])
 def simulated(request):
     """The washing experiment with two seeds."""
-    return washing.run(washing.Settings(seed=request.param, steps=20))
+    return washing.run(washing.Settings(seed=request.param, steps=20, trials=1))
 
 
 @pytest.fixture(scope="module")
@@ -325,7 +327,7 @@ def test_a_share_of_none_or_all_leaves_no_empty_demonstration():
 @pytest.mark.parametrize("plate", PLATES, ids=lambda plate: plate.name)
 def test_a_wiped_plate_holds_the_sponge_to_the_noise_of_the_camera(plate):
     noise = 0.002
-    demo = wipe(plate, np.random.default_rng(0), noise=noise)
+    demo = wipe(plate, np.random.default_rng(0), strokes=Strokes(noise=noise))
     off = demo.states @ plate.rotation[:, 2]
     assert off.std() == pytest.approx(noise, rel=0.2)
     assert abs(off.mean()) < 4 * noise / np.sqrt(len(demo))
@@ -353,7 +355,7 @@ def test_tilts_follow_the_right_hand():
 
 def test_a_steady_hand_seen_sharply_moves_as_the_policy_projected():
     for plate in (PLATES[0], PLATES[3], PLATES[5]):
-        demo = wipe(plate, np.random.default_rng(0), noise=0.0, unsteadiness=0.0)
+        demo = wipe(plate, np.random.default_rng(0), strokes=Strokes(noise=0.0, unsteadiness=0.0, dropped=0.0))
         wanted = np.einsum("tij,tj->ti", demo.truth.projections, WipingPolicy()(demo.states))
         missed, speed = np.linalg.norm(demo.actions - wanted, axis=1), np.linalg.norm(wanted, axis=1)
         assert np.median(missed / speed) < 0.02  # what smoothing costs
@@ -383,7 +385,7 @@ def test_washing_has_a_row_for_each_method_and_surface(simulated):
         (method, plate.name) for method in METHODS for plate in PLATES
     ]
     for row in simulated.rows:
-        assert list(row) == ["method", "surface", "seen", "ncpe", "nupe"]
+        assert list(row) == ["method", "surface", "seen", "ncpe", "ncpe_sd", "nupe", "nupe_sd"]
         assert row["seen"] == ("about y" not in row["surface"])
         assert 0 < row["ncpe"] <= row["nupe"]
 
@@ -398,7 +400,8 @@ def test_washing_says_so_in_its_headlines(simulated):
     error = {method: mean_of(simulated, method, "nupe", seen=False) for method in METHODS}
     values = ", ".join(f"{method} {error[method]:.4f}" for method in METHODS)
     assert washing.headlines(simulated)[1] == (
-        f"nUPE on unseen surfaces, mean: {values}; hybrid is {error['hybrid'] / error['direct']:.2f} times direct"
+        f"nUPE on unseen surfaces, mean: {values}; hybrid is {error['hybrid'] / error['direct']:.2f} times direct, "
+        f"{error['hybrid'] / min(error['direct'], error['inconsistency']):.2f} times the better of the two"
     )
 
 
@@ -426,8 +429,53 @@ def test_the_movement_shown_stays_on_the_first_surface_left_out(simulated):
 
 
 def test_another_seed_is_another_demonstrator():
-    one, other = (washing._simulated_splits(washing.Settings(seed=seed, duration=2.0)) for seed in (0, 1))
-    assert not np.array_equal(one[0][0][0].demonstrations[0].states, other[0][0][0].demonstrations[0].states)
+    short = washing.Settings(duration=2.0, strokes=1)
+    one, other = (simulated_split(short, np.random.SeedSequence(seed)) for seed in (0, 1))
+    assert not np.array_equal(one[0][0].demonstrations[0].states, other[0][0].demonstrations[0].states)
+
+
+def test_on_the_arm_the_sponge_stays_on_the_plate_and_keeps_the_beat(simulated):
+    rows = simulated.tables["reproduction"]
+    assert [(row["surface"], row["seen"]) for row in rows] == [
+        ("+27° about x", True),
+        ("+16° about y", False),
+        ("-16° about y", False),
+    ]
+    for row in rows:
+        assert row["failed"] == ""
+        assert row["contact_share"] >= 0.995
+        assert row["force_sd"] <= 0.15 * row["force_mean"]
+        assert row["frequency"] == pytest.approx(row["frequency_demonstrated"], rel=0.05)
+        assert row["drift_m"] <= 0.01
+        assert row["cycles"] >= 10
+        assert row["torque_share"] < 1.5
+
+
+def test_without_physics_the_stand_in_demonstrates_and_says_so():
+    result = washing.run(washing.Settings(simulator="kinematic", steps=20, trials=2))
+    assert result.tables["reproduction"] == []
+    assert washing.headlines(result)[0] == washing.WITHOUT_PHYSICS
+    error = {method: mean_of(result, method, "ncpe", seen=False) for method in METHODS}
+    assert error["hybrid"] < min(error["direct"], error["inconsistency"])
+    assert all(row["ncpe_sd"] > 0 for row in result.rows)
+
+
+def test_a_plate_out_of_reach_is_refused_before_anything_long_begins():
+    began = time.perf_counter()
+    with pytest.raises(uc.errors.SettingError, match=r"plate \+80° about y: out of the arm's reach.*cm away"):
+        washing.run(washing.Settings(plate=(0.0, 80.0), trials=50))
+    assert time.perf_counter() - began < 20
+
+
+def test_a_further_plate_is_wiped_and_not_learnt_from():
+    result = washing.run(washing.Settings(plate=(8.0, -6.0), trials=1, steps=20, cycles=2))
+    assert {row["seen"] for row in result.rows if row["surface"] == "+8° about x, -6° about y"} == {False}
+    assert result.tables["reproduction"][-1]["surface"] == "+8° about x, -6° about y"
+
+
+def test_a_simulator_that_does_not_exist_is_refused():
+    with pytest.raises(uc.errors.SettingError, match="simulator"):
+        washing.Settings(simulator="gazebo")
 
 
 @needs_data

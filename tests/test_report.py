@@ -20,7 +20,7 @@ from unconstrain.errors import MissingExtraError
 from unconstrain.experiments import figure4, figure5, table1, table2, toy, washing
 from unconstrain.experiments.trials import Result
 from unconstrain.report import html
-from unconstrain.systems.wiping import PLATES, demonstrate
+from unconstrain.systems.wiping import PLATES, Strokes, demonstrate
 
 DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))
 SMALL = {"demonstrations": 8, "steps": 10, "per_axis": 4, "folds": 4}
@@ -29,7 +29,7 @@ RESULTS = {
     "table2": lambda: table2.run(table2.Settings(trials=2, demonstrations=6, steps=20, test_demonstrations=2, folds=2)),
     "figure4": lambda: figure4.run(figure4.Settings(**SMALL, arrows=5)),
     "figure5": lambda: figure5.run(figure5.Settings(**SMALL, widest=(0.0, 0.5, 1.5), trials=2)),
-    "washing": lambda: washing.run(washing.Settings(duration=4.0, steps=40)),
+    "washing": lambda: washing.run(washing.Settings(duration=8.0, steps=40, trials=1, cycles=2)),
     "of another kind": lambda: Result("else", Odd(), [{"method": "direct", "seen": True, "ncpe": 0.1, "nupe": None}]),
 }
 
@@ -51,7 +51,10 @@ class Odd:
 
 def wiping(columns: slice = slice(None), times: bool = True) -> list[uc.Demonstration]:
     """As a user has it: without the truth."""
-    demos = [demonstrate(plate, np.random.default_rng(at), duration=4.0) for at, plate in enumerate(PLATES[:5])]
+    demos = [
+        demonstrate(plate, np.random.default_rng(at), strokes=Strokes(count=2, duration=4.0))
+        for at, plate in enumerate(PLATES[:5])
+    ]
     return [
         uc.Demonstration(one.states[:, columns], one.actions[:, columns], one.times if times else None, name=one.name)
         for one in demos
@@ -219,7 +222,7 @@ class TestPages:
         run = split.rollouts["direct"]
         away = replace(run, states=run.states + np.linspace(0, 10, len(run))[:, None])
         changed = replace(split, rollouts=split.rollouts | {"direct": away})
-        page = report.page(replace(result, details={"splits": [changed]}))
+        page = report.page(replace(result, details=result.details | {"splits": [changed]}))
         assert re.search(r"These left the picture: [^.]*direct after [\d.]+ s on \+16° about y", page)
 
 
@@ -260,8 +263,8 @@ def browser(tmp_path_factory):
     if chromium is None or driver is None:
         pytest.fail(
             "These tests open reports in Chromium, and it or its driver is missing. Install them with "
-            "'apt-get install chromium chromium-driver' (or scripts/install-browser), or set UNCONSTRAIN_NO_BROWSER=1 "
-            "to leave these tests out."
+            "'apt-get install chromium chromium-driver' (or scripts/install-system browser), or set "
+            "UNCONSTRAIN_NO_BROWSER=1 to leave these tests out."
         )
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
@@ -320,7 +323,7 @@ def opened(browser, page, folder):
 class TestInABrowser:
     @pytest.mark.parametrize(
         ("name", "count"),
-        [("table1", 2), ("table2", 4), ("figure4", 2), ("figure5", 5), ("washing", 8), ("of another kind", 0)],
+        [("table1", 2), ("table2", 4), ("figure4", 2), ("figure5", 5), ("washing", 14), ("of another kind", 0)],
     )
     def test_a_page_draws_all_its_pictures(self, results, browser, tmp_path, name, count):
         assert len(opened(browser, report.page(results(name)), tmp_path)) == count
@@ -329,7 +332,7 @@ class TestInABrowser:
     def test_the_page_of_real_recordings_draws_all_its_pictures(self, browser, tmp_path, monkeypatch):
         monkeypatch.setenv("UNCONSTRAIN_DATA", str(DATA))
         result = washing.run(washing.Settings(real=True, steps=40))
-        assert len(opened(browser, report.page(result), tmp_path)) == 2 + 1 + 4 * 4
+        assert len(opened(browser, report.page(result), tmp_path)) == 2 + 2 + 1 + 4 * 4
 
     @pytest.mark.parametrize("name", FITS)
     def test_the_page_of_a_fit_draws_all_its_pictures(self, browser, tmp_path, name):

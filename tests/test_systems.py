@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from unconstrain import rollout
 from unconstrain.systems.arm import JointLimitAvoidance
 from unconstrain.systems.limit_cycle import LimitCycle
-from unconstrain.systems.wiping import HELD_OUT, PLATES, Plate, WipingPolicy, demonstrate
+from unconstrain.systems.wiping import HELD_OUT, PLATES, Plate, Strokes, WipingPolicy, demonstrate
 
 
 def test_the_limit_cycle_is_the_paper_s_in_polar_coordinates():
@@ -66,7 +66,11 @@ def test_plates_are_the_seven_of_the_paper():
 
 def test_a_demonstration_stays_on_its_plate_and_says_what_was_true():
     plate = Plate(16, 0)
-    demo = demonstrate(plate, np.random.default_rng(0), duration=4.0, noise=0.0, unsteadiness=0.0)
+    demo = demonstrate(
+        plate,
+        np.random.default_rng(0),
+        strokes=Strokes(count=2, duration=4.0, noise=0.0, unsteadiness=0.0, dropped=0.0),
+    )
     normal = plate.rotation[:, 2]
     assert_allclose(demo.states @ normal, 0, atol=1e-9)
     assert_allclose(demo.actions @ normal, 0, atol=1e-9)
@@ -80,7 +84,9 @@ def test_a_demonstration_stays_on_its_plate_and_says_what_was_true():
 
 
 def test_a_seed_draws_the_same_demonstration_again():
-    one, same, other = (demonstrate(PLATES[1], np.random.default_rng(s), duration=2.0) for s in (1, 1, 2))
+    one, same, other = (
+        demonstrate(PLATES[1], np.random.default_rng(s), strokes=Strokes(count=1, duration=2.0)) for s in (1, 1, 2)
+    )
     assert_array_equal(one.states, same.states)
     assert np.abs(one.states - other.states[: len(one)]).max() > 0.01
 

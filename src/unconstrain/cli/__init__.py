@@ -255,15 +255,15 @@ def reproduce(experiment: str, trials: int | None, seed: int, workers: int, out:
         raise SettingError("--workers: got 0, expected a number of processes, or -1 for one on each core.")
     module = experiments.find(experiment)
     settings = replace(module.Settings(), seed=seed)
-    if not hasattr(settings, "trials"):
-        if trials is not None:
+    if trials is not None:
+        if not hasattr(settings, "trials"):
             raise SettingError(f"--trials: {experiment} is a single data set.")
+        settings = replace(settings, trials=trials)
+    if experiment not in experiments.JOURNALED:
         with progress_bar(experiment) as progress:
             result = module.run(settings, workers, progress)
         deliver(result, module.headlines(result), out)
         return
-    if trials is not None:
-        settings = replace(settings, trials=trials)
     journal = Journal(Path(out) / f".{experiment}.trials", settings)
     with progress_bar(experiment) as progress:
         result = module.run(settings, workers, progress, journal)
@@ -274,25 +274,46 @@ def reproduce(experiment: str, trials: int | None, seed: int, workers: int, out:
 @main.command(epilog="\b\nExample:\n  unconstrain demo --real --download --out wiping")
 @click.option("--real", is_flag=True, help="Learn from recorded wiping of a car rim, leaving one tilt out at a time.")
 @click.option("--download", is_flag=True, help="Fetch those recordings (3 MB) if they are not there.")
+@click.option("--plate", type=Numbers(), help="TILT_X,TILT_Y of a further plate to wipe, degrees.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the simulated demonstrator.")
 @click.option(
     "--out", type=click.Path(file_okay=False), default="demo", show_default=True, help="Folder for the report."
 )
-def demo(real: bool, download: bool, seed: int, out: str) -> None:
+def demo(real: bool, download: bool, plate: tuple[float, ...] | None, seed: int, out: str) -> None:
     """Wash a car: learn on some surfaces, be tested on others.
 
     Writes a report to look at.
     """
     from ..experiments import washing
 
-    if not real:
-        click.echo("Seven plates are wiped, five to learn from, two to be tested on.")
+    if plate is not None and len(plate) != 2:
+        raise SettingError(f"--plate: got {len(plate)} numbers, expected two, the tilts about x and y in degrees.")
+    tilts = None if plate is None else (plate[0], plate[1])
     try:
         with progress_bar("washing") as progress:
-            result = washing.run(washing.Settings(real=real, download=download, seed=seed), 1, progress)
+            result = washing.run(
+                washing.Settings(real=real, download=download, trials=1, seed=seed, plate=tilts), 1, progress
+            )
     except ReadError as error:
         raise error if download else ReadError(f"{error} On the command line, --download allows it.") from error
+    if not real:
+        click.echo("Seven plates were wiped, five to learn from, two to be tested on.")
     deliver(result, washing.headlines(result), out)
+
+
+@main.command(epilog="\b\nExample:\n  unconstrain doctor")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def doctor(as_json: bool) -> None:
+    """Say what is installed, what is missing, and the command that mends it."""
+    from .doctor import examine
+
+    found = examine()
+    if as_json:
+        click.echo(json.dumps([one._asdict() for one in found], indent=2))
+        return
+    print_table(["what", "for", "found", "to mend it"], [list(one) for one in found])
+    missing = sum(bool(one.mend) for one in found)
+    click.echo("Everything is there." if not missing else f"{missing} of {len(found)} are missing something.")
 
 
 def _fitted(path: str) -> Policy:

@@ -7,10 +7,13 @@ from types import ModuleType
 
 from ..errors import SettingError
 
-__all__ = ["NAMES", "find"]
+__all__ = ["JOURNALED", "NAMES", "find"]
 
 NAMES = ("table1", "figure4", "figure5", "table2", "washing")
 """What can be reproduced."""
+
+JOURNALED = ("table1", "figure5", "table2")
+"""Those whose trials are kept as they finish, so that an interrupted run goes on."""
 
 
 def find(name: str) -> ModuleType:

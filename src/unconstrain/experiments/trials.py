@@ -41,16 +41,19 @@ class Result:
         One for each method and setting, in plain units.
     details : dict
         What pictures need and tables do not.
+    tables : dict
+        Further rows, by name.
     """
 
     name: str
     settings: DataClass
     rows: list[dict[str, Any]]
     details: dict[str, Any] = field(default_factory=dict)
+    tables: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Settings and rows as plain values."""
-        return {"name": self.name, "settings": asdict(self.settings), "rows": self.rows}
+        return {"name": self.name, "settings": asdict(self.settings), "rows": self.rows, **self.tables}
 
 
 def run_trials(

@@ -5,6 +5,7 @@ Interactive ones are plotly figures; :func:`overview` draws with matplotlib.
 Both come with the extra ``viz`` and are imported when first used.
 """
 
+from .arms import arm_on_plate
 from .curves import RATIO_COLOURS, bands, bars, dots, over_time, ratios, spectra, step_scores
 from .overview import overview
 from .planes import Quad, broken, paths, vector_field
@@ -18,6 +19,7 @@ __all__ = [
     "PALETTE",
     "RATIO_COLOURS",
     "Quad",
+    "arm_on_plate",
     "bands",
     "bars",
     "broken",

@@ -303,7 +303,10 @@ def _mend(whole: _Piece, recipe: Recipe, name: str) -> tuple[_Piece, list[str]]:
     if recipe.differentiate is not None:
         interval = _typical(whole.times)
         if recipe.differentiate == "savgol" and any(_is_irregular(np.diff(piece.times), interval) for piece in pieces):
-            notes.append(f"time stamps are irregular, so it was resampled to its median rate of {1 / interval:.4g} Hz.")
+            if recipe.rate is None or abs(recipe.rate * interval - 1.0) > 0.01:  # else it is what was asked for
+                notes.append(
+                    f"time stamps are irregular, so it was resampled to its median rate of {1 / interval:.4g} Hz."
+                )
             pieces = [_resampled(piece, 1 / interval) for piece in pieces]
         needed = _samples_needed(recipe, interval)
         pieces, more = _long_enough(pieces, needed, name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import inspect
 import re
 from collections.abc import Sequence
@@ -224,6 +225,27 @@ def picture(
     return (
         f'<figure id="{name}">{key}<div class="panels" style="{style}">{"".join(drawn)}</div>'
         f"<figcaption>{caption}</figcaption></figure>"
+    )
+
+
+def image(name: str, data: bytes, kind: str, alternative: str, caption: str) -> str:
+    """A picture that is part of the page.
+
+    Parameters
+    ----------
+    name : str
+        Of the picture within the page.
+    data : bytes
+    kind : {"png", "gif"}
+    alternative : str
+        What it shows, for those who cannot see it.
+    caption : str
+        HTML.
+    """
+    encoded = base64.b64encode(data).decode("ascii")
+    return (
+        f'<figure id="{name}"><img src="data:image/{kind};base64,{encoded}" alt="{escape(alternative)}" '
+        f'style="max-width:100%;height:auto"><figcaption>{caption}</figcaption></figure>'
     )
 
 

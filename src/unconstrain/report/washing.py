@@ -15,6 +15,7 @@ from ..experiments.washing import Split, Surface
 from ..projection import null_space_projection, project
 from ..systems.wiping import WipingPolicy
 from . import html
+from .washing_arm import on_the_arm
 from .washing_scores import bars, scores
 
 __all__ = ["page"]
@@ -56,6 +57,7 @@ def page(result: Result) -> str:
         "Wiping a car rim, as recorded" if real else "Washing a car, simulated",
         _lead(real),
         html.section("How well each method does", scores(result), bars(result)),
+        html.section("On the arm", *on_the_arm(result)),
         html.section("The demonstrations", _demonstrations(splits)),
         html.section("The policy on plates that nobody learnt from", _fields(cases, real)),
         html.section("Predicted and observed velocity on these plates", _velocities(cases)),

@@ -1,0 +1,64 @@
+"""What is installed, what is missing, and the command that mends it."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from typing import NamedTuple
+
+__all__ = ["Finding", "examine"]
+
+EXTRAS = {
+    "viz": ("plotly", "matplotlib"),
+    "data": ("pooch",),
+    "arm": ("yourdfpy",),
+    "sim": ("mujoco", "pillow"),
+}
+"""What each extra brings."""
+
+SERVES = {
+    "viz": "figures and reports",
+    "data": "loaders for public recordings",
+    "arm": "arms from URDF files",
+    "sim": "wiping with contact",
+}
+
+
+class Finding(NamedTuple):
+    """One line of the table."""
+
+    what: str
+    serves: str
+    found: str
+    mend: str
+
+
+def examine() -> list[Finding]:
+    """Look at Python, the extras, and what the scene can be rendered with."""
+    found = [Finding("Python", "everything", platform.python_version(), "")]
+    for extra, packages in EXTRAS.items():
+        versions = {package: _version(package) for package in packages}
+        missing = [package for package, number in versions.items() if number is None]
+        said = ", ".join(f"{package} {number or 'missing'}" for package, number in versions.items())
+        mend = f"pip install 'unconstrain[{extra}]'" if missing else ""
+        found.append(Finding(extra, SERVES[extra], said, mend))
+    return [*found, _graphics()]
+
+
+def _graphics() -> Finding:
+    from ..simulation import BACKENDS, backend
+
+    what, serves = "graphics", "pictures of the arm without a screen"
+    if _version("mujoco") is None:
+        return Finding(what, serves, "needs sim", "pip install 'unconstrain[sim]'")
+    works = backend()
+    if works is None:
+        return Finding(what, serves, "neither EGL nor OSMesa works", f"apt-get install {BACKENDS['egl']} libegl-mesa0")
+    return Finding(what, serves, works or "the system's own", "")
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
