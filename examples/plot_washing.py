@@ -42,8 +42,8 @@ plt.show()
 # Learn
 # -----
 #
-# The fields are half as wide as the circle. The policy is fitted once; other learners solve from the same sums, without a
-# second look at the data. On noisy recordings a soft hybrid does better than the hard split of the paper: its first
+# The fields are half as wide as the circle. The policy is fitted once; other learners solve from the same sums, without
+# a second look at the data. On noisy recordings a soft hybrid does better than the hard split of the paper: its first
 # objective is the inconsistency plus a tenth of the standard risk.
 
 hybrid = uc.LocallyLinearPolicy(variance=0.0025, learner=uc.Hybrid(threshold=0, softness=0.1)).fit_demonstrations(
