@@ -12,6 +12,7 @@ from typing import Any
 
 _HOME = {
     "Affine": "features",
+    "ClosedForm": "closed_form",
     "Demonstration": "demonstration",
     "Direct": "learners",
     "Folds": "validation",

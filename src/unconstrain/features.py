@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import SMALLEST_VARIANCE, Array, as_matrix, check_at_least
+from .closed_form import ClosedForm, exponents
 from .errors import InvalidDataError, SettingError
 
 __all__ = ["Affine", "FeatureMap", "KMeansRBF", "NormalisedRBF", "Placeable", "gaussian", "shares", "squared_distances"]
@@ -58,6 +59,13 @@ class Affine:
     def __call__(self, states: Array) -> Array:
         """Compute features (N, n + 1) of states (N, n)."""
         return np.column_stack([(states - self.centre) / self.scale, np.ones(len(states))])
+
+    def closed_form(self, weights: Array) -> ClosedForm:
+        """Write a policy ``W φ(x)`` with weights (d, n + 1) as one formula."""
+        n = weights.shape[1] - 1
+        scale = np.broadcast_to(np.asarray(self.scale, np.float64), n)
+        maps = np.column_stack([weights[:, :n] / scale, weights[:, n]])
+        return ClosedForm(np.broadcast_to(np.asarray(self.centre, np.float64), n), maps[None], None, np.abs(scale))
 
     def place(self, states: Array) -> Affine:
         """Centre and scale on the data, unless told where already."""
@@ -104,6 +112,12 @@ class NormalisedRBF:
     def support(self, states: Array) -> Array:
         """Weight of the nearest kernel, from 1 at its centre to 0 far from all, shape (N,)."""
         return gaussian(squared_distances(states, self.centres).min(axis=1), self.variance)
+
+    def closed_form(self, weights: Array) -> ClosedForm:
+        """Write a policy ``W φ(x)`` with weights (d, p) as one formula."""
+        origin = self.centres.mean(axis=0)
+        reach = np.abs(self.centres - origin).max(axis=0) + np.sqrt(self.variance)
+        return ClosedForm(origin, weights.T[:, :, None], exponents(self.centres, self.variance, origin), reach)
 
     @classmethod
     def grid(

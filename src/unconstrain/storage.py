@@ -178,7 +178,11 @@ def _pack(value: Any, arrays: dict[str, np.ndarray[Any, Any]]) -> Any:
             f"cannot store a {kind.__name__}: only classes that are known by name can be read back without running "
             f"code. Known are {', '.join(sorted(_KNOWN))}; add a dataclass of your own with storage.register."
         )
-    parts = {field.name: getattr(value, field.name) for field in fields(value)} if is_dataclass(value) else vars(value)
+    parts = (
+        {field.name: getattr(value, field.name) for field in fields(value)}
+        if is_dataclass(value)
+        else value.__getstate__()
+    )
     return {"class": kind.__name__, "parts": {name: _pack(part, arrays) for name, part in parts.items()}}
 
 

@@ -21,6 +21,7 @@ from ..moments import Moments, gather_blocks
 from ..objectives import inconsistency, vec
 from ..projection import unit_actions
 from ..validation import FoldedMoments, Folds, Groups, Splitter, Validation
+from .deployable import Deployable
 
 __all__ = ["PLACING_SAMPLES", "Policy"]
 
@@ -33,8 +34,8 @@ AT_REST = 1e-12
 _ROWS = 4096
 
 
-class Policy(RegressorMixin, BaseEstimator):
-    """What both policies share: fitting from a stream, predicting, changing the learner."""
+class Policy(Deployable, RegressorMixin, BaseEstimator):
+    """What both policies share: fitting from a stream, predicting, stepping, changing the learner."""
 
     learner: Learner | None
     validation: Validation | None

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted
 
 from ..arrays import Array, as_matrix
+from ..closed_form import ClosedForm, exponents
 from ..features import Affine
 from ..learners import Learner, Solution
 from ..receptive_fields import ReceptiveFields, choose_variance, cover
@@ -86,6 +87,13 @@ class LocallyLinearPolicy(Policy):
         centring[:, :n, n] = offsets
         solution = learner.solve(folds.in_features(centring))
         return replace(solution, weights=solution.weights @ centring)
+
+    def _closed_form(self) -> ClosedForm:
+        weights, centres, variance = self.solution_.weights, self.fields_.centres, self.fields_.variance
+        origin, scale = self.features_.centre, self.features_.scale
+        maps = np.concatenate([weights[..., :-1] / scale, weights[..., -1:]], axis=2)
+        reach = np.abs(centres - origin).max(axis=0) + np.sqrt(variance)
+        return ClosedForm(np.asarray(origin), maps, exponents(centres, variance, np.asarray(origin)), reach)
 
     def support(self, states: ArrayLike) -> Array:
         """Weight in the nearest field, from 1 at its centre to 0 far from all data, shape (N,)."""

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted
 
 from ..arrays import Array, as_matrix
+from ..closed_form import ClosedForm
 from ..errors import SettingError
 from ..features import FeatureMap, KMeansRBF, Placeable
 from ..learners import Learner, Solution
@@ -70,6 +71,10 @@ class ParametricPolicy(Policy):
 
     def _solve(self, learner: Learner, folds: FoldedMoments) -> Solution:
         return learner.solve(folds)
+
+    def _closed_form(self) -> ClosedForm | None:
+        closed = getattr(self.features_, "closed_form", None)
+        return None if closed is None else closed(self.solution_.weights[0])
 
     def support(self, states: ArrayLike) -> Array:
         """How near to the features' kernels each state is, from 1 to 0, shape (N,).

@@ -1,0 +1,12 @@
+"""A fitted policy where it is used: in a control loop, in C, in an ONNX runtime. One file for each target.
+
+All are made from a :class:`~unconstrain.ClosedForm`; a new target is one more function of it.
+"""
+
+from __future__ import annotations
+
+from .c99 import c_source
+from .onnx_graph import onnx_model
+from .stepping import Step, stepper, stepper_on
+
+__all__ = ["Step", "c_source", "onnx_model", "stepper", "stepper_on"]

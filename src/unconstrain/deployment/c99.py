@@ -1,0 +1,233 @@
+"""One C99 file for a policy, with fixed sizes, no allocation and no state."""
+
+from __future__ import annotations
+
+import re
+from importlib.metadata import PackageNotFoundError, version
+
+import numpy as np
+
+from ..arrays import Array
+from ..closed_form import ClosedForm
+from ..errors import SettingError
+
+__all__ = ["TOLERANCE", "c_source"]
+
+TOLERANCE = 1e-9
+"""The self-test allows this share of the largest action: mathematics libraries differ in the last digit of ``exp``."""
+
+
+def c_source(form: ClosedForm, name: str, states: Array, actions: Array) -> str:
+    """C99 source of ``void NAME_step(const double state[n], double action[d])``.
+
+    Constants are hexadecimal, so that no digit is lost. The file needs
+    nothing but ``exp`` from the standard library. With ``NAME_SELF_TEST``
+    defined, in capitals, it has a ``main`` that compares itself with the
+    given actions.
+
+    Parameters
+    ----------
+    form : ClosedForm
+    name : str
+        A C identifier.
+    states, actions : ndarray, shape (K, n) and (K, d)
+        What the self-test looks at, and what it expects there.
+
+    Raises
+    ------
+    SettingError
+        If the name is none in C.
+    """
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+        raise SettingError(f"name: got {name!r}, expected a name in C: a letter, then letters, digits, underscores.")
+    n, d, models = form.sizes
+    fill = {
+        "name": name,
+        "macro": f"{name.upper()}_SELF_TEST",
+        "version": _version(),
+        "what": f"{n} states to {d} actions, {models} model{'s' * (models > 1)}",
+        "n": str(n),
+        "d": str(d),
+        "models": str(models),
+        "tests": str(len(states)),
+        "origin": _braced(form.origin),
+        "maps": _braced(form.maps if form.is_affine else form.maps[:, :, 0]),
+        "slopes": "" if form.exponents is None else _braced(form.exponents),
+        "test_states": _braced(states),
+        "test_actions": _braced(actions),
+        "tolerance": float(TOLERANCE * np.abs(actions).max()).hex(),
+    }
+    body = _AFFINE if form.exponents is None else _BLENDED_MAPS if form.is_affine else _BLENDED_CONSTANTS
+    return re.sub(r"@(\w+)@", lambda found: fill[found[1]], _HEAD + body + _SELF_TEST)
+
+
+def _braced(values: Array) -> str:
+    """An initialiser, by rows."""
+    if np.ndim(values) > 1:
+        return "{\n" + ",\n".join(_braced(row) for row in values) + "}"
+    # Adding zero makes a minus zero plain.
+    return "{" + ", ".join((float(value) + 0.0).hex() for value in values) + "}"
+
+
+def _version() -> str:
+    try:
+        return version("unconstrain")
+    except PackageNotFoundError:
+        return "from its sources"
+
+
+_HEAD = """\
+/*
+ * @what@; written by unconstrain @version@.
+ *
+ *     void @name@_step(const double state[@n@], double action[@d@]);
+ *
+ * C99, needs only exp() of the standard library. No allocation, no state: safe in any number of threads.
+ * The action may be written over the state. Finite for every finite state of sensible size; NaN gives NaN.
+ *
+ * Test: cc -std=c99 -O2 -D@macro@ FILE.c -lm -o test && ./test
+ */
+#include <math.h>
+
+enum { STATES = @n@, ACTIONS = @d@, MODELS = @models@ };
+
+void @name@_step(const double state[@n@], double action[@d@]);
+
+static const double ORIGIN[STATES] = @origin@;
+
+"""
+
+_AFFINE = """\
+/* The map, its constant in the last column. */
+static const double MAP[MODELS][ACTIONS][STATES + 1] = @maps@;
+
+void @name@_step(const double state[@n@], double action[@d@])
+{
+    double z[STATES];
+    int i, k;
+
+    for (i = 0; i < STATES; i++)
+        z[i] = state[i] - ORIGIN[i];
+    for (k = 0; k < ACTIONS; k++) {
+        double sum = MAP[0][k][STATES];
+        for (i = 0; i < STATES; i++)
+            sum += MAP[0][k][i] * z[i];
+        action[k] = sum;
+    }
+}
+"""
+
+_SHARES = """\
+/* Exponents of the kernels are affine in the state; the constant is in the last column. */
+static const double SLOPES[MODELS][STATES + 1] = @slopes@;
+
+/* Shares of the models, not yet divided by their sum, which is returned. Relative to the largest: none overflows. */
+static double shares(const double z[STATES], double share[MODELS])
+{
+    double largest, sum = 0.0;
+    int i, m;
+
+    for (m = 0; m < MODELS; m++) {
+        double exponent = SLOPES[m][STATES];
+        for (i = 0; i < STATES; i++)
+            exponent += SLOPES[m][i] * z[i];
+        share[m] = exponent;
+    }
+    largest = share[0];
+    for (m = 1; m < MODELS; m++)
+        if (share[m] > largest)
+            largest = share[m];
+    for (m = 0; m < MODELS; m++) {
+        share[m] = exp(share[m] - largest);
+        sum += share[m];
+    }
+    return sum;
+}
+
+"""
+
+_BLENDED_CONSTANTS = (
+    _SHARES
+    + """\
+/* What each model says. */
+static const double CONSTANTS[MODELS][ACTIONS] = @maps@;
+
+void @name@_step(const double state[@n@], double action[@d@])
+{
+    double z[STATES], share[MODELS], sum;
+    int i, k, m;
+
+    for (i = 0; i < STATES; i++)
+        z[i] = state[i] - ORIGIN[i];
+    sum = shares(z, share);
+    for (k = 0; k < ACTIONS; k++)
+        action[k] = 0.0;
+    for (m = 0; m < MODELS; m++)
+        for (k = 0; k < ACTIONS; k++)
+            action[k] += share[m] * CONSTANTS[m][k];
+    for (k = 0; k < ACTIONS; k++)
+        action[k] /= sum;
+}
+"""
+)
+
+_BLENDED_MAPS = (
+    _SHARES
+    + """\
+/* The map of each model, its constant in the last column. */
+static const double MAPS[MODELS][ACTIONS][STATES + 1] = @maps@;
+
+void @name@_step(const double state[@n@], double action[@d@])
+{
+    double z[STATES], share[MODELS], blend[ACTIONS][STATES + 1], sum;
+    int i, k, m;
+
+    for (i = 0; i < STATES; i++)
+        z[i] = state[i] - ORIGIN[i];
+    sum = shares(z, share);
+    for (k = 0; k < ACTIONS; k++)
+        for (i = 0; i <= STATES; i++)
+            blend[k][i] = share[0] * MAPS[0][k][i];
+    for (m = 1; m < MODELS; m++)
+        for (k = 0; k < ACTIONS; k++)
+            for (i = 0; i <= STATES; i++)
+                blend[k][i] += share[m] * MAPS[m][k][i];
+    for (k = 0; k < ACTIONS; k++) {
+        double whole = blend[k][STATES];
+        for (i = 0; i < STATES; i++)
+            whole += blend[k][i] * z[i];
+        action[k] = whole / sum;
+    }
+}
+"""
+)
+
+_SELF_TEST = """\
+
+#ifdef @macro@
+#include <stdio.h>
+
+enum { TESTS = @tests@ };
+
+static const double TEST_STATES[TESTS][STATES] = @test_states@;
+static const double TEST_ACTIONS[TESTS][ACTIONS] = @test_actions@;
+
+int main(void)
+{
+    const double tolerance = @tolerance@;
+    double action[ACTIONS], worst = 0.0;
+    int k, t;
+
+    for (t = 0; t < TESTS; t++) {
+        @name@_step(TEST_STATES[t], action);
+        for (k = 0; k < ACTIONS; k++) {
+            const double error = fabs(action[k] - TEST_ACTIONS[t][k]);
+            if (!(error <= worst)) /* NaN, too, is worse */
+                worst = error;
+        }
+    }
+    printf("largest error %.3g, tolerance %.3g\\n", worst, tolerance);
+    return worst <= tolerance ? 0 : 1;
+}
+#endif
+"""

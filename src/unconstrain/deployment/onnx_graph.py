@@ -1,0 +1,89 @@
+"""A policy as a float64 ONNX graph, for any number of states at once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array, require_extra
+from ..closed_form import ClosedForm
+
+__all__ = ["onnx_model"]
+
+OPSET = 17
+"""Of the standard operators; runtimes of 2022 know it."""
+
+IR_VERSION = 8
+
+
+def onnx_model(form: ClosedForm) -> bytes:
+    """Serialised graph from ``states`` (N, n) to ``actions`` (N, d), float64, of standard operators only.
+
+    Raises
+    ------
+    MissingExtraError
+        If ``onnx`` is not installed.
+    """
+    require_extra("onnx", "onnx")
+    from onnx import TensorProto, checker, helper
+
+    n, d, _ = form.sizes
+    graph = _Graph()
+    relative = graph.add("Sub", "states", graph.constant("origin", form.origin))
+    if form.exponents is None:
+        actions = graph.affine(relative, form.maps[0, :, :n].T, form.maps[0, :, n], "map")
+    else:
+        exponents = graph.affine(relative, form.exponents[:, :n].T, form.exponents[:, n], "exponents")
+        actions = _blended(graph, form, relative, graph.add("Softmax", exponents, axis=-1))
+    graph.add("Identity", actions, to="actions")
+    double = TensorProto.DOUBLE
+    made = helper.make_graph(
+        graph.nodes,
+        "unconstrain_policy",
+        [helper.make_tensor_value_info("states", double, ["N", n])],
+        [helper.make_tensor_value_info("actions", double, ["N", d])],
+        graph.constants,
+    )
+    model = helper.make_model(
+        made, producer_name="unconstrain", opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION
+    )
+    checker.check_model(model, full_check=True)
+    return bytes(model.SerializeToString())
+
+
+def _blended(graph: _Graph, form: ClosedForm, relative: str, shares: str) -> str:
+    n, d, models = form.sizes
+    constants = graph.add("MatMul", shares, graph.constant("constants", form.maps[:, :, -1]))
+    if not form.is_affine:
+        return constants
+    slopes = graph.add("MatMul", shares, graph.constant("maps", form.maps[:, :, :n].reshape(models, d * n)))
+    blend = graph.add("Reshape", slopes, graph.constant("shape", np.array([-1, d, n])))
+    column = graph.add("Unsqueeze", relative, graph.constant("last", np.array([2])))
+    moving = graph.add("Squeeze", graph.add("MatMul", blend, column), "last")
+    return graph.add("Add", moving, constants)
+
+
+class _Graph:
+    """Nodes and constants, as they come."""
+
+    def __init__(self) -> None:
+        self.nodes: list[Any] = []
+        self.constants: list[Any] = []
+
+    def constant(self, name: str, values: Any) -> str:
+        from onnx import numpy_helper
+
+        self.constants.append(numpy_helper.from_array(np.ascontiguousarray(values), name))
+        return name
+
+    def add(self, operator: str, *inputs: str, to: str = "", **settings: Any) -> str:
+        from onnx import helper
+
+        result = to or f"{operator.lower()}_{len(self.nodes)}"
+        self.nodes.append(helper.make_node(operator, inputs, [result], **settings))
+        return result
+
+    def affine(self, of: str, slopes: Array, offsets: Array, name: str) -> str:
+        product = self.add("MatMul", of, self.constant(f"{name}_slopes", slopes))
+        return self.add("Add", product, self.constant(f"{name}_offsets", offsets))

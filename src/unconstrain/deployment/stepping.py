@@ -1,0 +1,137 @@
+"""One state at a time, in Python, with nothing but the arithmetic."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from threading import local
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Array
+from ..closed_form import ClosedForm
+from ..errors import InvalidDataError
+
+__all__ = ["Step", "stepper", "stepper_on"]
+
+Step: TypeAlias = Callable[[ArrayLike, Array | None], Array]
+"""From a state (n,) to an action (d,), written into the second argument if that is given."""
+
+
+def stepper(form: ClosedForm) -> Step:
+    """Prepare a policy for single states.
+
+    Each thread has its own buffers, made on its first call; after that only
+    the answer is allocated. Numbers are not checked: NaN gives NaN.
+
+    Parameters
+    ----------
+    form : ClosedForm
+
+    Returns
+    -------
+    callable
+        Raises InvalidDataError for a state of another shape than (n,).
+    """
+    if form.exponents is None:
+        return _affine(form)
+    return _blended_maps(form, form.exponents) if form.is_affine else _blended_constants(form, form.exponents)
+
+
+def stepper_on(features: Callable[[Array], Array], weights: Array, n: int) -> Step:
+    """Do the same, at the price of the features, for a policy ``W φ(x)`` that has no formula.
+
+    Parameters
+    ----------
+    features : callable
+        States (N, n) to features (N, p).
+    weights : ndarray, shape (d, p)
+    n : int
+    """
+    relative, dot = _relative_to(np.zeros(n)), np.dot
+
+    def step(state: ArrayLike, out: Array | None = None) -> Array:
+        row = np.empty((1, n))
+        relative(state, row[0])
+        return dot(weights, features(row)[0], out)
+
+    return step
+
+
+def _affine(form: ClosedForm) -> Step:
+    n, d, _ = form.sizes
+    relative, dot = _relative_to(form.origin), np.dot
+    whole = np.ascontiguousarray(form.maps[0])
+    buffers = _PerThread(n, 0, d)
+
+    def step(state: ArrayLike, out: Array | None = None) -> Array:
+        z, head, _, _ = buffers.own
+        relative(state, head)
+        return dot(whole, z, out)
+
+    return step
+
+
+def _blended_constants(form: ClosedForm, exponents: Array) -> Step:
+    n, d, models = form.sizes
+    relative, exp, dot, divide = _relative_to(form.origin), np.exp, np.dot, np.divide
+    slopes, constants = np.ascontiguousarray(exponents), _with_total(form.maps[:, :, 0])
+    buffers = _PerThread(n, models, d + 1)
+
+    def step(state: ArrayLike, out: Array | None = None) -> Array:
+        z, head, e, sums = buffers.own
+        relative(state, head)
+        dot(slopes, z, e)
+        e -= e[e.argmax()]
+        exp(e, e)
+        dot(e, constants, sums)
+        return divide(sums[:d], sums[d:], out)
+
+    return step
+
+
+def _blended_maps(form: ClosedForm, exponents: Array) -> Step:
+    n, d, models = form.sizes
+    relative, exp, dot, divide = _relative_to(form.origin), np.exp, np.dot, np.divide
+    slopes, maps = np.ascontiguousarray(exponents), _with_total(form.maps.reshape(models, -1))
+    buffers = _PerThread(n, models, d * (n + 1) + 1)
+
+    def step(state: ArrayLike, out: Array | None = None) -> Array:
+        z, head, e, sums = buffers.own
+        relative(state, head)
+        dot(slopes, z, e)
+        e -= e[e.argmax()]
+        exp(e, e)
+        dot(e, maps, sums)
+        return divide(dot(sums[:-1].reshape(d, n + 1), z), sums[-1:], out)
+
+    return step
+
+
+def _relative_to(origin: Array) -> Callable[[ArrayLike, Array], None]:
+    subtract, n = np.subtract, len(origin)
+
+    def relative(state: ArrayLike, out: Array) -> None:
+        try:
+            if len(state) == n:  # type: ignore[arg-type]  # what has no length is refused below
+                subtract(state, origin, out)
+                return
+        except (TypeError, ValueError):
+            pass
+        raise InvalidDataError(f"step: got a state of shape {np.shape(state)}, expected {n} numbers.")
+
+    return relative
+
+
+def _with_total(values: Array) -> Array:
+    """A column of ones beside them, so that one product gives the blend and the sum of the shares."""
+    return np.column_stack([values, np.ones(len(values))])
+
+
+class _PerThread(local):
+    """Buffers: (z, 1), its first n entries, exponents, sums."""
+
+    def __init__(self, n: int, models: int, sums: int) -> None:
+        z = np.ones(n + 1)
+        self.own = z, z[:n], np.empty(models), np.empty(sums)

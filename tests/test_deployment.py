@@ -1,0 +1,333 @@
+"""What leaves the estimator says the same as the estimator: steps, C, ONNX."""
+
+import copy
+import ctypes
+import pickle
+import shutil
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.exceptions import NotFittedError
+
+import naive
+import unconstrain as uc
+from conftest import POLICIES
+from samples import draw
+from unconstrain.deployment import c_source
+from unconstrain.errors import InvalidDataError, MissingExtraError, SettingError
+
+DATA = draw(noise=0.02)
+needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs the C compiler gcc")
+FAR = [1.0, 3.0, 30.0, 1e3, 1e8]
+"""Half-widths of the boxes that states are drawn from; the data is in the first."""
+
+
+def circular(states):
+    """Features that are Python code and nothing else."""
+    return np.column_stack([np.sin(states[:, 0]), np.cos(states[:, 0]), states[:, 1]])
+
+
+@pytest.fixture(scope="module", params=POLICIES, ids=POLICIES)
+def policy(request):
+    """Each kind of policy, fitted."""
+    return POLICIES[request.param](uc.Hybrid()).fit(DATA.states, DATA.actions)
+
+
+@pytest.fixture(scope="module")
+def arm():
+    """A locally linear policy of seven joints."""
+    data = draw(samples=400, policy=lambda x: np.sin(x @ np.eye(7)[::-1]) + 0.1 * x, dimensions=7)
+    centres = np.random.default_rng(1).uniform(-1, 1, (50, 7))
+    return uc.LocallyLinearPolicy(2.0, centres=centres, learner=uc.Direct()).fit(data.states, data.actions)
+
+
+def states(dimensions, width, count=40, seed=3):
+    return np.random.default_rng(seed).uniform(-width, width, (count, dimensions))
+
+
+def assert_same(found, policy, at, width):
+    """Equal to rounding, which the exponents have in proportion to the distance."""
+    expected = policy(at)
+    assert np.isfinite(expected).all()
+    assert_allclose(found, expected, rtol=0, atol=1e-11 * width * (1 + np.abs(expected).max()))
+
+
+# Steps
+
+
+@pytest.mark.parametrize("width", FAR)
+def test_a_step_is_a_prediction(policy, arm, width):
+    for one in (policy, arm):
+        at = states(one.n_features_in_, width)
+        assert_same(np.stack([one.step(x) for x in at]), one, at, width)
+
+
+def test_a_step_is_the_formula_of_the_paper(arm):
+    matrices = np.concatenate([arm.solution_.weights[..., :-1], arm.solution_.weights[..., -1:]], axis=2)
+    shift = np.tile(np.eye(8), (50, 1, 1))
+    shift[:, :7, 7] = arm.features_(arm.fields_.centres)[:, :7]  # from one origin to each centre
+    at = states(7, 1.0, count=5)
+    expected = naive.locally_linear(at, arm.fields_.centres, 2.0, matrices @ shift)
+    assert_allclose([arm.step(x) for x in at], expected, atol=1e-10)
+
+
+def test_a_step_takes_lists_and_other_kinds_of_numbers(policy):
+    expected = policy.predict([[0.25, -0.5]])[0]
+    for x in ([0.25, -0.5], (0.25, -0.5), np.array([0.25, -0.5], np.float32), np.array([0.25, 9, -0.5])[::2]):
+        assert_allclose(policy.step(x), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("x", [0.5, [0.5], [[0.1, 0.2]], [[0.1], [0.2]], [0.1, 0.2, 0.3], "ab", None, ["a", "b"]])
+def test_a_state_of_another_shape_is_refused(policy, x):
+    with pytest.raises(InvalidDataError, match=r"step: got a state of shape .*, expected 2 numbers\."):
+        policy.step(x)
+
+
+def test_nan_gives_nan(policy):
+    assert np.isnan(policy.step([np.nan, 0.0])).all()
+    assert np.isfinite(policy.step([0.0, 0.0])).all()
+
+
+def test_steps_do_not_share_their_results(policy):
+    first = policy.step([0.1, 0.2])
+    kept = first.copy()
+    policy.step([-0.5, 0.9])
+    assert_array_equal(first, kept)
+
+
+def test_a_step_writes_where_it_is_told(policy):
+    out = np.full(2, np.nan)
+    assert policy.step([0.1, 0.2], out=out) is out
+    assert_array_equal(out, policy.step([0.1, 0.2]))
+
+
+def test_a_step_notices_that_more_was_learnt(policy):
+    learner = copy.deepcopy(policy)
+    x = np.array([0.3, 0.4])
+    learner.step(x)
+    learner.partial_fit(DATA.states[:20] + 0.05, -3.0 * DATA.actions[:20])
+    assert_allclose(learner.step(x), learner.predict(x[None])[0], atol=1e-11)
+    assert np.abs(learner.step(x) - policy.step(x)).max() > 1e-3
+    learner.fit(DATA.states, 2.0 * DATA.actions)
+    assert_allclose(learner.step(x), 2.0 * policy.step(x), rtol=1e-6)
+
+
+def test_another_learner_steps_by_its_own_solution(policy):
+    policy.step([0.3, 0.4])
+    other = policy.with_learner(uc.Inconsistency())
+    assert_allclose(other.step([0.3, 0.4]), other.predict([[0.3, 0.4]])[0], atol=1e-11)
+
+
+def test_before_a_fit_there_is_no_step():
+    with pytest.raises(NotFittedError):
+        uc.LocallyLinearPolicy().step([0.0, 0.0])
+
+
+def test_a_policy_of_one_number_steps_to_a_vector_of_one():
+    flat = uc.ParametricPolicy(uc.Affine()).fit(DATA.states, DATA.actions[:, 0])
+    assert flat.step([0.1, 0.2]).shape == (1,)
+    assert_allclose(flat.step([0.1, 0.2]), flat.predict([[0.1, 0.2]]), atol=1e-12)
+
+
+def test_features_of_your_own_step_too():
+    own = uc.ParametricPolicy(circular, uc.Direct()).fit(DATA.states, DATA.actions)
+    assert_allclose(own.step([0.1, 0.2]), own.predict([[0.1, 0.2]])[0], atol=1e-12)
+    with pytest.raises(InvalidDataError, match="expected 2 numbers"):
+        own.step([0.1])
+
+
+def test_threads_do_not_disturb_each_other(arm):
+    at = states(7, 1.0, count=300)
+    expected = np.stack([arm.step(x) for x in at])
+    found = [np.empty_like(expected) for _ in range(4)]
+
+    def follow(into):
+        for _ in range(5):
+            for row, x in zip(into, at, strict=True):
+                arm.step(x, out=row)
+
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        threads = [threading.Thread(target=follow, args=(into,)) for into in found]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    finally:
+        sys.setswitchinterval(before)
+    for into in found:
+        assert_array_equal(into, expected)
+
+
+def test_a_policy_that_has_stepped_is_pickled_copied_and_saved(policy, tmp_path):
+    policy.step([0.1, 0.2])
+    uc.save(policy, tmp_path / "policy.npz")
+    for other in (pickle.loads(pickle.dumps(policy)), copy.deepcopy(policy), uc.load(tmp_path / "policy.npz")):
+        assert "_prepared" not in vars(other)
+        assert_array_equal(other.step([0.1, 0.2]), policy.step([0.1, 0.2]))
+
+
+# C
+
+
+def compiled(policy, folder, name="policy", flags=()):
+    """The exported policy as a function, compiled without a warning."""
+    folder.mkdir(exist_ok=True)
+    policy.export_c(folder / "policy.c", name)
+    strict = ["gcc", "-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror", *flags]
+    subprocess.run([*strict, "-shared", "-fPIC", "policy.c", "-lm", "-o", "policy.so"], cwd=folder, check=True)
+    test = [*strict, f"-D{name.upper()}_SELF_TEST", "policy.c", "-lm", "-o", "self_test"]
+    subprocess.run(test, cwd=folder, check=True)
+    step = getattr(ctypes.CDLL(str(folder / "policy.so")), f"{name}_step")
+    step.restype = None
+    vector = np.ctypeslib.ndpointer(np.float64, 1, flags="C")
+    step.argtypes = [vector, vector]
+
+    def call(x):
+        action = np.full(policy.n_outputs_, np.nan)
+        step(np.ascontiguousarray(x, np.float64), action)
+        return action
+
+    return call
+
+
+@needs_gcc
+def test_the_c_file_says_what_the_policy_says_inside_and_far_outside(policy, tmp_path):
+    step = compiled(policy, tmp_path)
+    for width in FAR:
+        at = states(2, width)
+        assert_same(np.stack([step(x) for x in at]), policy, at, width)
+    assert np.isnan(step([np.nan, 0.0])).all()
+
+
+@needs_gcc
+def test_the_c_file_of_an_arm(arm, tmp_path):
+    step = compiled(arm, tmp_path, "left_arm", flags=["-Wconversion", "-Wmissing-prototypes", "-Wshadow"])
+    for width in FAR:
+        at = states(7, width)
+        assert_same(np.stack([step(x) for x in at]), arm, at, width)
+
+
+@needs_gcc
+def test_the_c_file_tests_itself(policy, tmp_path):
+    compiled(policy, tmp_path)
+    done = subprocess.run([tmp_path / "self_test"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert done.stdout.startswith("largest error ")
+
+
+@needs_gcc
+def test_the_self_test_of_a_c_file_finds_a_wrong_digit(arm, tmp_path):
+    form = arm.closed_form()
+    at = states(7, 1.0, count=4)
+    expected = arm(at)
+    expected[2, 3] += 1e-6
+    (tmp_path / "wrong.c").write_text(c_source(form, "wrong", at, expected))
+    subprocess.run(["gcc", "-std=c99", "-DWRONG_SELF_TEST", "wrong.c", "-lm", "-o", "test"], cwd=tmp_path, check=True)
+    assert subprocess.run([tmp_path / "test"], check=False, capture_output=True).returncode == 1
+
+
+def test_constants_in_c_lose_no_digit(policy, tmp_path):
+    policy.export_c(tmp_path / "policy.c")
+    written = set((tmp_path / "policy.c").read_text(encoding="ascii").replace(",", " ").replace("}", " ").split())
+    form = policy.closed_form()
+    for values in (form.origin, form.maps, *([] if form.exponents is None else [form.exponents])):
+        for value in np.ravel(values):
+            assert {(float(value) + 0.0).hex(), "{" + (float(value) + 0.0).hex()} & written
+
+
+@pytest.mark.parametrize("name", ["", "2nd", "my-policy", "a b", "ä"])
+def test_a_name_that_c_does_not_know_is_refused(arm, tmp_path, name):
+    with pytest.raises(SettingError, match="expected a name in C"):
+        arm.export_c(tmp_path / "policy.c", name)
+    assert not list(tmp_path.iterdir())
+
+
+# ONNX
+
+
+def session(path):
+    runtime = pytest.importorskip("onnxruntime")
+    return runtime.InferenceSession(path, providers=["CPUExecutionProvider"])
+
+
+def test_the_onnx_graph_says_what_the_policy_says_inside_and_far_outside(policy, arm, tmp_path):
+    pytest.importorskip("onnx")
+    for one in (policy, arm):
+        one.export_onnx(tmp_path / "policy.onnx")
+        graph = session(tmp_path / "policy.onnx")
+        for width in FAR:
+            at = states(one.n_features_in_, width)
+            [found] = graph.run(None, {"states": at})
+            assert found.dtype == np.float64
+            assert_same(found, one, at, width)
+            [alone] = graph.run(None, {"states": at[:1]})
+            assert_same(alone, one, at[:1], width)
+
+
+def test_without_onnx_the_error_names_the_extra(policy, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'unconstrain\[onnx\]'"):
+        policy.export_onnx(tmp_path / "policy.onnx")
+    assert not list(tmp_path.iterdir())
+
+
+# What can be exported
+
+
+@pytest.mark.parametrize("export", ["export_c", "export_onnx"])
+def test_features_that_are_code_are_refused_with_what_can_be_exported(tmp_path, export):
+    own = uc.ParametricPolicy(circular, uc.Direct()).fit(DATA.states, DATA.actions)
+    with pytest.raises(SettingError) as caught:
+        getattr(own, export)(tmp_path / "file")
+    assert "cannot export a policy on the features circular: they are Python code" in str(caught.value)
+    assert "Affine, NormalisedRBF or KMeansRBF" in str(caught.value)
+
+
+class Reversed:
+    """Features of one's own that say their formula: the state from back to front, and one."""
+
+    def __call__(self, states):
+        return np.column_stack([states[:, ::-1], np.ones(len(states))])
+
+    def closed_form(self, weights):
+        n = weights.shape[1] - 1
+        maps = np.column_stack([weights[:, :n][:, ::-1], weights[:, n]])
+        return uc.ClosedForm(np.zeros(n), maps[None], None, np.ones(n))
+
+
+def test_features_of_your_own_that_say_their_formula_can_be_exported(tmp_path):
+    own = uc.ParametricPolicy(Reversed(), uc.Direct()).fit(DATA.states, DATA.actions)
+    own.export_c(tmp_path / "policy.c")
+    at = states(2, 5.0)
+    assert_same(np.stack([own.step(x) for x in at]), own, at, 5.0)
+
+
+def test_before_a_fit_there_is_nothing_to_export(tmp_path):
+    with pytest.raises(NotFittedError):
+        uc.LocallyLinearPolicy().export_c(tmp_path / "policy.c")
+
+
+@given(
+    unit=st.sampled_from([1e-8, 1e-3, 1.0, 1e8]),
+    offset=st.sampled_from([0.0, 1.0, -50.0]),
+    scale=st.sampled_from([1e-8, 1.0, 1e8]),
+)
+def test_units_and_offsets_do_not_matter_to_a_step(unit, offset, scale):
+    at = unit * (DATA.states + offset)
+    for make in POLICIES.values():
+        one = make(uc.Direct())
+        if "variance" in one.get_params():
+            one.set_params(variance=0.5 * unit**2)
+        if isinstance(one.get_params().get("features"), uc.NormalisedRBF):
+            continue  # its centres are given in units
+        one.fit(at, scale * DATA.actions)
+        found = np.stack([one.step(x) for x in at[:5]])
+        assert_allclose(found, one(at[:5]), rtol=0, atol=1e-9 * scale)
