@@ -152,7 +152,7 @@ def assert_learnt_the_policy(path, tolerance=1e-6):
 # Help
 
 
-COMMANDS = ["inspect", "fit", "score", "rollout", "reproduce", "demo"]
+COMMANDS = ["inspect", "fit", "score", "rollout", "export", "reproduce", "demo"]
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -526,6 +526,33 @@ def test_a_movement_far_from_the_data_is_noted(files, tmp_path):
     assert (near.code, near.err) == (0, "")
     assert (far.code, far.err) == (0, "Note: from 0.00 s on the movement is far from all data.\n")
     assert len(far.out.splitlines()) == 4
+
+
+# export
+
+
+@pytest.mark.parametrize("name", ["swing.c", "swing.ONNX"])
+def test_export_writes_what_its_suffix_says(policy, tmp_path, name):
+    pytest.importorskip("onnx")
+    said = run("export", policy, "-o", tmp_path / name)
+    assert said.strip().endswith(str(tmp_path / name))
+    exported = (tmp_path / name).read_bytes()
+    assert (b"void policy_step(const double state[2], double action[2]);" in exported) == (name == "swing.c")
+
+
+def test_export_calls_the_c_function_as_told(policy, tmp_path):
+    run("export", policy, "-o", tmp_path / "swing.c", "--name", "left")
+    assert "void left_step(" in (tmp_path / "swing.c").read_text()
+
+
+def test_export_refuses_other_suffixes_and_names_where_there_are_none(policy, tmp_path):
+    assert refused("export", policy, "-o", tmp_path / "swing.h").endswith(
+        "got the suffix '.h', expected .c for C source or .onnx for an ONNX graph."
+    )
+    assert refused("export", policy, "-o", tmp_path / "swing.onnx", "--name", "left").startswith("--name: belongs to C")
+    assert "expected a name in C" in refused("export", policy, "-o", tmp_path / "swing.c", "--name", "a b")
+    assert "No such file" in refused("export", policy, "-o", tmp_path / "missing" / "swing.c")
+    assert not list(tmp_path.iterdir())
 
 
 # Wrong input

@@ -230,6 +230,25 @@ def rollout(
         )
 
 
+@main.command(epilog="\b\nExample:\n  unconstrain export wipe.npz -o wipe.c --name wipe")
+@click.argument("policy", type=click.Path())
+@click.option("-o", "--output", required=True, type=click.Path(dir_okay=False), help="File that ends in .c or .onnx.")
+@click.option("--name", help="C: what its function and macro begin with, policy by default.")
+def export(policy: str, output: str, name: str | None) -> None:
+    """Write POLICY as C99 source or as an ONNX graph."""
+    kind = Path(output).suffix.lower()
+    if kind not in (".c", ".onnx"):
+        raise SettingError(f"{output}: got the suffix {kind!r}, expected .c for C source or .onnx for an ONNX graph.")
+    if name is not None and kind != ".c":
+        raise SettingError(f"--name: belongs to C source, got {output}.")
+    learnt = _fitted(policy)
+    if kind == ".c":
+        learnt.export_c(output, name)
+    else:
+        learnt.export_onnx(output)
+    click.echo(f"{'C source' if kind == '.c' else 'ONNX graph'}: {output}")
+
+
 @main.command(epilog="\b\nExample:\n  unconstrain reproduce table1 --trials 100 --out results")
 @click.argument("experiment", type=click.Choice(experiments.NAMES))
 @click.option("--trials", type=click.IntRange(1), help="Data sets; the paper's number by default.")

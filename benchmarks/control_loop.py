@@ -1,0 +1,114 @@
+"""How long one step of a policy takes in Python, C and ONNX; needs a C compiler called cc."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+import unconstrain as uc
+from unconstrain.arrays import Array
+
+FIELDS, JOINTS = 50, 7
+REPEATS, CALLS = 15, 5_000
+
+_LOOP = """
+#include <time.h>
+void policy_step(const double state[{n}], double action[{n}]);
+double seconds(const double *states, int count, int rounds);
+volatile double sink; /* so that no call can be left out */
+double seconds(const double *states, int count, int rounds)
+{{
+    double action[{n}];
+    struct timespec start, stop;
+    int i, r;
+    clock_gettime(CLOCK_MONOTONIC, &start);
+    for (r = 0; r < rounds; r++)
+        for (i = 0; i < count; i++) {{
+            policy_step(states + {n} * i, action);
+            sink = action[0];
+        }}
+    clock_gettime(CLOCK_MONOTONIC, &stop);
+    return (double)(stop.tv_sec - start.tv_sec) + 1e-9 * (double)(stop.tv_nsec - start.tv_nsec);
+}}
+"""
+
+
+def arm_policy() -> uc.LocallyLinearPolicy:
+    """A locally linear policy of seven joints in fifty fields."""
+    rng = np.random.default_rng(0)
+    states = rng.uniform(-2, 2, (3000, JOINTS))
+    actions = np.sin(states[:, ::-1]) - 0.3 * states
+    return uc.LocallyLinearPolicy(3.0, centres=states[:FIELDS], learner=uc.Direct()).fit(states, actions)
+
+
+def median_us(call: Callable[[Array], object], states: Array) -> float:
+    """Median time of one call on one state, µs."""
+    times = []
+    for _ in range(REPEATS):
+        start = perf_counter()
+        for state in states:
+            call(state)
+        times.append((perf_counter() - start) / len(states))
+    return 1e6 * float(np.median(times))
+
+
+def in_c(policy: uc.LocallyLinearPolicy, folder: Path, states: Array) -> float:
+    """Median time of one step in a loop in C, µs."""
+    policy.export_c(folder / "policy.c")
+    (folder / "loop.c").write_text("#define _POSIX_C_SOURCE 199309L\n" + _LOOP.format(n=JOINTS))
+    command = ["cc", "-std=c99", "-O3", "-shared", "-fPIC", "policy.c", "loop.c", "-lm", "-o", "loop.so"]
+    subprocess.run(command, cwd=folder, check=True)
+    seconds = ctypes.CDLL(str(folder / "loop.so")).seconds
+    seconds.restype, pointer = ctypes.c_double, states.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+    return 1e6 * float(np.median([seconds(pointer, len(states), 4) for _ in range(REPEATS)])) / (4 * len(states))
+
+
+def in_onnx(policy: uc.LocallyLinearPolicy, folder: Path, states: Array) -> float:
+    """Median time of one run on one state, µs."""
+    import onnxruntime
+
+    policy.export_onnx(folder / "policy.onnx")
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    graph = onnxruntime.InferenceSession(folder / "policy.onnx", options, providers=["CPUExecutionProvider"])
+    return median_us(lambda state: graph.run(None, {"states": state[None]}), states)
+
+
+def main() -> list[dict[str, Any]]:
+    """Print the table and return its rows."""
+    policy = arm_policy()
+    states = np.random.default_rng(1).uniform(-2, 2, (CALLS, JOINTS))
+    out = np.empty(JOINTS)
+    what = f"{FIELDS} fields, {JOINTS}-DOF"
+    rows = [
+        (f"step, {what}", median_us(policy.step, states), 20.0, 8.0),
+        (f"step into a buffer, {what}", median_us(lambda state: policy.step(state, out), states), 20.0, 8.0),
+        (
+            f"predict of one state, {what}",
+            median_us(lambda state: policy.predict(state[None]), states[:200]),
+            None,
+            None,
+        ),
+    ]
+    with TemporaryDirectory() as made:
+        if shutil.which("cc"):
+            rows.append((f"exported C, {what}", in_c(policy, Path(made), states), 3.0, 1.0))
+        rows.append((f"exported ONNX, one state, {what}", in_onnx(policy, Path(made), states), 15.0, None))
+    print(f"{'one state, median of ' + str(REPEATS):60} {'µs':>8} {'at most':>8} {'aim':>8}")
+    for name, value, least, aim in rows:
+        print(f"{name:60} {value:8.2f} {least or '-':>8} {aim or '-':>8}")
+    return [
+        {"what": name, "value": value, "unit": "µs", "at_least": least, "aim": aim} for name, value, least, aim in rows
+    ]
+
+
+if __name__ == "__main__":
+    main()
