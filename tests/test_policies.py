@@ -194,8 +194,21 @@ def test_centres_may_be_given(data):
 def test_only_so_many_samples_place_the_features():
     rng = np.random.default_rng(0)
     states = rng.uniform(-1, 1, (2 * PLACING_SAMPLES + 1, 1))
-    policy = uc.ParametricPolicy(uc.Affine(), uc.Direct()).fit(states, states)
-    assert_allclose(policy.features_.centre, states[::3].mean(axis=0))
+    seen = []
+
+    class Watching(uc.Affine):
+        def place(self, states):
+            seen.append(states)
+            return super().place(states)
+
+    policy = uc.ParametricPolicy(Watching(), uc.Direct())
+    for order in (slice(None), slice(None, None, -1), rng.permutation(len(states))):
+        policy.fit(states[order], states[order])
+    assert len(seen[0]) == PLACING_SAMPLES
+    assert np.isin(seen[0], states).all()
+    assert_allclose(seen[0].mean(), 0.0, atol=4 / np.sqrt(3 * PLACING_SAMPLES))
+    assert_array_equal(seen[0], seen[1])
+    assert_array_equal(seen[0], seen[2])
 
 
 def test_samples_without_weight_place_nothing(data):

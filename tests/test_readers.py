@@ -302,7 +302,10 @@ def test_content_decides_where_the_suffix_does_not(tmp_path: Path, write: Write)
 
 @pytest.mark.parametrize("content", [b"", b"\x93NUMPY\x01", b"plain words", b"a,b\0"])
 def test_an_unknown_format_lists_the_known_ones(write: Write, content: bytes) -> None:
-    with pytest.raises(ReadError, match=r"of a known format\. Supported are \.npz, \.csv, \.tsv, \.txt, \.dat\."):
+    with pytest.raises(
+        ReadError,
+        match=r"of a known format\. Supported are \.npz, \.parquet, \.pq, \.h5, \.hdf5, \.csv, \.tsv, \.txt, \.dat\.",
+    ):
         read(write(content, "wipe.xyz"))
 
 

@@ -8,13 +8,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from samples import draw
 from unconstrain import Folds, HeldOut, Hybrid, ParametricPolicy
+from unconstrain.batches import Batch, FirstLook
 from unconstrain.errors import SettingError
 from unconstrain.moments import gather
 from unconstrain.validation import FoldedMoments, Splitter
 
 
 def splitter(validation, states, groups=None, weights=None):
-    return Splitter(validation, states, np.ones(len(states)) if weights is None else weights, groups)
+    return Splitter(validation, FirstLook.at(Batch(states, states, weights, groups)))
 
 
 def spread(samples=2000, seed=0, n=2):

@@ -28,6 +28,7 @@ _HOME = {
     "ReceptiveFields": "receptive_fields",
     "Recording": "demonstration",
     "Solution": "learners",
+    "Stream": "streams",
     "Truth": "demonstration",
     "UnconstrainError": "errors",
     "action_projection": "projection",

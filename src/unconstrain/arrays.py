@@ -11,7 +11,7 @@ import importlib
 from collections.abc import Hashable, Sequence
 from numbers import Integral
 from types import ModuleType
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,11 +36,14 @@ Array = NDArray[np.float64]
 LARGEST = 1e30
 """Numbers beyond this are refused: fillers for missing values are, and products of several must stay finite."""
 
+_ROWS = 2**17
+"""Rows that are checked together."""
+
 SMALLEST_VARIANCE = 1e-100
 """Variances down to this are refused, and states that spread less count as one: their squares lose digits."""
 
 
-def as_matrix(values: ArrayLike, what: str) -> Array:
+def as_matrix(values: ArrayLike, what: str, *, convert: bool = True) -> Array:
     """Check a table of finite numbers and return it as a float64 array.
 
     Parameters
@@ -49,6 +52,8 @@ def as_matrix(values: ArrayLike, what: str) -> Array:
         Any real numbers: lists, integers, float32, read-only, non-contiguous.
     what : str
         What the table is, for the error message, such as ``"states of 'demo_3'"``.
+    convert : bool
+        Without it, the numbers are checked and stay of their type: an array that is mapped from a file is not copied.
 
     Returns
     -------
@@ -61,7 +66,7 @@ def as_matrix(values: ArrayLike, what: str) -> Array:
         If it is ragged, not two-dimensional, empty, or holds NaN, infinity or a
         number beyond :data:`LARGEST`; the message names the row and the column.
     """
-    matrix = _as_real(values, what)
+    matrix = _as_real(values, what, convert)
     if matrix.ndim != 2:
         raise InvalidDataError(
             f"{what}: got an array of shape {matrix.shape}, expected two dimensions (samples, columns). "
@@ -74,7 +79,7 @@ def as_matrix(values: ArrayLike, what: str) -> Array:
     return _finite(matrix, what)
 
 
-def as_table(values: ArrayLike, what: str) -> tuple[Array, bool]:
+def as_table(values: ArrayLike, what: str, *, convert: bool = True) -> tuple[Array, bool]:
     """Check a table, or a vector as a table of one column, and say whether it was a vector.
 
     Returns
@@ -87,9 +92,9 @@ def as_table(values: ArrayLike, what: str) -> tuple[Array, bool]:
     InvalidDataError
         As :func:`as_matrix` does.
     """
-    array = _as_real(values, what)
+    array = _as_real(values, what, convert)
     flat = array.ndim == 1
-    return as_matrix(array[:, None] if flat else array, what), flat
+    return as_matrix(array[:, None] if flat else array, what, convert=convert), flat
 
 
 def as_vector(values: ArrayLike, what: str, length: int | None = None) -> Array:
@@ -196,13 +201,15 @@ def require_extra(module: str, extra: str) -> ModuleType:
         ) from error
 
 
-def _as_real(values: ArrayLike, what: str) -> Array:
+def _as_real(values: ArrayLike, what: str, convert: bool = True) -> Array:
     try:
         raw = np.asarray(values)
     except ValueError as error:  # NumPy's word for rows of different lengths
         raise InvalidDataError(f"{what}: the rows have different lengths, expected a rectangular table.") from error
     if raw.dtype.kind == "c":
         raise InvalidDataError(f"{what}: complex data not supported, expected real numbers.")
+    if not convert and raw.dtype.kind in "fiu":
+        return raw
     try:
         return raw.astype(np.float64, copy=False)
     except (TypeError, ValueError) as error:
@@ -210,6 +217,16 @@ def _as_real(values: ArrayLike, what: str) -> Array:
 
 
 def _finite(values: Array, what: str) -> Array:
+    if all(_is_sensible(values[start : start + _ROWS]) for start in range(0, len(values), _ROWS)):
+        return values
+    return _refuse(values.astype(np.float64, copy=False), what)
+
+
+def _is_sensible(block: Array) -> bool:
+    return bool((np.abs(block.astype(np.float64, copy=False)) <= LARGEST).all())  # which NaN is not, either
+
+
+def _refuse(values: Array, what: str) -> NoReturn:
     bad = ~np.isfinite(values)
     if bad.any():
         where = np.argwhere(bad)
@@ -217,14 +234,11 @@ def _finite(values: Array, what: str) -> Array:
             f"{what}: found {values[tuple(where[0])]} at {_place(where[0])} (NaN or infinity in {len(where)} places), "
             "expected finite numbers. Remove or repair these rows first."
         )
-    large = np.abs(values) > LARGEST
-    if large.any():
-        where = np.argwhere(large)
-        raise InvalidDataError(
-            f"{what}: found {values[tuple(where[0])]} at {_place(where[0])}, expected numbers up to {LARGEST}. "
-            "Repair this row or take other units."
-        )
-    return values
+    where = np.argwhere(np.abs(values) > LARGEST)
+    raise InvalidDataError(
+        f"{what}: found {values[tuple(where[0])]} at {_place(where[0])}, expected numbers up to {LARGEST}. "
+        "Repair this row or take other units."
+    )
 
 
 def _place(index: NDArray[np.intp]) -> str:

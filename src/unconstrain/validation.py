@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from itertools import accumulate
 from typing import Literal
@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Array, check_at_least
+from .batches import FirstLook, Groups, in_order, mixed
 from .errors import SettingError
 from .moments import Moments, total
 
 __all__ = ["FoldedMoments", "Folds", "HeldOut", "Splitter", "Validation"]
 
 Unit = Literal["auto", "demonstration", "sample"]
-Groups = Sequence[Hashable] | NDArray[np.generic]
 
 
 @dataclass(frozen=True)
@@ -109,37 +109,32 @@ class Splitter:
 
     A demonstration's fold depends on the order in which demonstrations are
     first seen. A sample's fold is a hash of its state, to a thousandth of the
-    first batch's spread: it depends neither on order nor on units, equal
+    spread at first look: it depends neither on order nor on units, equal
     samples stay together, and so a weight of two is the same as a repetition.
 
     Parameters
     ----------
     validation : Folds or HeldOut
-    states : ndarray, shape (N, n)
-        The first batch; fixes the spread.
-    weights : ndarray, shape (N,)
-        How much each of them counts.
-    groups : sequence, optional
-        The first batch's; decides what "auto" means.
+    look : FirstLook
+        At everything, or at the first batch. Fixes the spread and what "auto"
+        means, and deals the demonstrations in it.
     more : bool
         Whether further batches may come. Then a single demonstration is the
         first of several.
     """
 
-    def __init__(
-        self, validation: Validation, states: Array, weights: Array, groups: Groups | None, more: bool = False
-    ) -> None:
+    def __init__(self, validation: Validation, look: FirstLook, more: bool = False) -> None:
         self.validation = validation
-        several = groups is not None and (more or len(np.unique(np.asarray(groups))) > 1)
+        several = look.groups is not None and (more or len(look.groups) > 1)
         automatic: Unit = "demonstration" if several else "sample"
         self.by = automatic if validation.by == "auto" else validation.by
-        counts = weights / weights.sum()
-        self._origin = counts @ states
-        spread = np.sqrt(counts @ (states - self._origin) ** 2)
-        size = np.abs(states).max(axis=0)
+        self._origin, size = look.mean, look.size
+        spread = np.sqrt(look.scatter / look.weight)
         # A coordinate that has not moved yet may do so later; its size is all that is known of it.
         self._scale = np.where(spread > 1e-9 * size, spread, np.where(size > 0, size, 1.0))
         self._fold_of: dict[Hashable, int] = {}
+        if self.by == "demonstration":
+            self._deal(look.groups or ())
 
     def assign(self, states: Array, groups: Groups | None) -> NDArray[np.intp]:
         """Folds of some samples, shape (N,).
@@ -155,11 +150,14 @@ class Splitter:
             raise SettingError(
                 "validation by demonstration: expected groups=, one name or number for each sample, in every batch."
             )
-        names, first, places = np.unique(np.asarray(groups), return_index=True, return_inverse=True)
-        for name in names[np.argsort(first)].tolist():
+        self._deal(in_order(groups))
+        names, places = np.unique(np.asarray(groups), return_inverse=True)
+        return np.array([self._fold_of[name] for name in names.tolist()], dtype=np.intp)[places]
+
+    def _deal(self, names: Iterable[Hashable]) -> None:
+        for name in names:
             if name not in self._fold_of:
                 self._fold_of[name] = self.validation.deal_in_turn(len(self._fold_of))
-        return np.array([self._fold_of[name] for name in names.tolist()], dtype=np.intp)[places]
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,12 +215,6 @@ def _check_unit(by: str) -> None:
 
 
 def _scatter(states: Array, seed: int) -> Array:
-    """A number in [0, 1) for each state, the same for the same state to 1e-3: SplitMix64's finaliser."""
-    mixed = np.full(len(states), seed % 2**32 + 1, dtype=np.uint64)
-    with np.errstate(over="ignore"):
-        for column in np.rint(np.clip(1e3 * states, -(2.0**52), 2.0**52)).astype(np.int64).astype(np.uint64).T:
-            mixed = (mixed ^ column) * np.uint64(0x9E3779B97F4A7C15)
-            mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-            mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-            mixed ^= mixed >> np.uint64(31)
-    return (mixed >> np.uint64(11)) / 2.0**53
+    """A number in [0, 1) for each state, the same for the same state to 1e-3."""
+    cells = np.rint(np.clip(1e3 * states, -(2.0**52), 2.0**52)).astype(np.int64).astype(np.uint64)
+    return (mixed(cells.T, seed) >> np.uint64(11)) / 2.0**53

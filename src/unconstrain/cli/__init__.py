@@ -14,7 +14,18 @@ import click
 from .. import experiments
 from ..errors import ModelFileError, ReadError, SettingError, UnconstrainError
 from .printing import Group, deliver, number, print_table, progress_bar, say_fit
-from .reading import Numbers, complete, expanded, options_for_reading, recipe_of, recordings_in, said_recipe
+from .reading import (
+    Numbers,
+    beginning,
+    complete,
+    expanded,
+    options_for_reading,
+    recipe_of,
+    recordings_in,
+    recordings_one_by_one,
+    said_recipe,
+    stream_of,
+)
 
 if TYPE_CHECKING:  # everything heavy is imported by the command that needs it
     from ..constraints import Plane
@@ -45,10 +56,15 @@ def main() -> None:
 def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     """Say what is in FILEs, such as rates, gaps and zero actions."""
     from ..preparation import survey
+    from ..readers.table import unique_names
 
     recipe = recipe_of(**reading)
-    recordings = recordings_in(expanded(files), **reading)
-    surveys = [survey(recording, recipe) for recording in recordings]
+    surveys, first = [], None
+    for recording in recordings_one_by_one(expanded(files), **reading):
+        surveys.append(survey(recording, recipe))
+        first = replace(recording, values=recording.values[:1], times=None) if first is None else first
+    names = unique_names(found.name for found in surveys)
+    surveys = [replace(found, name=name) for found, name in zip(surveys, names, strict=True)]
     if as_json:
         click.echo(json.dumps([asdict(found) for found in surveys], indent=2))
         return
@@ -75,7 +91,8 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
         if found.non_increasing:
             click.echo(f"'{found.name}': time does not increase at row {found.non_increasing[0]}.")
     try:
-        click.echo(f"fit takes {said_recipe(complete(recipe, recordings[0]))}.")
+        assert first is not None
+        click.echo(f"fit takes {said_recipe(complete(recipe, first))}.")
     except UnconstrainError as error:
         click.echo(f"fit needs to know more: {error}")
 
@@ -119,7 +136,7 @@ def fit(
     **reading: Any,
 ) -> None:
     """Learn a policy from the demonstrations in FILEs."""
-    from .. import features, policies, preparation, storage, validation
+    from .. import features, policies, storage, validation
 
     paths = expanded(files)
     for written in filter(None, (output, report)):
@@ -130,9 +147,7 @@ def fit(
     for option, value, needed in (("--variance", variance, "local"), ("--centres", centres, "rbf")):
         if value is not None and model != needed:
             raise SettingError(f"{option}: belongs to --model {needed}, got --model {model}.")
-    recordings = recordings_in(paths, **reading)
-    recipe = complete(recipe_of(**reading), recordings[0])
-    demonstrations = preparation.prepare(recordings, recipe)
+    stream = stream_of(paths, speed_power, **reading)
     chosen: dict[str, Any] = {
         "learner": _learner(learner, alpha, softness),
         "validation": validation.Folds(folds, hold_out),
@@ -143,16 +158,17 @@ def fit(
     else:
         shape = features.KMeansRBF(centres or 25) if model == "rbf" else features.Affine()
         policy = policies.ParametricPolicy(shape, **chosen)
-    policy.fit_demonstrations(demonstrations, speed_power)
-    notes = {"recipe": recipe.to_dict(), "group": reading["group"], "time": reading["time"]}
+    policy.fit_batches(stream)
+    notes = {"recipe": stream.recipe.to_dict(), "group": reading["group"], "time": reading["time"]}
     storage.save(policy, output, notes)
-    click.echo(f"Learnt from {said_recipe(recipe)}.")
-    say_fit(policy, demonstrations, learner)
+    click.echo(f"Learnt from {said_recipe(stream.recipe)}.")
+    say_fit(policy, stream, learner)
     click.echo(f"policy: {output}")
     if report is not None:
         from ..report import policy_page
 
-        Path(report).write_text(policy_page(policy, demonstrations, Path(output).stem), encoding="utf-8")
+        shown = beginning(stream)
+        Path(report).write_text(policy_page(policy, shown, Path(output).stem), encoding="utf-8")
         click.echo(f"report: {report}")
 
 

@@ -18,9 +18,9 @@ from ..errors import UnconstrainError
 if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
     from collections.abc import Iterator
 
-    from ..demonstration import Demonstration
     from ..experiments.trials import Progress, Result
     from ..policies import Policy
+    from ..streams import Stream
 
 __all__ = ["Group", "deliver", "number", "print_table", "progress_bar", "say_fit", "show_warning"]
 
@@ -89,17 +89,12 @@ def _cell(value: Any) -> str:
     return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
-def say_fit(policy: Policy, demonstrations: Sequence[Demonstration], learner: str) -> None:
+def say_fit(policy: Policy, stream: Stream, learner: str) -> None:
     """Say what was learnt, how much the data determined, and how well it holds where held out."""
-    from ..demonstration import stack
-
     solution = policy.solution_
-    samples = sum(map(len, demonstrations))
-    click.echo(
-        f"{len(demonstrations)} demonstrations, {samples} samples, {len(solution.weights)} local models."
-        if len(solution.weights) > 1
-        else f"{len(demonstrations)} demonstrations, {samples} samples."
-    )
+    names, samples, training = _walked(policy, stream)
+    models = f", {len(solution.weights)} local models" if len(solution.weights) > 1 else ""
+    click.echo(f"{names} demonstrations, {samples} samples{models}.")
     if learner != "direct":
         rest = "; the rest follows the standard risk." if learner == "hybrid" and solution.determined_share < 1 else "."
         click.echo(
@@ -109,7 +104,7 @@ def say_fit(policy: Policy, demonstrations: Sequence[Demonstration], learner: st
         )
         if solution.determined_share == 0.0:
             click.echo("Note: nothing was determined, so this is the same as --learner direct.", err=True)
-    training, held_out = 1.0 - policy.score(*stack(demonstrations)[:2]), 1.0 - policy.held_out_score()
+    held_out = 1.0 - policy.held_out_score()
     click.echo(
         f"share of the observed motion that it misses (inconsistency): {training:.4g} on the training data"
         + (f", {held_out:.4g} where held out." if isfinite(held_out) else "; nothing could be held out.")
@@ -120,6 +115,18 @@ def say_fit(policy: Policy, demonstrations: Sequence[Demonstration], learner: st
             "--still help; otherwise the demonstrations may have too little in common.",
             err=True,
         )
+
+
+def _walked(policy: Policy, stream: Stream) -> tuple[int, int, float]:
+    """Numbers of demonstrations and samples, and the share of their motion that is missed, without weights."""
+    names, samples, missed, moved = set(), 0, 0.0, 0.0
+    for name, demonstration in stream.named_demonstrations():
+        names.add(name)
+        samples += len(demonstration)
+        motion = float((demonstration.actions**2).sum())
+        moved += motion
+        missed += motion * (1.0 - policy.score(demonstration.states, demonstration.actions))
+    return len(names), samples, missed / moved if moved > 0 else 1.0
 
 
 def number(value: Any, form: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,18 +12,22 @@ import click
 from ..errors import SettingError
 
 if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
-    from ..demonstration import Recording
+    from ..demonstration import Demonstration, Recording
     from ..preparation import Recipe
+    from ..streams import Stream
 
 __all__ = [
     "Names",
     "Numbers",
+    "beginning",
     "complete",
     "expanded",
     "options_for_reading",
     "recipe_of",
     "recordings_in",
+    "recordings_one_by_one",
     "said_recipe",
+    "stream_of",
 ]
 
 
@@ -133,3 +137,36 @@ def recordings_in(paths: Sequence[str], group: str | None = None, time: str | No
     from ..readers import read
 
     return read(paths, group=group, time=time)
+
+
+def recordings_one_by_one(
+    paths: Sequence[str], group: str | None = None, time: str | None = None, **_: Any
+) -> Iterator[Recording]:
+    """Read files as the options say, holding one at a time."""
+    from ..readers import expand, read_blocks
+
+    for path in expand(paths):
+        yield from read_blocks(path, group=group, time=time, whole=True)
+
+
+def stream_of(paths: Sequence[str], speed_power: float, **reading: Any) -> Stream:
+    """Files as batches to learn from, as the options say."""
+    from ..streams import Stream
+
+    roles = {"group": reading["group"], "time": reading["time"]}
+    asked = recipe_of(**reading)
+    return Stream(paths, complete(asked, Stream(paths, asked, **roles).first), speed_power=speed_power, **roles)
+
+
+def beginning(stream: Stream) -> list[Demonstration]:
+    """Demonstrations, as many from the first on as may be held."""
+    from ..streams import HELD_BYTES
+
+    shown: list[Demonstration] = []
+    size = 0
+    for _, demonstration in stream.named_demonstrations():
+        size += demonstration.states.nbytes + demonstration.actions.nbytes
+        if shown and size > HELD_BYTES:
+            break
+        shown.append(demonstration)
+    return shown

@@ -8,7 +8,8 @@ samples, solve.
 
 from __future__ import annotations
 
-from .base import PLACING_SAMPLES, Policy
+from ..batches import PLACING_SAMPLES
+from .base import Policy
 from .local import LocallyLinearPolicy
 from .parametric import ParametricPolicy
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from copy import deepcopy
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any, Self
 
 import numpy as np
@@ -14,22 +14,20 @@ from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from ..arrays import Array, as_groups, as_matrix, as_table, as_weights, check_at_least
+from ..batches import Batch, FirstLook, Groups
 from ..demonstration import Demonstration, stack
 from ..errors import InvalidDataError
 from ..learners import Hybrid, Learner, Solution
 from ..moments import Moments, gather_blocks
 from ..objectives import inconsistency, vec
 from ..projection import unit_actions
-from ..validation import FoldedMoments, Folds, Groups, Splitter, Validation
+from ..validation import FoldedMoments, Folds, Splitter, Validation
 from .deployable import Deployable
 
-__all__ = ["PLACING_SAMPLES", "Policy"]
-
-PLACING_SAMPLES = 20_000
-"""Features and fields are placed on at most this many samples, evenly spaced in the first batch."""
+__all__ = ["Policy"]
 
 AT_REST = 1e-12
-"""Actions shorter than this share of the largest in the first batch are rounding around rest."""
+"""Actions shorter than this share of the largest at first look are rounding around rest."""
 
 _ROWS = 4096
 
@@ -89,9 +87,9 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         InvalidDataError
             If the arrays are ragged, empty, of different lengths or not finite.
         """
-        for fitted in ("_folds", "_splitter", "n_features_in_", "solution_"):
-            self.__dict__.pop(fitted, None)
-        return self._learn(X, y, sample_weight, groups, more=False)
+        self._forget()
+        batch = self._checked(X, y, sample_weight, groups, reset=True)
+        return self._begin(FirstLook.at(batch), more=False)._learn([batch])
 
     def partial_fit(
         self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, groups: Groups | None = None
@@ -101,28 +99,53 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         The first batch fixes features, fields, action dimensions, and the
         spread by which samples are dealt into folds; it should be typical.
         Parameters, result and errors as in :meth:`fit`.
-        """
-        return self._learn(X, y, sample_weight, groups, more=True)
 
-    def _learn(
-        self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None, groups: Groups | None, *, more: bool
-    ) -> Self:
+        The solution is found anew each time. Where only the last counts,
+        :meth:`fit_batches` is faster.
+        """
         first = not hasattr(self, "_folds")
-        states, actions = self._checked(X, y, reset=first)
-        weights = as_weights(sample_weight, len(states))
-        names = None if groups is None else as_groups(groups, len(states))
-        if not weights.any():
-            raise InvalidDataError("sample_weight: all weights are zero, expected at least one that counts.")
-        if not weights.all():  # a weight of zero is the same as not being there
-            counting = weights > 0
-            states, actions, weights = states[counting], actions[counting], weights[counting]
-            names = None if names is None else names[counting]
+        batch = self._checked(X, y, sample_weight, groups, reset=first)
         if first:
-            self._at_rest = AT_REST * float(np.abs(actions).max())
-            self._begin(states, weights, names, more)
-        self._folds = self._folds + self._gather(states, actions, weights, names)
-        self._conclude()
-        return self
+            self._begin(FirstLook.at(batch), more=True)
+        return self._learn([batch])
+
+    def fit_batches(self, batches: Iterable[Sequence[Any]]) -> Self:
+        """Learn from more than fits into memory, batch by batch, solving once.
+
+        What can be walked through twice, such as a list or
+        :class:`unconstrain.Stream`, is: first to choose features, fields and
+        folds, then to sum. The result is that of :meth:`fit` on everything,
+        to rounding, however the samples are cut into batches. A generator
+        is walked through once; as in :meth:`partial_fit` its first batch
+        then fixes what would have been chosen, and should be typical.
+
+        Parameters
+        ----------
+        batches : iterable of tuples
+            Each ``(X, y)``, ``(X, y, sample_weight)`` or ``(X, y, sample_weight, groups)``,
+            as :meth:`fit` takes them.
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        InvalidDataError
+            As :meth:`fit` does, and if there is no batch.
+        """
+        self._forget()
+        checked = self._each_checked(batches)
+        if iter(batches) is not batches:
+            return self._begin(FirstLook.total(map(FirstLook.at, checked)), more=False)._learn(
+                self._checked(*batch, reset=False) for batch in batches
+            )
+        first = next(checked, None)
+        self._begin(None if first is None else FirstLook.at(first), more=True)
+        return self._learn(chain([first] if first is not None else [], checked))
+
+    def _each_checked(self, batches: Iterable[Sequence[Any]]) -> Iterator[Batch]:
+        return (self._checked(*batch, reset=number == 0) for number, batch in enumerate(batches))
 
     def fit_demonstrations(
         self, demonstrations: Demonstration | Sequence[Demonstration], speed_power: float = 0.0
@@ -197,12 +220,13 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
             As in :meth:`fit`.
         """
         check_is_fitted(self, "solution_")
-        states, actions = self._checked(X, y, reset=False)
-        weights = as_weights(sample_weight, len(states))
-        directions, lengths = unit_actions(actions)
-        missed = weights @ (lengths - (directions * self(states)).sum(axis=1)) ** 2
-        moved = weights @ lengths**2
-        return float(1.0 - missed / moved) if moved > 0 else 0.0
+        missed = moved = 0.0
+        for states, actions, weights, _ in self._checked(X, y, sample_weight, reset=False).blocks():
+            directions, lengths = unit_actions(actions)
+            counts = np.ones(len(states)) if weights is None else weights
+            missed += float(counts @ (lengths - (directions * self(states)).sum(axis=1)) ** 2)
+            moved += float(counts @ lengths**2)
+        return 1.0 - missed / moved if moved > 0 else 0.0
 
     def with_learner(self, learner: Learner) -> Self:
         """Return the same policy with another learner, from the same moments: no second pass over the data."""
@@ -218,11 +242,23 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         """Moments of all samples so far, over the features as they are summed."""
         return self._folds.whole
 
-    def _checked(self, X: ArrayLike, y: ArrayLike, *, reset: bool) -> tuple[Array, Array]:
-        states = self._checked_states(X, reset=reset)
+    def _forget(self) -> None:
+        for fitted in ("_folds", "_splitter", "n_features_in_", "solution_"):
+            self.__dict__.pop(fitted, None)
+
+    def _checked(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        sample_weight: ArrayLike | None = None,
+        groups: Groups | None = None,
+        *,
+        reset: bool,
+    ) -> Batch:
+        states = self._checked_states(X, reset=reset, convert=False)
         if y is None:
             raise InvalidDataError("requires y to be passed, but the target y is None: expected the observed actions.")
-        actions, flat = as_table(y, "actions")
+        actions, flat = as_table(y, "actions", convert=False)
         if len(actions) != len(states):
             raise InvalidDataError(
                 f"got {len(states)} states and {len(actions)} actions (inconsistent numbers of samples), "
@@ -232,29 +268,45 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
             self._flat, self.n_outputs_ = flat, actions.shape[1]
         elif actions.shape[1] != self.n_outputs_:
             raise InvalidDataError(f"actions: got {actions.shape[1]} columns, expected {self.n_outputs_} as before.")
-        return states, actions
+        weights = None if sample_weight is None else as_weights(sample_weight, len(states))
+        if weights is not None and not weights.any():
+            raise InvalidDataError("sample_weight: all weights are zero, expected at least one that counts.")
+        return Batch(states, actions, weights, None if groups is None else as_groups(groups, len(states)))
 
-    def _checked_states(self, X: ArrayLike, *, reset: bool = False) -> Array:
+    def _checked_states(self, X: ArrayLike, *, reset: bool = False, convert: bool = True) -> Array:
         if isinstance(X, list | tuple):
             X = as_matrix(X, "states")  # our words for ragged rows
         try:
             # scikit-learn checks names, sparse input and the number of columns; the numbers are ours to check.
-            table = validate_data(self, X, reset=reset, dtype=np.float64, ensure_all_finite=False)
+            kind = np.float64 if convert else "numeric"
+            table = validate_data(self, X, reset=reset, dtype=kind, ensure_all_finite=False)
         except ValueError as error:
             raise InvalidDataError(str(error)) from error
-        return as_matrix(table, "states")
+        return as_matrix(table, "states", convert=convert)
 
-    def _begin(self, states: Array, weights: Array, groups: Groups | None, more: bool) -> None:
+    def _begin(self, look: FirstLook | None, *, more: bool) -> Self:
+        """Choose all that has to be chosen before the first sample is summed."""
+        if look is None:
+            raise InvalidDataError("got no sample that counts, expected at least one.")
         validation = self.validation if self.validation is not None else Folds()
-        self._splitter = Splitter(validation, states, weights, groups, more)
-        # Different states in a fixed order: repetition and order must not move the features
-        # (beyond PLACING_SAMPLES they may).
-        self._place(np.unique(states[:: -(-len(states) // PLACING_SAMPLES)], axis=0))
-        features, actions, in_models = self._block(states[:1], np.zeros((1, self.n_outputs_)), weights[:1])
+        self._at_rest = AT_REST * look.fastest
+        self._splitter = Splitter(validation, look, more)
+        # In a fixed order: repetition and order of the samples must not move the features.
+        self._place(np.unique(look.states, axis=0))
+        one = np.zeros((1, look.actions))
+        features, actions, in_models = self._block(look.states[:1], one, np.ones(1))
         empty = Moments.zero(in_models.shape[1], actions.shape[1], features.shape[1])
         self._folds = FoldedMoments((empty,) * validation.count, validation.held_out)
+        return self
 
-    def _gather(self, states: Array, actions: Array, weights: Array, groups: Groups | None) -> FoldedMoments:
+    def _learn(self, batches: Iterable[Batch]) -> Self:
+        self._folds = sum((self._gather(block) for batch in batches for block in batch.blocks()), start=self._folds)
+        self._conclude()
+        return self
+
+    def _gather(self, batch: Batch) -> FoldedMoments:
+        states, actions, counts, groups = batch
+        weights = np.ones(len(states)) if counts is None else counts
         folds = self._splitter.assign(states, groups)
         order = np.argsort(folds, kind="stable")
         starts = np.searchsorted(folds[order], np.arange(len(self._folds.parts) + 1))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .movements import Gap, PreparationWarning, differentiate, find_gaps, prepare, resample, trim
-from .recipes import Recipe, guess_recipe
+from .recipes import Recipe, complete_recipe, guess_recipe
 from .surveys import Survey, survey
 
 __all__ = [
@@ -11,6 +11,7 @@ __all__ = [
     "PreparationWarning",
     "Recipe",
     "Survey",
+    "complete_recipe",
     "differentiate",
     "find_gaps",
     "guess_recipe",

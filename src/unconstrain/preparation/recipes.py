@@ -89,6 +89,12 @@ class Recipe:
                 "either the actions are columns, or they are the velocity of the states."
             )
 
+    @property
+    def is_row_by_row(self) -> bool:
+        """Whether each row is prepared without looking at others, so that recordings may be cut anywhere."""
+        whole = (self.rate, self.trim, self.still)
+        return self.actions is not None and not self.centre and all(setting is None for setting in whole)
+
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain values, ready for JSON."""
         return asdict(self)

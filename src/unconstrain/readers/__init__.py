@@ -6,19 +6,19 @@ A new format is one module with a :class:`~unconstrain.readers.table.Format`, li
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 from unconstrain.demonstration import Recording
 from unconstrain.errors import ReadError, SettingError
 
-from . import npz, text
-from .table import ReadFile, unique_names
+from . import hdf5, npz, parquet, text
+from .table import Format, unique_names
 
-__all__ = ["FORMATS", "read"]
+__all__ = ["FORMATS", "expand", "read", "read_blocks"]
 
-FORMATS = (npz.FORMAT, text.FORMAT)
+FORMATS = (npz.FORMAT, parquet.FORMAT, hdf5.FORMAT, text.FORMAT)
 
 PathLike = str | os.PathLike[str]
 
@@ -29,8 +29,9 @@ def read(paths: PathLike | Iterable[PathLike], *, group: str | None = None, time
     Parameters
     ----------
     paths : path or iterable of paths
-        CSV, TSV or semicolon-separated text, or NumPy archives; told apart by
-        suffix, else by content.
+        CSV, TSV or semicolon-separated text, NumPy archives, Parquet or HDF5
+        (extra ``data``); told apart by suffix, else by content. A folder
+        stands for the Parquet files in it.
     group : str, optional
         Column that tells the demonstrations apart. Without it, and without a column that
         is called like one (``demo``, ``trial``, ``bout``, ...), each file is one demonstration.
@@ -49,26 +50,56 @@ def read(paths: PathLike | Iterable[PathLike], *, group: str | None = None, time
     SettingError
         If there is no path, or one column is to be both group and time.
     """
-    files = [Path(path) for path in ([paths] if isinstance(paths, (str, os.PathLike)) else paths)]
-    if not files:
-        raise SettingError("got no file to read, expected at least one path.")
-    if group is not None and group == time:
-        raise SettingError(f"got {group!r} for both group and time, expected two different columns.")
-    recordings = [recording for path in files for recording in _reader(path)(path, group=group, time=time)]
+    recordings = [
+        recording for path in expand(paths) for recording in read_blocks(path, group=group, time=time, whole=True)
+    ]
     names = unique_names(recording.name for recording in recordings)
     return [replace(recording, name=name) for recording, name in zip(recordings, names, strict=True)]
 
 
-def _reader(path: Path) -> ReadFile:
+def read_blocks(
+    path: PathLike, *, group: str | None = None, time: str | None = None, whole: bool = False
+) -> Iterator[Recording]:
+    """Read one file recording by recording, and larger ones by some rows at a time where the format can.
+
+    Blocks of one recording have one name. Parameters and errors as in :func:`read`; with ``whole``
+    each recording comes in one piece.
+    """
+    if group is not None and group == time:
+        raise SettingError(f"got {group!r} for both group and time, expected two different columns.")
+    file = Path(path)
+    known = _format(file)
+    if whole or known.blocks is None:
+        yield from known.read(file, group=group, time=time)
+    else:
+        yield from known.blocks(file, group=group, time=time)
+
+
+def expand(paths: PathLike | Iterable[PathLike]) -> list[Path]:
+    """Files to read, where a folder stands for the Parquet files in it and below, in the order of their names.
+
+    Raises
+    ------
+    SettingError
+        If there is none.
+    """
+    listed = [Path(path) for path in ([paths] if isinstance(paths, (str, os.PathLike)) else paths)]
+    files = [file for path in listed for file in (sorted(path.rglob("*.parquet")) if path.is_dir() else []) or [path]]
+    if not files:
+        raise SettingError("got no file to read, expected at least one path.")
+    return files
+
+
+def _format(path: Path) -> Format:
     if not path.is_file():
         raise ReadError(f"{path}: {'a folder' if path.is_dir() else 'no such file'}, expected the path of a file.")
     for known in FORMATS:
         if path.suffix.lower() in known.suffixes:
-            return known.read
+            return known
     head = _head(path)
     for known in FORMATS:
         if known.recognises(head):
-            return known.read
+            return known
     suffixes = ", ".join(suffix for known in FORMATS for suffix in known.suffixes)
     raise ReadError(f"{path}: neither its suffix nor its content is of a known format. Supported are {suffixes}.")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -11,11 +11,29 @@ import numpy as np
 
 from unconstrain.arrays import Array
 from unconstrain.demonstration import Recording
+from unconstrain.errors import ReadError
 
-__all__ = ["Format", "ReadFile", "seconds", "split_by_group", "unique_names"]
+__all__ = [
+    "GROUP_NAMES",
+    "TIME_NAME",
+    "Format",
+    "ReadBlocks",
+    "ReadFile",
+    "find_roles",
+    "listed",
+    "seconds",
+    "split_by_group",
+    "unique_names",
+]
 
 CLOCKS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
 """Above these magnitudes a stamp counts nano-, micro- or milliseconds since 1970; the length of one in seconds."""
+
+GROUP_NAMES = ("demo", "demonstration", "trial", "bout", "group", "episode", "episode_index", "run")
+"""A column of one of these names, in any case, tells the demonstrations apart."""
+
+TIME_NAME = re.compile(r"(t|times?|timestamps?|stamps?|rosbagtimestamp)([_ \[(]?(s|ms|us|ns)[\])]?)?", re.IGNORECASE)
+"""A column of such a name holds the time stamps: ``t``, ``Time``, ``timestamp``, ``time_s``, ``t[ms]``, ..."""
 
 UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _UNIT_IN_NAME = re.compile(r"[_ \[(](s|ms|us|ns)[\])]?$", re.IGNORECASE)
@@ -28,16 +46,37 @@ class ReadFile(Protocol):
         """Read one file into its recordings."""
 
 
+class ReadBlocks(Protocol):
+    """What a format can do whose files may be larger than memory."""
+
+    def __call__(self, path: Path, *, group: str | None = None, time: str | None = None) -> Iterator[Recording]:
+        """Go through a file by some rows at a time; what is called the same is one recording."""
+
+
 class Format(NamedTuple):
     """A file format: how to know it, and how to read it.
 
     ``suffixes`` in small letters with the dot; ``recognises`` looks at the
-    first bytes of a file whose suffix says nothing.
+    first bytes of a file whose suffix says nothing; ``blocks`` is optional.
     """
 
     suffixes: tuple[str, ...]
     recognises: Callable[[bytes], bool]
     read: ReadFile
+    blocks: ReadBlocks | None = None
+
+
+def find_roles(names: Sequence[str], group: str | None, time: str | None, path: Path) -> tuple[int | None, int | None]:
+    """Where the columns are that name the demonstration and hold the time: as told, else by their names.
+
+    Raises
+    ------
+    ReadError
+        If a column that was told does not exist.
+    """
+    group_at = _find(names, group, "group", {at for at, name in enumerate(names) if name.lower() in GROUP_NAMES}, path)
+    stamped = {at for at, name in enumerate(names) if TIME_NAME.fullmatch(name) and at != group_at}
+    return group_at, _find(names, time, "time", stamped, path)
 
 
 def seconds(stamps: Array, name: str) -> Array:
@@ -107,3 +146,18 @@ def unique_names(names: Iterable[str]) -> tuple[str, ...]:
         taken.add(fresh)
         unique.append(fresh)
     return tuple(unique)
+
+
+def _find(names: Sequence[str], wanted: str | None, role: str, fitting: set[int], path: Path) -> int | None:
+    """Where a column is: by its name, or the first of those that fit."""
+    if wanted is None:
+        return min(fitting, default=None)
+    if wanted not in names:
+        raise ReadError(f"{path}: no column {wanted!r} for {role}; it has {listed(names)}.")
+    return names.index(wanted)
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names with commas between, the first thirty."""
+    more = f" and {len(names) - 30} more" if len(names) > 30 else ""
+    return ", ".join(names[:30]) + more

@@ -25,17 +25,11 @@ from unconstrain.arrays import Array
 from unconstrain.demonstration import Recording
 from unconstrain.errors import ReadError
 
-from .table import Format, seconds, split_by_group, unique_names
+from .table import Format, find_roles, listed, seconds, split_by_group, unique_names
 
-__all__ = ["FORMAT", "GROUP_NAMES", "read_text"]
+__all__ = ["FORMAT", "read_text"]
 
 DELIMITERS = ",\t;"
-GROUP_NAMES = ("demo", "demonstration", "trial", "bout", "group", "episode", "run")
-"""A column of one of these names, in any case, tells the demonstrations apart."""
-
-TIME_NAME = re.compile(r"(t|times?|timestamps?|stamps?|rosbagtimestamp)([_ \[(]?(s|ms|us|ns)[\])]?)?", re.IGNORECASE)
-"""A column of such a name holds the time stamps: ``t``, ``Time``, ``timestamp``, ``time_s``, ``t[ms]``, ..."""
-
 _ROWS_AT_ONCE = 20_000  # bounds the memory: a cell of text takes ten times the space of a number
 _QUOTED = re.compile(r'"[^"]*"')
 
@@ -60,11 +54,11 @@ def read_text(path: Path, *, group: str | None = None, time: str | None = None) 
     path : Path
     group : str, optional
         Column that names the demonstration of each row; its cells may be words or
-        numbers. By default the first column called as in :data:`GROUP_NAMES`;
+        numbers. By default the first column called as in :data:`~unconstrain.readers.table.GROUP_NAMES`;
         without one the file is one demonstration, called as the file.
     time : str, optional
         Column of time stamps. By default the first one called as in
-        :data:`TIME_NAME`; see :func:`~unconstrain.readers.table.seconds` for units.
+        :data:`~unconstrain.readers.table.TIME_NAME`; see :func:`~unconstrain.readers.table.seconds` for units.
 
     Returns
     -------
@@ -92,9 +86,7 @@ def _read_table(file: TextIO, path: Path, group: str | None, time: str | None) -
     rows = _rows(file, delimiter)
     titles, used = _titles(rows, comment, delimiter, path)
     names = unique_names(title or f"column{at + 1}" for at, title in enumerate(titles))
-    group_at = _find(names, group, "group", {at for at, name in enumerate(names) if name.lower() in GROUP_NAMES}, path)
-    stamped = {at for at, name in enumerate(names) if TIME_NAME.fullmatch(name) and at != group_at}
-    time_at = _find(names, time, "time", stamped, path)
+    group_at, time_at = find_roles(names, group, time, path)
     if group is None and group_at == time_at:
         group_at = None
 
@@ -108,7 +100,7 @@ def _read_table(file: TextIO, path: Path, group: str | None, time: str | None) -
     kept = [at for at in range(len(names)) if at not in text | padding | {group_at, time_at}]
     if not kept:
         raise ReadError(
-            f"{path}: no column of numbers; it has {_listed(names)}. "
+            f"{path}: no column of numbers; it has {listed(names)}. "
             "Expected a header, then rows of numbers separated by comma, tab or semicolon, with decimal points."
         )
     times = None if time_at is None or time_at in text else seconds(block.numbers[:, time_at], names[time_at])
@@ -148,15 +140,6 @@ def _titles(rows: Iterator[Row], comment: str, delimiter: str, path: Path) -> tu
             "Add a first line such as 't,x,y,z'."
         )
     return titles, [(line, cells)]
-
-
-def _find(names: Sequence[str], wanted: str | None, role: str, fitting: set[int], path: Path) -> int | None:
-    """Where a column is: by its name, or the first of those that fit."""
-    if wanted is None:
-        return min(fitting, default=None)
-    if wanted not in names:
-        raise ReadError(f"{path}: no column {wanted!r} for {role}; it has {_listed(names)}.")
-    return names.index(wanted)
 
 
 def _collect(
@@ -231,11 +214,6 @@ def _group(row: Row, at: int, names: Sequence[str], path: Path) -> str:
     if not cells[at].strip():
         raise ReadError(f"{path}, line {line}, column {names[at]!r}: empty, expected the name of a demonstration.")
     return cells[at].strip()
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = f" and {len(names) - 30} more" if len(names) > 30 else ""
-    return ", ".join(names[:30]) + more
 
 
 def _recognises(head: bytes) -> bool:

@@ -1,0 +1,187 @@
+"""Samples as they arrive, and the little that has to be known of all before the first is summed.
+
+Nothing here holds more than a block of rows beside what it was given, so
+arrays may be mapped from files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arrays import Array
+from .errors import InvalidDataError
+
+__all__ = ["BLOCK_ROWS", "PLACING_SAMPLES", "Batch", "FirstLook", "Groups", "mixed"]
+
+PLACING_SAMPLES = 20_000
+"""Features and fields are placed on at most this many different states."""
+
+BLOCK_ROWS = 2**17
+"""Rows that are looked at together."""
+
+Groups = Sequence[Hashable] | NDArray[np.generic]
+
+_ALL = np.uint64(2**64 - 1)
+
+
+class Batch(NamedTuple):
+    """Samples that were checked: ``states`` (N, n), ``actions`` (N, d), ``weights`` (N,) and ``groups`` (N,) if given.
+
+    Of any real type; :meth:`blocks` gives float64.
+    """
+
+    states: NDArray[Any]
+    actions: NDArray[Any]
+    weights: Array | None = None
+    groups: NDArray[np.generic] | None = None
+
+    def blocks(self) -> Iterator[Batch]:
+        """Go through it by some rows at a time, without those of no weight."""
+        for start in range(0, len(self.states), BLOCK_ROWS):
+            part = self._at(slice(start, start + BLOCK_ROWS))
+            if part.weights is not None and not part.weights.all():
+                part = part._at(part.weights > 0)  # a weight of zero is the same as not being there
+            if len(part.states):
+                states, actions = (np.asarray(table, dtype=np.float64) for table in part[:2])
+                yield part._replace(states=states, actions=actions)
+
+    def _at(self, rows: slice | NDArray[np.bool_]) -> Batch:
+        states, actions, weights, groups = self
+        return Batch(
+            states[rows],
+            actions[rows],
+            None if weights is None else weights[rows],
+            None if groups is None else groups[rows],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class FirstLook:
+    """What features, fields and folds are chosen by. First looks add, in the order of the samples.
+
+    Parameters
+    ----------
+    weight : float
+        ``Σ w``.
+    mean, scatter : ndarray, shape (n,)
+        Weighted mean of the states, and ``Σ w (x − mean)²``.
+    size : ndarray, shape (n,)
+        Largest absolute value of each state.
+    actions : int
+        Dimension d of the actions.
+    fastest : float
+        Largest absolute value in the actions.
+    keys : ndarray of uint64, shape (K,)
+        Hashes of different states, ascending: the smallest of all, at most :data:`PLACING_SAMPLES`.
+        So the choice depends neither on the order of the samples nor on how they come in batches.
+    states : ndarray, shape (K, n)
+        Those states.
+    groups : dict, optional
+        Names of the demonstrations, in the order of first appearance.
+    """
+
+    weight: float
+    mean: Array
+    scatter: Array
+    size: Array
+    actions: int
+    fastest: float
+    keys: NDArray[np.uint64]
+    states: Array
+    groups: dict[Hashable, None] | None
+
+    @classmethod
+    def at(cls, batch: Batch) -> FirstLook | None:
+        """Look at a batch; None if it is empty but for samples of no weight."""
+        look: FirstLook | None = None
+        for block in batch.blocks():
+            full = look is not None and len(look.keys) == PLACING_SAMPLES
+            further = cls._at_block(block, look.keys[-1] if look is not None and full else _ALL)
+            look = further if look is None else look + further
+        return look
+
+    @classmethod
+    def _at_block(cls, block: Batch, largest_key: np.uint64) -> FirstLook:
+        states, actions, weights, groups = block
+        counts = np.ones(len(states)) if weights is None else weights
+        weight = float(counts.sum())
+        shares = counts / weight
+        mean = shares @ states
+        keys = mixed((states + 0.0).view(np.uint64).T, 0)
+        low = keys <= largest_key
+        keys, first = np.unique(keys[low], return_index=True)
+        return cls(
+            weight,
+            mean,
+            weight * (shares @ (states - mean) ** 2),
+            np.abs(states).max(axis=0),
+            actions.shape[1],
+            float(np.abs(actions).max()),
+            keys[:PLACING_SAMPLES],
+            states[low][first[:PLACING_SAMPLES]],
+            None if groups is None else dict.fromkeys(in_order(groups)),
+        )
+
+    def __add__(self, other: FirstLook) -> FirstLook:
+        """Look at both, this one first.
+
+        Raises
+        ------
+        InvalidDataError
+            If they differ in the number of columns, or only one names its demonstrations.
+        """
+        for what, mine, theirs in (
+            ("states", len(self.mean), len(other.mean)),
+            ("actions", self.actions, other.actions),
+        ):
+            if mine != theirs:
+                raise InvalidDataError(f"{what}: got {theirs} columns, expected {mine} as before.")
+        if (self.groups is None) != (other.groups is None):
+            raise InvalidDataError("groups: got them for some batches only, expected them for all or for none.")
+        weight = self.weight + other.weight
+        gap, share = other.mean - self.mean, other.weight / weight
+        keys, first = np.unique(np.concatenate([self.keys, other.keys]), return_index=True)
+        first = first[:PLACING_SAMPLES]
+        return FirstLook(
+            weight,
+            self.mean + share * gap,
+            self.scatter + other.scatter + self.weight * share * gap**2,
+            np.maximum(self.size, other.size),
+            self.actions,
+            max(self.fastest, other.fastest),
+            keys[:PLACING_SAMPLES],
+            np.concatenate([self.states, other.states])[first],
+            None if self.groups is None else self.groups | (other.groups or {}),
+        )
+
+    @staticmethod
+    def total(looks: Iterable[FirstLook | None]) -> FirstLook | None:
+        """Sum of several, in their order; None if nothing was seen."""
+        whole: FirstLook | None = None
+        for look in looks:
+            whole = look if whole is None else whole if look is None else whole + look
+        return whole
+
+
+def in_order(names: Groups) -> list[Hashable]:
+    """Different names in the order of first appearance."""
+    different, first = np.unique(np.asarray(names), return_index=True)
+    ordered: list[Hashable] = different[np.argsort(first)].tolist()
+    return ordered
+
+
+def mixed(columns: NDArray[np.uint64], seed: int) -> NDArray[np.uint64]:
+    """A hash for each row of a table, given by columns (k, N): SplitMix64's finaliser, shape (N,)."""
+    hashes = np.full(columns.shape[1], seed % 2**32 + 1, dtype=np.uint64)
+    with np.errstate(over="ignore"):
+        for column in columns:
+            hashes = (hashes ^ column) * np.uint64(0x9E3779B97F4A7C15)
+            hashes = (hashes ^ (hashes >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+            hashes = (hashes ^ (hashes >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+            hashes ^= hashes >> np.uint64(31)
+    return hashes

@@ -1,0 +1,377 @@
+"""However the samples arrive, in blocks, from files, in any order, what is learnt is the same."""
+
+import pickle
+import sys
+import tracemalloc
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+import unconstrain as uc
+from conftest import POLICIES
+from samples import draw
+from unconstrain import batches, streams
+from unconstrain.batches import Batch, FirstLook
+from unconstrain.errors import InvalidDataError, MissingExtraError, ReadError, SettingError
+from unconstrain.preparation import Recipe
+from unconstrain.readers import hdf5, parquet, read_blocks
+
+DATA = draw(samples=400, groups=7)
+
+
+def same(one, other, tolerance=1e-9):
+    """Whether two policies learnt the same: places, folds, sums and answers."""
+    assert_array_equal(one.solution_.determined, other.solution_.determined)
+    for mine, theirs in zip(one._folds.parts, other._folds.parts, strict=True):
+        for a, b in zip(mine.sums, theirs.sums, strict=True):
+            assert_allclose(a, b, rtol=1e-11, atol=1e-11 * max(1.0, np.abs(b).max()))
+    assert_allclose(one(DATA.states), other(DATA.states), atol=tolerance)
+
+
+def cut(size, *arrays):
+    return [tuple(array[at : at + size] for array in arrays) for at in range(0, len(arrays[0]), size)]
+
+
+# Batches
+
+
+@pytest.mark.parametrize("size", [1, 7, 150, 1000])
+@pytest.mark.parametrize("kind", POLICIES)
+def test_batches_are_the_same_as_all_at_once(kind, size):
+    make = POLICIES[kind]
+    whole = make(uc.Hybrid()).fit(DATA.states, DATA.actions)
+    same(make(uc.Hybrid()).fit_batches(cut(size, DATA.states, DATA.actions)), whole)
+
+
+@given(size=st.integers(1, 400), seed=st.integers(0, 99))
+def test_batches_with_weights_and_groups_are_the_same_too(size, seed):
+    weights = np.random.default_rng(seed).integers(0, 3, 400).astype(float)
+    weights[::size] = 1.0  # no batch without any
+    whole = uc.ParametricPolicy(uc.KMeansRBF(7)).fit(DATA.states, DATA.actions, weights, DATA.groups)
+    batched = cut(size, DATA.states, DATA.actions, weights, DATA.groups)
+    same(uc.ParametricPolicy(uc.KMeansRBF(7)).fit_batches(batched), whole)
+
+
+def test_blocks_within_one_array_are_the_same_too(monkeypatch):
+    whole = uc.ParametricPolicy(uc.KMeansRBF(7)).fit(DATA.states, DATA.actions, groups=DATA.groups)
+    monkeypatch.setattr(batches, "BLOCK_ROWS", 33)
+    blocked = uc.ParametricPolicy(uc.KMeansRBF(7)).fit(DATA.states, DATA.actions, groups=DATA.groups)
+    same(blocked, whole)
+    assert blocked.score(DATA.states, DATA.actions) == pytest.approx(whole.score(DATA.states, DATA.actions), abs=1e-12)
+
+
+def test_a_generator_is_walked_once_and_its_first_batch_decides():
+    batched = cut(150, DATA.states, DATA.actions)
+    one = uc.ParametricPolicy(uc.KMeansRBF(7)).fit_batches(batch for batch in batched)
+    other = uc.ParametricPolicy(uc.KMeansRBF(7))
+    for states, actions in batched:
+        other.partial_fit(states, actions)
+    same(one, other)
+
+
+def test_it_learns_on_after_batches():
+    batched = cut(150, DATA.states, DATA.actions)
+    one = uc.ParametricPolicy(uc.Affine()).fit_batches(batched[:2]).partial_fit(*batched[2])
+    assert one.moments_.weight[0] == 400
+
+
+@pytest.mark.parametrize("nothing", [[], iter([])])
+def test_no_batch_is_refused(nothing):
+    with pytest.raises(InvalidDataError, match="got no sample that counts"):
+        uc.ParametricPolicy().fit_batches(nothing)
+
+
+def test_batches_that_do_not_fit_together_are_refused():
+    states, actions = DATA.states[:50], DATA.actions[:50]
+    with pytest.raises(InvalidDataError, match="actions: got 1 columns, expected 2 as before"):
+        uc.ParametricPolicy().fit_batches([(states, actions), (states, actions[:, :1])])
+    with pytest.raises(InvalidDataError, match="features"):
+        uc.ParametricPolicy().fit_batches([(states, actions), (states[:, :1], actions)])
+    with pytest.raises(InvalidDataError, match="groups: got them for some batches only"):
+        uc.ParametricPolicy().fit_batches([(states, actions), (states, actions, None, np.zeros(50))])
+
+
+def test_bad_numbers_far_into_an_array_are_named(monkeypatch):
+    states = DATA.states.copy()
+    states[317, 1] = np.nan
+    monkeypatch.setattr("unconstrain.arrays._ROWS", 50)
+    with pytest.raises(InvalidDataError, match=r"states: found nan at row 317, column 1 \(NaN or infinity in 1 places"):
+        uc.ParametricPolicy().fit(states, DATA.actions)
+
+
+# First looks
+
+
+@pytest.mark.parametrize("at_most", [50, 1000])
+@given(cuts=st.lists(st.integers(1, 399), max_size=5), seed=st.integers(0, 9))
+def test_first_looks_add_and_order_moves_no_sample(at_most, cuts, seed):
+    order = np.random.default_rng(seed).permutation(400)
+    parts = np.split(order, sorted(set(cuts)))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(batches, "PLACING_SAMPLES", at_most)
+        whole = FirstLook.at(Batch(DATA.states, DATA.actions))
+        total = FirstLook.total(FirstLook.at(Batch(DATA.states[rows], DATA.actions[rows])) for rows in parts)
+    assert len(whole.states) == min(at_most, 400)
+    assert_array_equal(total.states, whole.states)
+    assert_array_equal(total.size, np.abs(DATA.states).max(axis=0))
+    assert total.fastest == np.abs(DATA.actions).max()
+    assert_allclose(total.mean, DATA.states.mean(axis=0), atol=1e-14)
+    assert_allclose(total.scatter / total.weight, DATA.states.var(axis=0), rtol=1e-12)
+
+
+def test_what_is_chosen_is_spread_over_all_samples(monkeypatch):
+    monkeypatch.setattr(batches, "PLACING_SAMPLES", 500)
+    states = np.arange(10_000.0)[:, None]
+    chosen = FirstLook.at(Batch(states, states)).states[:, 0]
+    assert_allclose(np.histogram(chosen, 5, (0, 10_000))[0], 100, atol=40)
+    assert not np.isin(np.diff(np.sort(chosen)), 20).all()
+
+
+def test_demonstrations_keep_their_order():
+    looks = [
+        FirstLook.at(Batch(np.ones((3, 1)), np.ones((3, 1)), None, np.array(list(names)))) for names in ("bab", "cab")
+    ]
+    assert list(FirstLook.total(looks).groups) == ["b", "a", "c"]
+
+
+# Memory
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_arrays_mapped_from_files_are_not_copied(tmp_path, dtype):
+    rows, rng = 1_000_000, np.random.default_rng(0)
+    mapped = []
+    for name in ("x", "u"):
+        array = np.lib.format.open_memmap(tmp_path / f"{name}.npy", "w+", dtype, (rows, 4))
+        array[:] = rng.standard_normal((rows, 4))
+        array.flush()
+        del array
+        mapped.append(np.load(tmp_path / f"{name}.npy", mmap_mode="r"))
+    policy = uc.ParametricPolicy(uc.Affine(), uc.Direct())
+    policy.fit(*(array[:1000] for array in mapped))
+    tracemalloc.start()
+    try:
+        policy.fit(*mapped)
+        policy.score(*mapped)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 48e6 < 2 * rows * 4 * 8
+    assert policy.moments_.weight[0] == rows
+
+
+# Files
+
+
+@pytest.fixture
+def table():
+    """Columns of three demonstrations."""
+    times = np.concatenate([np.arange(n) * 0.05 for n in (120, 180, 100)])
+    return {
+        "t": times,
+        "demo": np.repeat(["b", "a", "c"], (120, 180, 100)),
+        **{name: DATA.states[:, i] for i, name in enumerate(("x", "y"))},
+        **{name: DATA.actions[:, i] for i, name in enumerate(("vx", "vy"))},
+    }
+
+
+def write_parquet(path, table, **options):
+    arrow = pytest.importorskip("pyarrow")
+    pytest.importorskip("pyarrow.parquet").write_table(arrow.table(table), path, **options)
+    return path
+
+
+def write_hdf5(path, table):
+    with pytest.importorskip("h5py").File(path, "w") as file:
+        for name, values in table.items():
+            file[name] = values.astype("S") if values.dtype.kind == "U" else values
+    return path
+
+
+def write_csv(path, table):
+    rows = zip(*(values.tolist() for values in table.values()), strict=True)
+    path.write_text("\n".join([",".join(table), *(",".join(map(str, row)) for row in rows)]))
+    return path
+
+
+WRITERS = {"parquet": write_parquet, "h5": write_hdf5, "csv": write_csv}
+
+
+def in_rows(table, rows):
+    return {name: values[rows] for name, values in table.items()}
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_each_format_says_the_same(tmp_path, table, suffix):
+    recordings = uc.read(WRITERS[suffix](tmp_path / f"wipes.{suffix}", table))
+    assert [recording.name for recording in recordings] == ["b", "a", "c"]
+    assert [len(recording) for recording in recordings] == [120, 180, 100]
+    for recording, start in zip(recordings, (0, 120, 300), strict=True):
+        rows = slice(start, start + len(recording))
+        assert_array_equal(recording.select(["x", "y"]), DATA.states[rows])
+        assert_array_equal(recording.select(["vx", "vy"]), DATA.actions[rows])
+        assert_array_equal(recording.times, table["t"][rows])
+
+
+@pytest.mark.parametrize("suffix", ["parquet", "h5"])
+def test_content_tells_them_without_a_suffix(tmp_path, table, suffix):
+    path = WRITERS[suffix](tmp_path / f"wipes.{suffix}", table).rename(tmp_path / "wipes.data")
+    assert len(uc.read(path)) == 3
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_a_stream_of_files_is_the_same_as_reading_them_all(tmp_path, table, suffix, monkeypatch):
+    for number, rows in enumerate((slice(0, 120), slice(120, 400))):
+        WRITERS[suffix](tmp_path / f"wipes_{number}.{suffix}", in_rows(table, rows))
+    files = sorted(tmp_path.iterdir())
+    recipe = Recipe(states=("x", "y"), actions=("vx", "vy"))
+    whole = uc.LocallyLinearPolicy(0.5).fit_demonstrations(uc.prepare(uc.read(files), recipe), speed_power=1.0)
+    for module in (streams, parquet, hdf5):
+        monkeypatch.setattr(module, "BLOCK_ROWS", 50)
+    for held in (0, 2**20):
+        monkeypatch.setattr(streams, "HELD_BYTES", held)
+        stream = uc.Stream(files, recipe, speed_power=1.0)
+        streamed = uc.LocallyLinearPolicy(0.5).fit_batches(stream)
+        assert_allclose(streamed(DATA.states), whole(DATA.states), atol=1e-8)
+        assert_array_equal(streamed.solution_.determined, whole.solution_.determined)
+        assert len(list(stream)) > 2
+
+
+def test_a_stream_holds_what_is_small_and_reads_the_rest_again(tmp_path, table, monkeypatch):
+    path = write_csv(tmp_path / "wipes.csv", table)
+    reads = []
+    monkeypatch.setattr(streams, "read_blocks", lambda *a, **k: reads.append(1) or read_blocks(*a, **k))
+    recipe = Recipe(states=("x", "y"), actions=("vx", "vy"))
+    for held, expected in ((2**20, 1), (0, 3)):
+        monkeypatch.setattr(streams, "HELD_BYTES", held)
+        reads.clear()
+        stream = uc.Stream(path, recipe)
+        for _ in range(3):
+            assert sum(len(batch.states) for batch in stream) == 400
+        assert len(reads) == expected
+
+
+def test_parts_of_a_stream_say_what_the_stream_says(tmp_path, table):
+    for number, rows in enumerate((slice(0, 120), slice(120, 400))):
+        write_csv(tmp_path / f"{number}.csv", in_rows(table, rows))
+    stream = uc.Stream(sorted(tmp_path.iterdir()), speed_power=2.0)
+    [whole] = stream
+    parts = [batch for part in stream.parts() for batch in pickle.loads(pickle.dumps(part))]
+    for mine, theirs in zip(whole, map(np.concatenate, zip(*parts, strict=True)), strict=True):
+        assert_array_equal(mine, theirs)
+
+
+def test_a_recipe_that_needs_neighbours_keeps_recordings_whole(tmp_path, table, monkeypatch):
+    path = write_parquet(tmp_path / "wipes.parquet", table)
+    monkeypatch.setattr(parquet, "BLOCK_ROWS", 50)
+    by_rows = uc.Stream(path, Recipe(states=("x", "y"), actions=("vx", "vy")))
+    smoothed = uc.Stream(path, Recipe(states=("x", "y"), differentiate="savgol"))
+    assert max(len(demo) for _, demo in by_rows.named_demonstrations()) == 50
+    assert [len(demo) for _, demo in smoothed.named_demonstrations()] == [120, 180, 100]
+    assert len({name for name, _ in by_rows.named_demonstrations()}) == 3
+
+
+def test_a_folder_stands_for_the_parquet_files_in_it(tmp_path, table):
+    (tmp_path / "set" / "day=1").mkdir(parents=True)
+    write_parquet(tmp_path / "set" / "b.parquet", in_rows(table, slice(120, 300)))
+    write_parquet(tmp_path / "set" / "day=1" / "a.parquet", in_rows(table, slice(0, 120)))
+    assert [recording.name for recording in uc.read(tmp_path / "set")] == ["a", "b"]
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(ReadError, match="a folder, expected the path of a file"):
+        uc.read(tmp_path / "empty")
+
+
+# Parquet
+
+
+def test_lists_become_numbered_columns(tmp_path):
+    columns = {"state": DATA.states.tolist(), "action": DATA.actions.tolist(), "episode_index": DATA.groups}
+    recordings = uc.read(write_parquet(tmp_path / "a.parquet", columns))
+    assert recordings[0].columns == ("state1", "state2", "action1", "action2")
+    assert [recording.name for recording in recordings] == [str(number) for number in range(7)]
+    assert_array_equal(recordings[2].values[:, :2], DATA.states[DATA.groups == 2])
+
+
+def test_kinds_of_numbers_in_parquet(tmp_path):
+    stamps = np.array(["2024-01-01T00:00:00.0", "2024-01-01T00:00:00.5"], "datetime64[us]")
+    columns = {"timestamp": stamps, "x": [1, None], "on": [True, False], "said": ["a", "b"], "v": np.float32([0.5, 1])}
+    [recording] = uc.read(write_parquet(tmp_path / "a.parquet", columns))
+    assert recording.columns == ("x", "on", "v")
+    assert_array_equal(recording.values, [[1, 1, 0.5], [np.nan, 0, 1]])
+    assert_array_equal(recording.times, [0.0, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("columns", "sentence"),
+    [
+        ({"said": ["a", "b"]}, "no column of numbers; it has said"),
+        ({"x": [[1.0], [1.0, 2.0]]}, "column 'x': its lists are of different lengths"),
+        ({"x": [1.0, 2.0], "time": ["a", "b"]}, "column 'time': is of type string, expected time stamps as numbers"),
+        ({"x": np.empty(0)}, "no rows, expected at least one"),
+    ],
+)
+def test_what_parquet_cannot_say_is_refused(tmp_path, columns, sentence):
+    with pytest.raises(ReadError, match=sentence):
+        uc.read(write_parquet(tmp_path / "a.parquet", columns))
+
+
+# HDF5
+
+
+def test_groups_of_hdf5_are_recordings(tmp_path):
+    with pytest.importorskip("h5py").File(tmp_path / "a.h5", "w") as file:
+        for number in (0, 1):
+            group = file.create_group(f"data/demo_{number}")
+            group["states"], group["actions"] = DATA.states[DATA.groups == number], DATA.actions[DATA.groups == number]
+            group["times"] = np.arange((DATA.groups == number).sum()) * 0.1
+            group["notes"] = "free text"
+    recordings = uc.read(tmp_path / "a.h5")
+    assert [recording.name for recording in recordings] == ["data/demo_0", "data/demo_1"]
+    assert recordings[0].columns == ("u1", "u2", "x1", "x2")
+    assert_array_equal(recordings[1].select(["x1", "x2"]), DATA.states[DATA.groups == 1])
+    assert_allclose(np.diff(recordings[1].times), 0.1)
+
+
+def test_roles_in_hdf5_may_be_told(tmp_path, table):
+    path = write_hdf5(tmp_path / "a.h5", {"clock": table["t"], "who": table["demo"], "x": table["x"]})
+    assert [recording.name for recording in uc.read(path, group="who", time="clock")] == ["b", "a", "c"]
+    with pytest.raises(ReadError, match="no column 'whom' for group; it has clock, who, x"):
+        uc.read(path, group="whom")
+
+
+@pytest.mark.parametrize(
+    ("sets", "sentence"),
+    [
+        (
+            {"x": np.zeros(3), "y": np.zeros(4)},
+            r"of different lengths, x \(3\), y \(4\); expected one length",
+        ),
+        ({"x": np.zeros((2, 2, 2))}, "no data sets of numbers in one or two dimensions"),
+        ({"t": np.zeros(3)}, "no column of numbers; it has t"),
+    ],
+)
+def test_what_hdf5_cannot_say_is_refused(tmp_path, sets, sentence):
+    with pytest.raises(ReadError, match=sentence):
+        uc.read(write_hdf5(tmp_path / "a.h5", sets))
+
+
+@pytest.mark.parametrize(("suffix", "module"), [("parquet", "pyarrow"), ("h5", "h5py")])
+def test_damaged_files_and_missing_extras_are_said(tmp_path, monkeypatch, suffix, module):
+    pytest.importorskip(module)
+    path = tmp_path / f"a.{suffix}"
+    path.write_bytes(b"PAR1 or not" * 20)
+    with pytest.raises(ReadError, match=rf"a\.{suffix}: cannot be read"):
+        uc.read(path)
+    for name in [name for name in sys.modules if name.partition(".")[0] == module]:
+        monkeypatch.setitem(sys.modules, name, None)
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(MissingExtraError, match=r"unconstrain\[data\]"):
+        uc.read(path)
+
+
+def test_a_stream_of_nothing_is_refused():
+    with pytest.raises(SettingError, match="got no file to read"):
+        uc.Stream([])
