@@ -97,7 +97,7 @@ def test_batches_that_do_not_fit_together_are_refused():
 def test_bad_numbers_far_into_an_array_are_named(monkeypatch):
     states = DATA.states.copy()
     states[317, 1] = np.nan
-    monkeypatch.setattr("unconstrain.arrays._ROWS", 50)
+    monkeypatch.setattr("unconstrain.arrays.BLOCK_ROWS", 50)
     with pytest.raises(InvalidDataError, match=r"states: found nan at row 317, column 1 \(NaN or infinity in 1 places"):
         uc.ParametricPolicy().fit(states, DATA.actions)
 

@@ -49,7 +49,7 @@ _HOME = {
     "stack": "demonstration",
     "upe": "metrics",
 }
-_ROOMS = ("constraints", "datasets", "errors", "experiments", "preparation", "readers", "systems")
+_ROOMS = ("cluster", "constraints", "datasets", "errors", "experiments", "preparation", "readers", "systems")
 
 __all__ = sorted([*_HOME, *_ROOMS])
 

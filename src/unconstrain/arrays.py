@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import InvalidDataError, MissingExtraError, SettingError
 
 __all__ = [
+    "BLOCK_ROWS",
     "LARGEST",
     "SMALLEST_VARIANCE",
     "Array",
@@ -36,8 +37,8 @@ Array = NDArray[np.float64]
 LARGEST = 1e30
 """Numbers beyond this are refused: fillers for missing values are, and products of several must stay finite."""
 
-_ROWS = 2**17
-"""Rows that are checked together."""
+BLOCK_ROWS = 2**16
+"""Rows of large tables that are read, checked and summed together."""
 
 SMALLEST_VARIANCE = 1e-100
 """Variances down to this are refused, and states that spread less count as one: their squares lose digits."""
@@ -217,7 +218,7 @@ def _as_real(values: ArrayLike, what: str, convert: bool = True) -> Array:
 
 
 def _finite(values: Array, what: str) -> Array:
-    if all(_is_sensible(values[start : start + _ROWS]) for start in range(0, len(values), _ROWS)):
+    if all(_is_sensible(values[start : start + BLOCK_ROWS]) for start in range(0, len(values), BLOCK_ROWS)):
         return values
     return _refuse(values.astype(np.float64, copy=False), what)
 

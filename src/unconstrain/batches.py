@@ -13,16 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Array
+from .arrays import BLOCK_ROWS, Array
 from .errors import InvalidDataError
 
-__all__ = ["BLOCK_ROWS", "PLACING_SAMPLES", "Batch", "FirstLook", "Groups", "mixed"]
+__all__ = ["PLACING_SAMPLES", "Batch", "FirstLook", "Groups", "mixed"]
 
 PLACING_SAMPLES = 20_000
 """Features and fields are placed on at most this many different states."""
-
-BLOCK_ROWS = 2**17
-"""Rows that are looked at together."""
 
 Groups = Sequence[Hashable] | NDArray[np.generic]
 

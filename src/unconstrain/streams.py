@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Array, check_at_least
-from .batches import BLOCK_ROWS, Batch
+from .arrays import BLOCK_ROWS, Array, check_at_least
+from .batches import Batch
 from .demonstration import Demonstration, Recording
 from .preparation import Recipe, complete_recipe, prepare
 from .readers import expand, read_blocks
 
 __all__ = ["HELD_BYTES", "Stream"]
 
-HELD_BYTES = 2**28
+HELD_BYTES = 2**25
 """Demonstrations that take no more than this in all are kept after the first walk, so that files are read once."""
 
 
@@ -82,7 +82,7 @@ class Stream:
         return float(np.linalg.norm(actions, axis=1).max()) or 1.0
 
     def __iter__(self) -> Iterator[Batch]:
-        """Batches of at least :data:`~unconstrain.batches.BLOCK_ROWS` samples, but for the last."""
+        """Batches of at least :data:`~unconstrain.arrays.BLOCK_ROWS` samples, but for the last."""
         waiting: list[tuple[str, Demonstration]] = []
         for named in self.named_demonstrations():
             waiting.append(named)

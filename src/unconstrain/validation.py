@@ -136,6 +136,11 @@ class Splitter:
         if self.by == "demonstration":
             self._deal(look.groups or ())
 
+    @property
+    def typical(self) -> Array:
+        """A state in the midst of those at first look, shape (n,)."""
+        return self._origin
+
     def assign(self, states: Array, groups: Groups | None) -> NDArray[np.intp]:
         """Folds of some samples, shape (N,).
 

@@ -120,6 +120,7 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     "--hold-out", type=click.Choice(["auto", "demonstration", "sample"]), default="auto", help="What a fold holds."
 )
 @click.option("--report", type=click.Path(dir_okay=False), help="Also write an HTML report there.")
+@click.option("--scheduler", metavar="ADDRESS", help="Compute on the dask cluster of this scheduler.")
 def fit(
     files: Sequence[str],
     output: str,
@@ -133,9 +134,13 @@ def fit(
     folds: int,
     hold_out: Any,
     report: str | None,
+    scheduler: str | None,
     **reading: Any,
 ) -> None:
-    """Learn a policy from the demonstrations in FILEs."""
+    """Learn a policy from the demonstrations in FILEs.
+
+    What does not fit into memory is read twice, one file or block at a time.
+    """
     from .. import features, policies, storage, validation
 
     paths = expanded(files)
@@ -158,11 +163,17 @@ def fit(
     else:
         shape = features.KMeansRBF(centres or 25) if model == "rbf" else features.Affine()
         policy = policies.ParametricPolicy(shape, **chosen)
-    policy.fit_batches(stream)
+    if scheduler is None:
+        policy.fit_batches(stream)
+    else:
+        from .. import cluster
+
+        with cluster.connected(scheduler) as client:
+            cluster.fit_batches(policy, stream.parts(), client=client)
     notes = {"recipe": stream.recipe.to_dict(), "group": reading["group"], "time": reading["time"]}
     storage.save(policy, output, notes)
     click.echo(f"Learnt from {said_recipe(stream.recipe)}.")
-    say_fit(policy, stream, learner)
+    say_fit(policy, stream if scheduler is None else None, learner)
     click.echo(f"policy: {output}")
     if report is not None:
         from ..report import policy_page

@@ -89,12 +89,19 @@ def _cell(value: Any) -> str:
     return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
-def say_fit(policy: Policy, stream: Stream, learner: str) -> None:
-    """Say what was learnt, how much the data determined, and how well it holds where held out."""
+def say_fit(policy: Policy, stream: Stream | None, learner: str) -> None:
+    """Say what was learnt, how much the data determined, and how well it holds where held out.
+
+    Without a stream nothing is said that would need to look at the samples again.
+    """
     solution = policy.solution_
-    names, samples, training = _walked(policy, stream)
     models = f", {len(solution.weights)} local models" if len(solution.weights) > 1 else ""
-    click.echo(f"{names} demonstrations, {samples} samples{models}.")
+    training = 0.0
+    if stream is not None:
+        names, samples, training = _walked(policy, stream)
+        click.echo(f"{names} demonstrations, {samples} samples{models}.")
+    elif models:
+        click.echo(f"{models.removeprefix(', ')}.")
     if learner != "direct":
         rest = "; the rest follows the standard risk." if learner == "hybrid" and solution.determined_share < 1 else "."
         click.echo(
@@ -106,10 +113,11 @@ def say_fit(policy: Policy, stream: Stream, learner: str) -> None:
             click.echo("Note: nothing was determined, so this is the same as --learner direct.", err=True)
     held_out = 1.0 - policy.held_out_score()
     click.echo(
-        f"share of the observed motion that it misses (inconsistency): {training:.4g} on the training data"
-        + (f", {held_out:.4g} where held out." if isfinite(held_out) else "; nothing could be held out.")
+        "share of the observed motion that it misses (inconsistency): "
+        + ("" if stream is None else f"{training:.4g} on the training data, ")
+        + (f"{held_out:.4g} where held out." if isfinite(held_out) else "nothing could be held out.")
     )
-    if held_out > 0.05 + 2.0 * training:
+    if stream is not None and held_out > 0.05 + 2.0 * training:
         click.echo(
             "Note: much is missed where held out. Against noise at low speed a wider --window, --speed-power 2 or "
             "--still help; otherwise the demonstrations may have too little in common.",

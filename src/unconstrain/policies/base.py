@@ -293,29 +293,38 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         self._splitter = Splitter(validation, look, more)
         # In a fixed order: repetition and order of the samples must not move the features.
         self._place(np.unique(look.states, axis=0))
-        one = np.zeros((1, look.actions))
-        features, actions, in_models = self._block(look.states[:1], one, np.ones(1))
-        empty = Moments.zero(in_models.shape[1], actions.shape[1], features.shape[1])
-        self._folds = FoldedMoments((empty,) * validation.count, validation.held_out)
+        self._folds = self._nothing()
         return self
 
     def _learn(self, batches: Iterable[Batch]) -> Self:
-        self._folds = sum((self._gather(block) for batch in batches for block in batch.blocks()), start=self._folds)
+        self._folds = self._folds + self._summed(batches)
         self._conclude()
         return self
 
-    def _gather(self, batch: Batch) -> FoldedMoments:
+    def _nothing(self) -> FoldedMoments:
+        """Moments of no sample."""
+        typical = self._splitter.typical[None]
+        features, actions, in_models = self._block(typical, np.zeros((1, self.n_outputs_)), np.ones(1))
+        empty = Moments.zero(in_models.shape[1], actions.shape[1], features.shape[1])
+        validation = self._splitter.validation
+        return FoldedMoments((empty,) * validation.count, validation.held_out)
+
+    def _summed(self, batches: Iterable[Batch]) -> FoldedMoments:
+        folds = self._nothing()
+        return sum((self._gather(block, folds) for batch in batches for block in batch.blocks()), start=folds)
+
+    def _gather(self, batch: Batch, like: FoldedMoments) -> FoldedMoments:
         states, actions, counts, groups = batch
         weights = np.ones(len(states)) if counts is None else counts
         folds = self._splitter.assign(states, groups)
         order = np.argsort(folds, kind="stable")
-        starts = np.searchsorted(folds[order], np.arange(len(self._folds.parts) + 1))
-        models, d, p = self._folds.parts[0].cross.shape
+        starts = np.searchsorted(folds[order], np.arange(len(like.parts) + 1))
+        models, d, p = like.parts[0].cross.shape
         parts = []
         for start, stop in pairwise(starts):
             blocks = (self._block(states[rows], actions[rows], weights[rows]) for rows in _chunks(order[start:stop]))
             parts.append(gather_blocks(blocks, models, d, p, self._at_rest))
-        return FoldedMoments(tuple(parts), self._folds.held_out)
+        return FoldedMoments(tuple(parts), like.held_out)
 
     def _block(self, states: Array, actions: Array, weights: Array) -> tuple[Array, Array, Array]:
         """Features, actions, and how much each sample counts in each model."""

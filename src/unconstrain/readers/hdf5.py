@@ -15,15 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from unconstrain.arrays import Array, require_extra
+from unconstrain.arrays import BLOCK_ROWS, Array, require_extra
 from unconstrain.demonstration import Recording
 from unconstrain.errors import ReadError
 
 from .table import Format, find_roles, listed, seconds, split_by_group
 
-__all__ = ["BLOCK_ROWS", "FORMAT", "read_hdf5", "read_hdf5_blocks"]
+__all__ = ["FORMAT", "read_hdf5", "read_hdf5_blocks"]
 
-BLOCK_ROWS = 2**17
 
 _SHORT = {"states": "x", "actions": "u"}
 _ROLES = {"groups": "group", "times": "time"}
@@ -53,7 +52,7 @@ def read_hdf5(path: Path, *, group: str | None = None, time: str | None = None) 
 
 
 def read_hdf5_blocks(path: Path, *, group: str | None = None, time: str | None = None) -> Iterator[Recording]:
-    """Go through one file, never holding more than :data:`BLOCK_ROWS` rows."""
+    """Go through one file, never holding more than :data:`~unconstrain.arrays.BLOCK_ROWS` rows."""
     return _recordings(path, group, time, BLOCK_ROWS)
 
 

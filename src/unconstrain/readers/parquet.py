@@ -11,15 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from unconstrain.arrays import Array, require_extra
+from unconstrain.arrays import BLOCK_ROWS, Array, require_extra
 from unconstrain.demonstration import Recording
 from unconstrain.errors import ReadError
 
 from .table import Format, find_roles, listed, seconds, split_by_group, unique_names
 
-__all__ = ["BLOCK_ROWS", "FORMAT", "read_parquet", "read_parquet_blocks"]
-
-BLOCK_ROWS = 2**17
+__all__ = ["FORMAT", "read_parquet", "read_parquet_blocks"]
 
 
 def read_parquet(path: Path, *, group: str | None = None, time: str | None = None) -> list[Recording]:
@@ -47,9 +45,9 @@ def read_parquet(path: Path, *, group: str | None = None, time: str | None = Non
 
 
 def read_parquet_blocks(path: Path, *, group: str | None = None, time: str | None = None) -> Iterator[Recording]:
-    """Go through one file, never holding more than a block of :data:`BLOCK_ROWS` rows."""
+    """Go through one file, never holding more than a block of :data:`~unconstrain.arrays.BLOCK_ROWS` rows."""
     with _opened(path) as file:
-        batches = file.iter_batches(batch_size=BLOCK_ROWS)
+        batches = file.iter_batches(batch_size=BLOCK_ROWS, use_threads=False)
         while (batch := _checked(path, lambda: next(batches, None))) is not None:
             yield from _recordings(batch, path, group, time)
 

@@ -1,0 +1,110 @@
+"""Learning from more samples than fit into memory: time, peak memory, growth; ``--samples 1e8`` for more."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+import unconstrain as uc
+from unconstrain.preparation import Recipe
+
+SMALL = 100_000
+SAMPLES = 10_000_000
+ROWS_IN_FILE = 2_000_000
+KERNELS_ON_AXIS = 10
+RECIPE = Recipe(states=("x", "y"), actions=("vx", "vy"))
+
+
+def write(folder: Path, samples: int) -> None:
+    """Parquet files of a swirl in the plane, behind a line of random direction at each sample."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    for number, start in enumerate(range(0, samples, ROWS_IN_FILE)):
+        rng = np.random.default_rng([0, number])
+        with parquet.ParquetWriter(folder / f"{number:05}.parquet", _schema(pa), compression="none") as file:
+            for begin in range(start, min(start + ROWS_IN_FILE, samples), SMALL):
+                states = rng.uniform(-1, 1, (min(SMALL, samples - begin), 2))
+                angle = rng.uniform(0, np.pi, len(states))
+                along = np.column_stack([np.cos(angle), np.sin(angle)])
+                wanted = np.column_stack([states[:, 1], np.sin(2 * states[:, 0])])
+                actions = along * (along * wanted).sum(axis=1, keepdims=True)
+                file.write_table(pa.table(list(np.hstack([states, actions]).T), _schema(pa)))
+
+
+def _schema(pa: Any) -> Any:
+    return pa.schema([(name, pa.float64()) for name in ("x", "y", "vx", "vy")])
+
+
+def learn(folder: Path) -> None:
+    """Fit, in a process of its own, and print what it took as JSON."""
+    features = uc.NormalisedRBF.grid(-1, 1, KERNELS_ON_AXIS)
+    before = _peak_mb()
+    start = perf_counter()
+    policy = uc.ParametricPolicy(features).fit_batches(uc.Stream(folder, RECIPE))
+    seconds = perf_counter() - start
+    samples = int(policy.moments_.weight[0])
+    print(json.dumps({"samples": samples, "seconds": seconds, "before_mb": before, "peak_mb": _peak_mb()}))
+
+
+def _peak_mb() -> float:
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
+
+
+def measured(samples: int) -> dict[str, float]:
+    """Write that many samples, learn from them, and say what it took."""
+    with TemporaryDirectory(dir=Path.cwd()) as folder:
+        write(Path(folder), samples)
+        command = [sys.executable, __file__, "--learn", folder]
+        said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    found: dict[str, float] = json.loads(said)
+    assert found["samples"] == samples
+    return found
+
+
+def main(samples: int = SAMPLES) -> list[dict[str, Any]]:
+    """Print the table and return its rows."""
+    small, large = measured(SMALL), measured(samples)
+    # What is done once (importing, solving) is no growth: rates are of what came on top of the smaller one.
+    middle = measured(samples // 10) if samples >= 100 * SMALL else small
+    rate = (large["samples"] - middle["samples"]) / (large["seconds"] - middle["seconds"])
+    ratio = float("nan")
+    if middle is not small:
+        ratio = (middle["samples"] - small["samples"]) / (middle["seconds"] - small["seconds"]) / rate
+    what = f"{samples:.0e} samples from Parquet, d = 2, M = {KERNELS_ON_AXIS**2}"
+    rows = [
+        {"what": f"peak memory, {what}", "value": large["peak_mb"], "unit": "MB", "at_least": 1000.0, "aim": 300.0},
+        {"what": "of it Python and its libraries", "value": large["before_mb"], "unit": "MB"},
+        {"what": f"time, {what}", "value": large["seconds"], "unit": "s"},
+        {"what": f"rate, {what}", "value": rate, "unit": "1/s"},
+        {
+            "what": f"time per sample, tenfold from {middle['samples']:.0e}",
+            "value": ratio,
+            "unit": "×",
+            "at_least": 1.1,
+        },
+    ]
+    for row in rows:
+        print(f"{row['what']:72} {row['value']:14.5g} {row['unit']:4} at most {row.get('at_least') or '-'}")
+    return [{"at_least": None, "aim": None} | row for row in rows]
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--samples", type=lambda text: int(float(text)), default=SAMPLES)
+    parser.add_argument("--learn", type=Path, help=argparse.SUPPRESS)
+    asked = parser.parse_args()
+    if asked.learn:
+        learn(asked.learn)
+    else:
+        main(asked.samples)
