@@ -415,6 +415,34 @@ def test_fit_writes_a_report_too(files, tmp_path):
     assert "<html" in (tmp_path / "p.html").read_text(encoding="utf-8")
 
 
+def test_fit_and_inspect_read_parquet_and_hdf5(folder, policy, tmp_path):
+    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    h5py = pytest.importorskip("h5py")
+    for number, start in enumerate(STARTS):
+        table = dict(zip(("t", "x", "y", "vx", "vy"), record(start, seed=number).T, strict=True))
+        parquet.write_table(arrow.table(table), tmp_path / f"swing_{number}.parquet")
+        with h5py.File(tmp_path / f"swing_{number}.h5", "w") as file:
+            for name, values in table.items():
+                file[name] = values
+    for suffix in ("parquet", "h5"):
+        pattern = tmp_path / f"swing_*.{suffix}"
+        surveyed = json.loads(run("inspect", pattern, "--json"))
+        assert [found["name"] for found in surveyed] == [f"swing_{number}" for number in range(8)]
+        learnt_here = tmp_path / f"{suffix}.npz"
+        assert "8 demonstrations, 320 samples." in run("fit", pattern, "--model", "linear", "-o", learnt_here)
+        assert_allclose(np.hstack([*learnt(learnt_here)[0]]), np.hstack([*learnt(policy)[0]]), atol=1e-12)
+
+
+def test_a_report_of_more_than_memory_shows_its_beginning(folder, tmp_path, monkeypatch):
+    from unconstrain import streams
+    from unconstrain.cli.reading import beginning
+
+    stream = uc.Stream(sorted(folder.glob("swing_*.csv")))
+    assert len(beginning(stream)) == 8
+    monkeypatch.setattr(streams, "HELD_BYTES", 3000)
+    assert len(beginning(uc.Stream(stream.paths))) == 2
+
+
 # score
 
 
