@@ -137,6 +137,23 @@ def test_demonstrations_keep_their_order():
     assert list(FirstLook.total(looks).groups) == ["b", "a", "c"]
 
 
+def test_a_block_without_weight_is_passed_over(monkeypatch):
+    monkeypatch.setattr(batches, "BLOCK_ROWS", 100)
+    weights = np.repeat([1.0, 0.0, 2.0, 0.0], 100)
+    counting = weights > 0
+    blocked = uc.ParametricPolicy(uc.Affine()).fit(DATA.states, DATA.actions, weights)
+    left_out = uc.ParametricPolicy(uc.Affine()).fit(DATA.states[counting], DATA.actions[counting], weights[counting])
+    same(blocked, left_out)
+
+
+def test_first_looks_at_other_columns_do_not_add():
+    one = FirstLook.at(Batch(np.ones((3, 2)), np.ones((3, 2))))
+    with pytest.raises(InvalidDataError, match="states: got 1 columns, expected 2 as before"):
+        one + FirstLook.at(Batch(np.ones((3, 1)), np.ones((3, 2))))
+    with pytest.raises(InvalidDataError, match="actions: got 3 columns, expected 2 as before"):
+        one + FirstLook.at(Batch(np.ones((3, 2)), np.ones((3, 3))))
+
+
 # Memory
 
 
