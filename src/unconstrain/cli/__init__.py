@@ -13,6 +13,7 @@ import click
 
 from .. import experiments
 from ..errors import ModelFileError, ReadError, SettingError, UnconstrainError
+from .fitting import check_writable, learn, policy_of
 from .printing import Group, deliver, number, print_table, progress_bar, say_fit
 from .reading import (
     Numbers,
@@ -141,45 +142,23 @@ def fit(
 
     What does not fit into memory is read twice, one file or block at a time.
     """
-    from .. import features, policies, storage, validation
+    from .. import storage, validation
 
     paths = expanded(files)
-    for written in filter(None, (output, report)):
-        if Path(written).resolve() in {Path(path).resolve() for path in paths}:
-            raise SettingError(f"{written}: is one of the files to learn from; give another name to write to.")
-        if not Path(written).absolute().parent.is_dir():
-            raise SettingError(f"{written}: cannot be written, its folder does not exist.")
-    for option, value, needed in (("--variance", variance, "local"), ("--centres", centres, "rbf")):
-        if value is not None and model != needed:
-            raise SettingError(f"{option}: belongs to --model {needed}, got --model {model}.")
+    check_writable((output, report), paths)
+    chosen = {"learner": _learner(learner, alpha, softness), "validation": validation.Folds(folds, hold_out)}
+    fitted = policy_of(model, variance, centres, **chosen)
     stream = stream_of(paths, speed_power, **reading)
-    chosen: dict[str, Any] = {
-        "learner": _learner(learner, alpha, softness),
-        "validation": validation.Folds(folds, hold_out),
-    }
-    policy: Policy
-    if model == "local":
-        policy = policies.LocallyLinearPolicy(variance, **chosen)
-    else:
-        shape = features.KMeansRBF(centres or 25) if model == "rbf" else features.Affine()
-        policy = policies.ParametricPolicy(shape, **chosen)
-    if scheduler is None:
-        policy.fit_batches(stream)
-    else:
-        from .. import cluster
-
-        with cluster.connected(scheduler) as client:
-            cluster.fit_batches(policy, stream.parts(), client=client)
+    learn(fitted, stream, scheduler)
     notes = {"recipe": stream.recipe.to_dict(), "group": reading["group"], "time": reading["time"]}
-    storage.save(policy, output, notes)
+    storage.save(fitted, output, notes)
     click.echo(f"Learnt from {said_recipe(stream.recipe)}.")
-    say_fit(policy, stream if scheduler is None else None, learner)
+    say_fit(fitted, stream if scheduler is None else None, learner)
     click.echo(f"policy: {output}")
     if report is not None:
         from ..report import policy_page
 
-        shown = beginning(stream)
-        Path(report).write_text(policy_page(policy, shown, Path(output).stem), encoding="utf-8")
+        Path(report).write_text(policy_page(fitted, beginning(stream), Path(output).stem), encoding="utf-8")
         click.echo(f"report: {report}")
 
 

@@ -10,17 +10,21 @@ __all__ = ["Finding", "examine"]
 
 EXTRAS = {
     "viz": ("plotly", "matplotlib"),
-    "data": ("pooch",),
+    "data": ("pyarrow", "h5py", "pooch"),
     "arm": ("yourdfpy",),
     "sim": ("mujoco", "pillow"),
+    "onnx": ("onnx", "onnxruntime"),
+    "cluster": ("dask", "distributed"),
 }
 """What each extra brings."""
 
 SERVES = {
     "viz": "figures and reports",
-    "data": "loaders for public recordings",
+    "data": "Parquet, HDF5, public recordings",
     "arm": "arms from URDF files",
     "sim": "wiping with contact",
+    "onnx": "export to ONNX",
+    "cluster": "learning on many machines",
 }
 
 
