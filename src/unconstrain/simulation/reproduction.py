@@ -5,10 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import LARGEST, Array
 from ..demonstration import Demonstration
 from ..errors import InvalidDataError, SettingError
 from ..rollouts import rollout
@@ -143,16 +144,21 @@ def centres(positions: Array, plate: Plate) -> Array:
         If it does not turn once.
     """
     flat = (positions - positions.mean(axis=0)) @ plate.rotation[:, :2]
-    turns = np.abs(np.unwrap(np.arctan2(flat[:, 1], flat[:, 0])) / (2.0 * np.pi))
-    turns -= turns[0]
+    turns = np.unwrap(np.arctan2(flat[:, 1], flat[:, 0])) / (2.0 * np.pi)
+    turns = np.abs(turns - turns[0])
     full = int(turns.max())
     if full < 1:
         raise InvalidDataError(f"the movement: got {turns.max():.1f} turns, expected at least one.")
-    # Averaged over the angle: a turn's middle must not depend on where the sponge is slow.
-    angles = np.linspace(0.0, 1.0, 64, endpoint=False)
-    reached = np.maximum.accumulate(turns)
-    at = np.searchsorted(reached, np.arange(full)[:, None] + angles)
-    return positions[np.minimum(at, len(positions) - 1)].mean(axis=1)
+    ends = np.searchsorted(np.maximum.accumulate(turns), np.arange(full + 1))
+    # Averaged along the path: a turn's middle must not depend on where the sponge is slow.
+    steps = np.diff(positions, axis=0)
+    lengths, middles = np.linalg.norm(steps, axis=1, keepdims=True), positions[:-1] + 0.5 * steps
+    return np.stack(
+        [
+            (lengths[a:b] * middles[a:b]).sum(axis=0) / lengths[a:b].sum()
+            for a, b in pairwise(np.minimum(ends, len(steps)))
+        ]
+    )
 
 
 def _plan(policy: Callable[[Array], Array], plate: Plate, start: Array, duration: float) -> Array:
@@ -162,7 +168,7 @@ def _plan(policy: Callable[[Array], Array], plate: Plate, start: Array, duration
     try:
         path = rollout(policy, start, samples, every, plate.constraint).states
     except InvalidDataError:
-        path = np.full((samples, 3), np.inf)
+        path = np.full((samples, 3), LARGEST)
     outside = np.abs(path @ plate.rotation[:, :2]).max(axis=1) > HALF_PLATE
     if outside.any():
         raise SettingError(
