@@ -20,12 +20,15 @@ from .arrays import Array, check_at_least
 from .errors import SettingError
 from .moments import Moments
 from .objectives import inconsistency, standard_risk, unvec
-from .quadratic import SECONDARY_NOISE, Path, Quadratic, eigensystem, lexicographic_path, minimum
+from .quadratic import SECONDARY_NOISE, Path, Quadratic, eigensystem, lexicographic_path, minimum, softened_minima
 from .validation import FoldedMoments
 
 __all__ = ["Direct", "Hybrid", "Inconsistency", "Learner", "Solution"]
 
 Averaging = Literal["geometric", "arithmetic"]
+
+SOFTNESSES = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.2, 0.3, 0.5, 1.0, 3.0)
+"""What ``Hybrid(alpha="auto")`` tries."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,10 +119,12 @@ class Hybrid:
 
     Parameters
     ----------
-    alpha : float
+    alpha : float or "auto"
         Weight of the standard risk in the score ``E_i + α E_2`` that picks
         the threshold on held-out data. Small for constraints that vary a lot
-        from sample to sample, large for data that is nearly free.
+        from sample to sample, large for data that is nearly free. "auto"
+        chooses a softness instead, the largest whose inconsistency on
+        held-out data is within one standard error of the best.
     threshold : float, optional
         Use this λ_t, as a share of the largest eigenvalue, instead of
         choosing. 0 leaves out rounding noise only.
@@ -130,26 +135,61 @@ class Hybrid:
         goes over from one objective to the other by degrees.
     """
 
-    alpha: float = 0.1
+    alpha: float | Literal["auto"] = 0.1
     threshold: float | None = None
     softness: float = 0.0
     averaging: Averaging = "geometric"
 
     def __post_init__(self) -> None:
-        check_at_least("alpha", self.alpha, 0.0)
+        if self.alpha != "auto":
+            check_at_least("alpha", self.alpha, 0.0)
+        elif self.threshold is not None or self.softness:
+            raise SettingError('alpha: "auto" chooses a softness, and needs no threshold and no softness beside it.')
         check_at_least("softness", self.softness, 0.0)
         _check(self)
 
     def solve(self, folds: FoldedMoments) -> Solution:
         """Learn from the whole, at a threshold chosen on the folds."""
+        if self.alpha == "auto":
+            softened = Hybrid(threshold=0.0, softness=self.chosen_softness(folds), averaging=self.averaging)
+            return softened.solve(folds)
         return _solve(self, folds, self._path, self._score)
+
+    @staticmethod
+    def chosen_softness(folds: FoldedMoments) -> float:
+        """The softness that ``alpha="auto"`` chooses, the same for all models."""
+        rounds = folds.rounds()
+        if len(rounds) < 2:
+            return SOFTNESSES[0]
+        missed = []
+        for training, held_out in rounds:
+            candidates = softened_minima(inconsistency(training), standard_risk(training), SOFTNESSES)
+            # Each round as a share of its own motion: a fast demonstration says no more than a slow one.
+            missed.append(inconsistency(held_out)(candidates).sum(axis=0) / max(held_out.energy.sum(), 1e-300))
+        return SOFTNESSES[softest(np.stack(missed))]
 
     def _path(self, moments: Moments) -> Path:
         consistent, risk = inconsistency(moments), standard_risk(moments)
         return lexicographic_path(consistent + self.softness * risk, risk)
 
     def _score(self, moments: Moments) -> Quadratic:
+        assert self.alpha != "auto"
         return inconsistency(moments) + self.alpha * standard_risk(moments)
+
+
+def softest(missed: Array) -> int:
+    """The softest candidate whose loss is within one standard error of the best.
+
+    Parameters
+    ----------
+    missed : ndarray, shape (R, K)
+        Held-out loss in each round, candidates from hard to soft. Errors are of the difference to the best, round
+        by round.
+    """
+    best = int(missed.mean(axis=0).argmin())
+    gap = missed - missed[:, [best]]
+    near = gap.mean(axis=0) <= gap.std(axis=0, ddof=1) / np.sqrt(len(missed))
+    return int(np.flatnonzero(near).max())
 
 
 def _inconsistency_path(moments: Moments) -> Path:

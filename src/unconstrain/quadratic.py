@@ -21,6 +21,7 @@ So all k are solved together by two triangular solves with P + 1 columns.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +30,16 @@ from scipy.linalg import solve_triangular
 
 from .arrays import Array
 
-__all__ = ["NOISE", "SECONDARY_NOISE", "Path", "Quadratic", "eigensystem", "lexicographic_path", "minimum"]
+__all__ = [
+    "NOISE",
+    "SECONDARY_NOISE",
+    "Path",
+    "Quadratic",
+    "eigensystem",
+    "lexicographic_path",
+    "minimum",
+    "softened_minima",
+]
 
 NOISE = 1e-10
 """Eigenvalues of the first objective below this share of the largest are rounding."""
@@ -160,6 +170,22 @@ def minimum(objective: Quadratic) -> Array:
     size = objective.linear.shape[1]
     lower, _ = _factor(objective.hessian, np.broadcast_to(np.eye(size), objective.hessian.shape))
     return _solve_lower(lower, _solve_lower(lower, objective.linear), transposed=True)
+
+
+def softened_minima(first: Quadratic, second: Quadratic, softnesses: Sequence[float]) -> Array:
+    """Minimise ``first + s second`` for each s, at the price of one factorisation, shape (M, P, K).
+
+    With ``second.hessian = L Lᵀ`` and ``L⁻¹ first.hessian L⁻ᵀ = Q Λ Qᵀ`` every
+    minimum is ``L⁻ᵀ Q (Λ + s)⁻¹ Qᵀ L⁻¹ (linear₁ + s linear₂)``.
+    """
+    size = first.linear.shape[1]
+    lower, _ = _factor(second.hessian, np.broadcast_to(np.eye(size), second.hessian.shape))
+    half = _solve_lower(lower, first.hessian)
+    eigenvalues, vectors = eigensystem(_solve_lower(lower, half.swapaxes(-1, -2)))
+    along, beside = (_across(vectors, _solve_lower(lower, one.linear)) for one in (first, second))
+    shares = np.asarray(softnesses)
+    scaled = (along[..., None] + shares * beside[..., None]) / (np.maximum(eigenvalues, 0.0)[..., None] + shares)
+    return _solve_lower(lower, vectors @ scaled, transposed=True)
 
 
 def eigensystem(hessian: Array) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""The paper's experiments, each a module with ``Settings`` and ``run(settings)``."""
+"""The paper's experiments and a benchmark beyond them, each a module with ``Settings`` and ``run(settings)``."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from ..errors import SettingError
 
 __all__ = ["JOURNALED", "NAMES", "find"]
 
-NAMES = ("table1", "figure4", "figure5", "table2", "washing")
+NAMES = ("table1", "figure4", "figure5", "table2", "washing", "regimes")
 """What can be reproduced."""
 
-JOURNALED = ("table1", "figure5", "table2")
+JOURNALED = ("table1", "figure5", "table2", "regimes")
 """Those whose trials are kept as they finish, so that an interrupted run goes on."""
 
 

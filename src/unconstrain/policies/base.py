@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from copy import deepcopy
+from dataclasses import replace
 from itertools import chain, pairwise
 from typing import Any, Self
 
@@ -16,11 +17,12 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from ..arrays import Array, as_groups, as_matrix, as_table, as_weights, check_at_least
 from ..batches import Batch, FirstLook, Groups
 from ..demonstration import Demonstration, stack
-from ..errors import InvalidDataError
+from ..errors import InvalidDataError, SettingError
 from ..learners import Hybrid, Learner, Solution
 from ..moments import Moments, gather_blocks
 from ..objectives import inconsistency, vec
 from ..projection import unit_actions
+from ..robust import RobustSolution, SampleLearner, Samples, Uncertainty, uncertainty
 from ..validation import FoldedMoments, Folds, Splitter, Validation
 from .deployable import Deployable
 
@@ -35,9 +37,10 @@ _ROWS = 4096
 class Policy(Deployable, RegressorMixin, BaseEstimator):
     """What both policies share: fitting from a stream, predicting, stepping, changing the learner."""
 
-    learner: Learner | None
+    learner: Learner | SampleLearner | None
     validation: Validation | None
     _folds: FoldedMoments
+    _kept: tuple[Batch, ...]
     _splitter: Splitter
     _flat: bool
 
@@ -58,8 +61,8 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         """Share of each model in the prediction, shape (N, M), or None for a single model."""
 
     @abstractmethod
-    def _solve(self, learner: Learner, folds: FoldedMoments) -> Solution:
-        """Find the weights of the features φ(x)."""
+    def _centring(self) -> Array | None:
+        """T_m, shape (M, p, p), with which model m is solved in features ``T_m φ``; None for φ itself."""
 
     def fit(
         self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, groups: Groups | None = None
@@ -179,6 +182,9 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         """
         check_is_fitted(self, "solution_")
         parts, filled, learner = self._folds.parts, self._folds.filled, self._learner()
+        if isinstance(self.solution_, RobustSolution):
+            return self.solution_.held_out_score
+        assert not isinstance(learner, SampleLearner)
         missed = moved = 0.0
         for i in filled if len(filled) > 1 else ():
             others = tuple(parts[j] for j in filled if j != i)
@@ -208,6 +214,40 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         """Be a policy: the same as :meth:`predict`, always of shape (N, d)."""
         return self.predict(states).reshape(-1, self.n_outputs_)
 
+    def uncertainty(self, X: ArrayLike) -> Uncertainty:
+        """How far the unconstrained policy may be from :meth:`predict`, and why.
+
+        Parameters
+        ----------
+        X : array_like, shape (N, n)
+            States.
+
+        Returns
+        -------
+        Uncertainty
+            Standard deviations of each action coordinate, (N, d): from noise, from what the data does not
+            determine, and in total.
+
+        Raises
+        ------
+        SettingError
+            If the learner does not look at samples; :class:`~unconstrain.Robust` does.
+        """
+        check_is_fitted(self, "solution_")
+        if not isinstance(self.solution_, RobustSolution):
+            raise SettingError(
+                f"uncertainty: {type(self._learner()).__name__} does not tell it. Fit with learner=Robust()."
+            )
+        states, centring = self._checked_states(X), self._centring()
+        features, shares = self._features(states), self._shares(states)
+        unchanged, alone = np.eye(features.shape[1])[None], np.ones((len(states), 1))
+        return uncertainty(
+            self.solution_,
+            features,
+            alone if shares is None else shares,
+            unchanged if centring is None else centring,
+        )
+
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
         """Share of the observed motion that the policy, projected onto each action, explains.
 
@@ -228,8 +268,14 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
             moved += float(counts @ lengths**2)
         return 1.0 - missed / moved if moved > 0 else 0.0
 
-    def with_learner(self, learner: Learner) -> Self:
-        """Return the same policy with another learner, from the same moments: no second pass over the data."""
+    def with_learner(self, learner: Learner | SampleLearner) -> Self:
+        """Return the same policy with another learner, from the same moments: no second pass over the data.
+
+        Raises
+        ------
+        SettingError
+            If the learner needs the samples, and they were not kept: this policy's own does not need them.
+        """
         check_is_fitted(self, "solution_")
         other = clone(self).set_params(learner=learner)
         other.__dict__ |= {name: value for name, value in self.__dict__.items() if name not in other.__dict__}
@@ -243,7 +289,7 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         return self._folds.whole
 
     def _forget(self) -> None:
-        for fitted in ("_folds", "_splitter", "n_features_in_", "solution_"):
+        for fitted in ("_folds", "_splitter", "_kept", "n_features_in_", "solution_"):
             self.__dict__.pop(fitted, None)
 
     def _checked(
@@ -294,9 +340,13 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         # In a fixed order: repetition and order of the samples must not move the features.
         self._place(np.unique(look.states, axis=0))
         self._folds = self._nothing()
+        self._kept = ()
         return self
 
     def _learn(self, batches: Iterable[Batch]) -> Self:
+        if isinstance(self._learner(), SampleLearner):
+            batches = tuple(batches)
+            self._kept += batches
         self._folds = self._folds + self._summed(batches)
         self._conclude()
         return self
@@ -333,9 +383,50 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         return self._features(states), actions, column if in_models is None else column * in_models
 
     def _conclude(self) -> None:
-        self.solution_ = self._solve(self._learner(), self._folds)
+        learner, centring = self._learner(), self._centring()
+        if not isinstance(learner, SampleLearner):
+            self.solution_ = self._solve(learner, self._folds)
+            return
+        if not getattr(self, "_kept", ()):
+            raise SettingError(
+                f"learner: {type(learner).__name__} needs the samples, and this policy has kept their sums alone. "
+                f"Fit it with learner={type(learner).__name__}() from the start."
+            )
+        folds = self._folds if centring is None else self._folds.in_features(centring)
+        filled = tuple(folds.parts[i] for i in folds.filled)
+        self.solution_ = learner.learn(self._samples(), FoldedMoments(filled, range(len(filled))))
 
-    def _learner(self) -> Learner:
+    def _solve(self, learner: Learner, folds: FoldedMoments) -> Solution:
+        """Find the weights of the features φ(x)."""
+        centring = self._centring()
+        if centring is None:
+            return learner.solve(folds)
+        solution = learner.solve(folds.in_features(centring))
+        return replace(solution, weights=solution.weights @ centring)
+
+    def _samples(self) -> Samples:
+        """All samples that were kept, in their order."""
+        blocks = [block for batch in self._kept for block in batch.blocks()]
+        states, actions = (np.concatenate([block[i] for block in blocks]) for i in (0, 1))
+        counts = np.concatenate([np.ones(len(b.states)) if b.weights is None else b.weights for b in blocks])
+        dealt = np.concatenate([self._splitter.assign(block.states, block.groups) for block in blocks])
+        named = [None if b.groups is None else np.asarray(b.groups) for b in blocks]
+        groups = np.zeros(len(states)) if any(n is None for n in named) else np.concatenate(named)  # type: ignore[arg-type]
+        centring, p = self._centring(), self._folds.parts[0].gram.shape[-1]
+        alone = np.ones((len(states), 1))
+        weights, shares = self._weights(states), self._shares(states)
+        return Samples(
+            self._features(states),
+            actions,
+            counts,
+            alone if weights is None else weights,
+            alone if shares is None else shares,
+            np.unique(groups, return_inverse=True)[1],
+            np.unique(dealt, return_inverse=True)[1],
+            np.eye(p)[None] if centring is None else centring,
+        )
+
+    def _learner(self) -> Learner | SampleLearner:
         return self.learner if self.learner is not None else Hybrid()
 
     def _predict_block(self, states: Array) -> Array:

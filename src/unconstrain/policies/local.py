@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted
@@ -11,9 +9,9 @@ from sklearn.utils.validation import check_is_fitted
 from ..arrays import Array, as_matrix
 from ..closed_form import ClosedForm, exponents
 from ..features import Affine
-from ..learners import Learner, Solution
+from ..learners import Learner
 from ..receptive_fields import ReceptiveFields, choose_variance, cover
-from ..validation import FoldedMoments, Validation
+from ..validation import Validation
 from .base import Policy
 
 __all__ = ["LocallyLinearPolicy"]
@@ -79,14 +77,13 @@ class LocallyLinearPolicy(Policy):
     def _shares(self, states: Array) -> Array:
         return self.fields_.shares(states)
 
-    def _solve(self, learner: Learner, folds: FoldedMoments) -> Solution:
+    def _centring(self) -> Array:
         # Gathering over common features is one product; centring each field afterwards is exact.
         offsets = -self.features_(self.fields_.centres)[:, :-1]
         models, n = offsets.shape
         centring = np.tile(np.eye(n + 1), (models, 1, 1))
         centring[:, :n, n] = offsets
-        solution = learner.solve(folds.in_features(centring))
-        return replace(solution, weights=solution.weights @ centring)
+        return centring
 
     def _closed_form(self) -> ClosedForm:
         weights, centres, variance = self.solution_.weights, self.fields_.centres, self.fields_.variance

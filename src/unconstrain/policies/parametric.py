@@ -10,8 +10,8 @@ from ..arrays import Array, as_matrix
 from ..closed_form import ClosedForm
 from ..errors import SettingError
 from ..features import FeatureMap, KMeansRBF, Placeable
-from ..learners import Learner, Solution
-from ..validation import FoldedMoments, Validation
+from ..learners import Learner
+from ..validation import Validation
 from .base import Policy
 
 __all__ = ["ParametricPolicy"]
@@ -69,8 +69,8 @@ class ParametricPolicy(Policy):
 
     _shares = _weights
 
-    def _solve(self, learner: Learner, folds: FoldedMoments) -> Solution:
-        return learner.solve(folds)
+    def _centring(self) -> None:
+        return None
 
     def _closed_form(self) -> ClosedForm | None:
         closed = getattr(self.features_, "closed_form", None)

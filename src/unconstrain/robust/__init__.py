@@ -1,0 +1,17 @@
+"""Beyond the paper: learners that look at the samples, hold under noise, and say when they cannot know."""
+
+from .learner import Likelihood, NoiseCorrected, Robust
+from .posterior import RobustSolution
+from .samples import SampleLearner, Samples
+from .uncertainty import Uncertainty, uncertainty
+
+__all__ = [
+    "Likelihood",
+    "NoiseCorrected",
+    "Robust",
+    "RobustSolution",
+    "SampleLearner",
+    "Samples",
+    "Uncertainty",
+    "uncertainty",
+]

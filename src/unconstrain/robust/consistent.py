@@ -1,0 +1,138 @@
+"""Consistency first, with the noise taken out of the sums."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Array
+from ..learners import Hybrid
+from ..moments import Moments, total
+from ..objectives import inconsistency, standard_risk, vec
+from ..quadratic import NOISE, Quadratic, eigensystem
+from ..validation import FoldedMoments
+from .noise import corrected, correlation_time, noise_by_differences
+from .posterior import Candidate, Posterior, unit_information
+from .samples import Samples
+from .sphere import distances
+
+__all__ = ["noise_corrected", "softened"]
+
+_ROUNDS = 3
+_STEPS = 6
+_CERTAIN = 2.0
+"""Standard errors by which an eigenvalue has to be above the noise that was subtracted from it."""
+
+
+def noise_corrected(samples: Samples, noise: float | None = None) -> Candidate:
+    """Minimise the inconsistency on noise-corrected moments, softened as far as a prior goes.
+
+    The noise level is the smaller of two estimates: from differences in time
+    (too large where constraints change at every sample), and from the
+    residuals (too large where the model does not fit). Or it is given.
+    """
+    parts = samples.by_fold()
+    weighted = [part.moments(part.actions, (part.actions**2).sum(axis=1)) for part in parts]
+    plain = [part.moments(part.actions, np.ones(len(part))) for part in parts]
+    d = samples.actions.shape[1]
+    most, variance = noise_by_differences(samples.actions, samples.groups), 0.0 if noise is None else noise**2
+    for _ in range(_ROUNDS):
+        used = variance
+        whole = _Corrected(total(weighted), total(plain), used, samples.sizes)
+        softness = whole.softness()
+        weights = whole.posterior(softness).weights(d)
+        policy = samples.predict(weights)
+        if noise is None:
+            variance = min(most, _mean(samples, distances(samples.actions, policy).radial ** 2))
+    held_out = np.empty_like(policy)
+    for fold, part in enumerate(parts):
+        others = [i for i in range(len(parts)) if i != fold] or [fold]
+        rest = _Corrected(total(weighted[i] for i in others), total(plain[i] for i in others), used, samples.sizes)
+        held_out[samples.folds == fold] = part.predict(rest.posterior(softness).weights(d))
+    residuals = (samples.actions * (samples.actions - policy)).sum(axis=1) - d * used
+    time = correlation_time(residuals[:, None], samples.groups)
+    posterior = whole.posterior(softness)
+    return Candidate("noise-corrected", weights, _per(posterior, time * whole.residual(weights)), held_out, variance)
+
+
+def softened(samples: Samples, folds: FoldedMoments) -> Candidate:
+    """:class:`~unconstrain.Hybrid` with ``alpha="auto"``."""
+    whole, d = folds.whole, samples.actions.shape[1]
+    softness = Hybrid(alpha="auto").chosen_softness(folds)
+
+    def posterior(moments: Moments) -> Posterior:
+        return Posterior(inconsistency(moments), softness * standard_risk(moments))
+
+    weights = posterior(whole).weights(d)
+    held_out = np.empty_like(samples.actions)
+    for fold, part in enumerate(folds.parts):
+        rest = total([one for one in folds.parts if one is not part])
+        rows = samples.folds == fold
+        held_out[rows] = samples[rows].predict(posterior(rest).weights(d))
+    radial = distances(samples.actions, samples.predict(weights)).radial
+    sizes = np.maximum(whole.weight, np.finfo(float).tiny)
+    residual = np.maximum(inconsistency(whole)(vec(weights)), 1e-12 * whole.energy) / sizes
+    scaled = _per(posterior(whole), correlation_time(radial[:, None], samples.groups) * residual)
+    return Candidate("hybrid", weights, scaled, held_out, _mean(samples, radial**2))
+
+
+class _Corrected:
+    """The two objectives of corrected moments, without what is not above the noise."""
+
+    def __init__(self, weighted: Moments, plain: Moments, variance: float, sizes: Array) -> None:
+        moments = corrected(weighted, plain, variance)
+        self.sizes, self.d = sizes, plain.cross.shape[1]
+        self.expected = variance * weighted.weight
+        self.risk = standard_risk(moments)
+        self.consistent = _certain(inconsistency(moments), standard_risk(plain).hessian, variance, sizes)
+
+    def posterior(self, softness: Array) -> Posterior:
+        risk = self.risk
+        soft = Quadratic(softness[:, None, None] * risk.hessian, softness[:, None] * risk.linear, softness)
+        return Posterior(self.consistent, soft)
+
+    def softness(self) -> Array:
+        """Variance along each action over that across it, by as much as a prior counts, found in a few steps."""
+        worth = unit_information(self.risk.linear.shape[1], self.sizes)
+        softness = np.full(len(worth), 1e-2)
+        for _ in range(_STEPS):
+            weights = vec(self.posterior(softness).weights(self.d))
+            along = self.consistent(weights) + self.expected
+            both = self.risk(weights) + self.expected
+            across = np.maximum((both - along) / max(self.d - 1, 1), 1e-3 * both)
+            softness = np.clip(worth * along / np.where(across > 0, across, 1.0), 1e-8, 1.0)
+        return softness
+
+    def residual(self, weights: Array) -> Array:
+        """Mean square of ρ, shape (M,)."""
+        energy = np.abs(self.consistent.constant)
+        return np.maximum(self.consistent(vec(weights)) + self.expected, 1e-12 * energy) / np.maximum(
+            self.sizes, 1e-300
+        )
+
+
+def _certain(objective: Quadratic, gram: Array, variance: float, sizes: Array) -> Quadratic:
+    """Only those directions whose eigenvalue is more than the noise's own scatter would leave."""
+    eigenvalues, vectors = eigensystem(objective.hessian)
+    scatter = variance * np.sqrt(2.0 / np.maximum(sizes, 1.0))[:, None] * (vectors * (gram @ vectors)).sum(axis=1)
+    kept = eigenvalues > np.maximum(_CERTAIN * scatter, NOISE * eigenvalues[:, -1:])
+    values = np.where(kept, eigenvalues, 0.0)
+    linear = np.where(kept, np.einsum("mij,mi->mj", vectors, objective.linear), 0.0)
+    return Quadratic(
+        (vectors * values[:, None, :]) @ vectors.swapaxes(1, 2),
+        np.einsum("mij,mj->mi", vectors, linear),
+        objective.constant,
+    )
+
+
+def _per(posterior: Posterior, variance: Array) -> Posterior:
+    """The same in units of a variance, shape (M,)."""
+    by = 1.0 / np.maximum(variance, 1e-300)
+
+    def scaled(one: Quadratic) -> Quadratic:
+        return Quadratic(by[:, None, None] * one.hessian, by[:, None] * one.linear, by * one.constant)
+
+    return Posterior(scaled(posterior.evidence), scaled(posterior.prior))
+
+
+def _mean(samples: Samples, values: Array) -> float:
+    return float(samples.counts @ values / samples.counts.sum())

@@ -1,0 +1,210 @@
+"""Learners that look at the samples: they need no α and hold under noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array, check_at_least
+from ..learners import Direct, Hybrid
+from ..projection import unit_actions
+from ..validation import FoldedMoments
+from .consistent import noise_corrected, softened
+from .likelihood import MISFIT, free_probability, maximise, settle
+from .posterior import Candidate, RobustSolution
+from .samples import Samples
+
+__all__ = ["Likelihood", "NoiseCorrected", "Robust"]
+
+NOISY = 0.015
+"""Noise of more than this share of the actions' size is taken out of the sums."""
+
+INFORMED = 0.05
+"""Where of fewer samples than this share more is known than that they are on their spheres, nothing is added by it."""
+
+WORSE = 1.35
+"""By which factor the inconsistency has to be larger to count."""
+
+NEGLIGIBLE = 0.05
+"""Share of the actions' size that may be missed without counting, when policies are compared."""
+
+HIDDEN = 0.35
+"""Noise of more than this share hides the sphere: free and constrained samples look the same."""
+
+
+@dataclass(frozen=True)
+class Likelihood:
+    """The most probable policy, where each sample was free, turned a little, or anywhere on its sphere.
+
+    See :mod:`unconstrain.robust.sphere`. It holds where constraints vary at
+    random; where they are a function of the state, what they took looks like
+    part of the policy. Needs the samples, not only their moments.
+
+    Parameters
+    ----------
+    steps : int
+        Of expectation maximisation from each of two starts, at most.
+    most : int
+        Steps but the last look at no more samples than these, evenly thinned in time.
+    """
+
+    steps: int = 60
+    most: int = 4000
+
+    def __post_init__(self) -> None:
+        check_at_least("steps", self.steps, 1, whole=True)
+        check_at_least("most", self.most, 1, whole=True)
+
+    def learn(self, samples: Samples, folds: FoldedMoments) -> RobustSolution:
+        """Learn from samples; ``folds`` are their moments."""
+        if _trivial(samples):
+            return _plain(samples, folds)
+        starts = [softened(samples, folds).weights, Direct().solve(folds).weights]
+        found = maximise(samples, starts, self.steps, self.most)
+        return _solution(samples, found.candidate, {})
+
+
+@dataclass(frozen=True)
+class NoiseCorrected:
+    """Consistency first, on moments without the expected part of the noise; see :mod:`unconstrain.robust.noise`.
+
+    Samples count by ‖u‖², and the standard risk beside the inconsistency by
+    what a prior counts. Holds under noise, constraints of any kind, and
+    knows nothing of free samples. Needs the samples, not only their moments.
+
+    Parameters
+    ----------
+    noise : float, optional
+        Standard deviation of the noise on each action coordinate; estimated by default.
+    """
+
+    noise: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.noise is not None:
+            check_at_least("noise", self.noise, 0.0)
+
+    def learn(self, samples: Samples, folds: FoldedMoments) -> RobustSolution:
+        """Learn from samples; ``folds`` are their moments."""
+        if _trivial(samples):
+            return _plain(samples, folds)
+        return _solution(samples, noise_corrected(samples, self.noise), {})
+
+
+@dataclass(frozen=True)
+class Robust:
+    """Learn under noise and in every constraint setting, with nothing to tune.
+
+    Learns a consistent policy, on noise-corrected moments where noise shows
+    and as :class:`~unconstrain.Hybrid` with ``alpha="auto"`` where it does
+    not, and the most probable one (:class:`Likelihood`). The likelihood's is
+    taken unless noise hides the sphere, or it knows no more of next to any
+    sample than that it is on its sphere, or its inconsistency on samples held
+    out is above the other's, by a third and by more than one
+    standard error: then constraints do not vary as it supposes.
+
+    Needs the samples, not only their moments, and keeps those it has seen.
+
+    Parameters
+    ----------
+    steps, most : int
+        See :class:`Likelihood`.
+    """
+
+    steps: int = 60
+    most: int = 4000
+
+    def __post_init__(self) -> None:
+        check_at_least("steps", self.steps, 1, whole=True)
+        check_at_least("most", self.most, 1, whole=True)
+
+    def learn(self, samples: Samples, folds: FoldedMoments) -> RobustSolution:
+        """Learn from samples; ``folds`` are their moments."""
+        if _trivial(samples):
+            return _plain(samples, folds)
+        consistent = noise_corrected(samples)
+        if not _more_than(NOISY, consistent.variance, samples):
+            consistent = softened(samples, folds)
+        found = maximise(samples, [consistent.weights, Direct().solve(folds).weights], self.steps, self.most)
+        likely, informed = found.candidate, 1.0 - float(found.mixture[-1])
+        apart, error = compared(samples, likely.held_out, consistent.held_out, consistent.variance)
+        refuted = apart > max(np.log(WORSE), error)
+        usable = informed > INFORMED and not refuted and not _more_than(HIDDEN, likely.variance, samples)
+        return _solution(samples, likely if usable else consistent, {likely.name: apart, consistent.name: 0.0})
+
+
+def compared(samples: Samples, one: Array, other: Array, variance: float) -> tuple[float, float]:
+    """Logarithm of the inconsistency of ``one`` over ``other``'s, median over the folds and standard error.
+
+    The inconsistency is that of :mod:`unconstrain.robust.noise`, in which
+    every sample's residual has the same variance.
+    """
+    actions, d = samples.actions, samples.actions.shape[1]
+    counts = np.bincount(samples.folds, samples.counts)
+
+    def missed(policy: Array) -> Array:
+        residual = (actions * (actions - policy)).sum(axis=1) - d * variance
+        return np.asarray(np.bincount(samples.folds, samples.counts * residual**2) / counts)
+
+    floor = (NEGLIGIBLE * samples.energy) ** 2
+    gap = np.log(missed(one) + floor) - np.log(missed(other) + floor)
+    return float(np.median(gap)), float(gap.std(ddof=1) / np.sqrt(len(gap)))
+
+
+def _solution(samples: Samples, chosen: Candidate, gaps: dict[str, float]) -> RobustSolution:
+    policy = samples.predict(chosen.weights)
+    variance, mixture = settle(samples, policy)
+    free = free_probability(samples, policy, variance, mixture)
+    from_noise, undetermined = chosen.posterior.spreads()
+    models, d, p = chosen.weights.shape
+    return RobustSolution(
+        chosen.weights @ samples.centring,
+        chosen.posterior.determined(),
+        d * p,
+        np.zeros(models),
+        method=chosen.name,
+        noise=float(np.sqrt(variance)),
+        misfit=MISFIT * float(np.sqrt(samples.energy / d)),
+        free_share=float(samples.counts @ free / samples.counts.sum()),
+        free=free,
+        from_noise=from_noise,
+        undetermined=undetermined,
+        held_out_score=_explained(samples, chosen.held_out),
+        compared=gaps,
+    )
+
+
+def _explained(samples: Samples, policy: Array) -> float:
+    directions, lengths = unit_actions(samples.actions)
+    missed = samples.counts @ (lengths - (directions * policy).sum(axis=1)) ** 2
+    return float(1.0 - missed / (samples.counts @ lengths**2))
+
+
+def _trivial(samples: Samples) -> bool:
+    """Whether there is no sphere, or nothing on it."""
+    return samples.actions.shape[1] == 1 or samples.energy == 0.0 or samples.folds.max() == 0
+
+
+def _plain(samples: Samples, folds: FoldedMoments) -> RobustSolution:
+    """What the hybrid makes of it."""
+    found = Hybrid().solve(folds)
+    size = found.directions
+    nothing = np.zeros((len(found.weights), size, size))
+    return RobustSolution(
+        found.weights @ samples.centring,
+        found.determined,
+        size,
+        found.threshold,
+        found.eigenvalues,
+        found.scores,
+        method="hybrid",
+        free=np.ones(len(samples)),
+        free_share=1.0,
+        from_noise=nothing,
+        undetermined=nothing,
+    )
+
+
+def _more_than(share: float, variance: float, samples: Samples) -> bool:
+    return samples.actions.shape[1] * variance > share**2 * samples.energy

@@ -1,0 +1,186 @@
+"""The most probable policy if each sample was free, turned a little, or anywhere on its sphere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Array
+from ..objectives import inconsistency
+from ..quadratic import Quadratic
+from .noise import correlation_time
+from .posterior import Candidate, Posterior, unit_information
+from .samples import Samples
+from .sphere import SPREADS, Beliefs, Distances, beliefs, distances
+
+__all__ = ["Fit", "free_probability", "maximise", "settle"]
+
+MISFIT = 0.01
+"""No model is right to better than this share of the actions' size."""
+
+_GAIN = 1e-4
+"""Less than this in a sample's log-likelihood, for each action coordinate, is the end of a climb."""
+
+_AT_LEAST = 6
+_POOLED = 10.0
+"""Samples that the data as a whole counts for, beside a demonstration's own, in how free it was."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Where expectation maximisation ended.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (M, d, p)
+    variance : float
+        σ², misfit included.
+    mixture : ndarray, shape (K + 1,)
+        Share of each spread on the sphere, and of the uniform density.
+    likelihood : float
+        Mean logarithm of the samples' density.
+    candidate : Candidate
+    """
+
+    weights: Array
+    variance: float
+    mixture: Array
+    likelihood: float
+    candidate: Candidate
+
+
+def maximise(samples: Samples, starts: Sequence[Array], steps: int, most: int) -> Fit:
+    """Expectation maximisation from several starts; the most probable end is kept.
+
+    Parameters
+    ----------
+    samples : Samples
+    starts : sequence of ndarray, shape (M, d, p)
+    steps : int
+        At most so many from each.
+    most : int
+        Of more samples than these, every second, third, ... is climbed on; the last step is on all.
+    """
+    thinned = samples[:: -(-len(samples) // most)]
+    ends = [_climb(thinned, start, steps) for start in starts]
+    weights, variance, mixture, likelihood = max(ends, key=lambda end: end[3])
+    model = _Model(samples, samples.predict(weights), variance, mixture)
+    parts = [model.posterior(samples.folds == fold) for fold in range(int(samples.folds.max()) + 1)]
+    d = samples.actions.shape[1]
+    weights = _sum(parts).weights(d)
+    held_out = np.empty_like(samples.actions)
+    for fold in range(len(parts)):
+        rest = _sum([part for i, part in enumerate(parts) if i != fold] or parts)
+        held_out[samples.folds == fold] = samples[samples.folds == fold].predict(rest.weights(d))
+    candidate = Candidate("likelihood", weights, _sum(parts), held_out, variance)
+    return Fit(weights, variance, mixture, likelihood, candidate)
+
+
+def settle(samples: Samples, policy: Array, steps: int = 20) -> tuple[float, Array]:
+    """Noise variance and mixture that go best with a policy's predictions (N, d)."""
+    variance, mixture = _begin(samples, policy)
+    place = distances(samples.actions, policy)
+    for _ in range(steps):
+        found = beliefs(samples.actions, policy, place, variance, mixture)
+        variance, mixture = _updated(samples, policy, place, found)
+    return variance, mixture
+
+
+def free_probability(samples: Samples, policy: Array, variance: float, mixture: Array) -> Array:
+    """Probability that each sample was free, knowing that a demonstration's samples go together, shape (N,).
+
+    Each demonstration has a share of free samples of its own, drawn towards that of all.
+    """
+    place = distances(samples.actions, policy)
+    count = int(samples.groups.max()) + 1
+    own = np.tile(mixture, (count, 1))
+    size = np.bincount(samples.groups, samples.counts, count)[:, None]
+    for _ in range(_AT_LEAST):
+        shares = beliefs(samples.actions, policy, place, variance, own[samples.groups]).shares
+        seen = np.stack([np.bincount(samples.groups, samples.counts * one, count) for one in shares.T], axis=1)
+        own = (seen + _POOLED * mixture) / (size + _POOLED)
+    return shares[:, 0]
+
+
+def _begin(samples: Samples, policy: Array) -> tuple[float, Array]:
+    radial = distances(samples.actions, policy).radial
+    count = len(SPREADS) + 1
+    return max(float(np.median(radial**2)) / 0.455, MISFIT**2 * samples.energy), np.full(count, 1.0 / count)
+
+
+def _updated(samples: Samples, policy: Array, place: Distances, found: Beliefs) -> tuple[float, Array]:
+    """Noise variance and mixture, given what is thought of each sample."""
+    counts, free, d = samples.counts, found.free, samples.actions.shape[1]
+    missed = (1.0 - free) * place.radial**2 + free * ((samples.actions - policy) ** 2).sum(axis=1)
+    variance = float(counts @ missed / (counts @ (1.0 - free + d * free)))
+    return max(variance, MISFIT**2 * samples.energy), counts @ found.shares / counts.sum()
+
+
+def _climb(samples: Samples, weights: Array, steps: int) -> tuple[Array, float, Array, float]:
+    """One run of expectation maximisation: weights, σ², mixture and mean log-likelihood."""
+    policy, last = samples.predict(weights), -np.inf
+    variance, mixture = _begin(samples, policy)
+    for step in range(steps):
+        model = _Model(samples, policy, variance, mixture)
+        variance, mixture = _updated(samples, policy, model.place, model.found)
+        likelihood = float(samples.counts @ model.found.likelihood / samples.counts.sum())
+        weights = model.posterior(variance=variance).weights(samples.actions.shape[1])
+        policy = samples.predict(weights)
+        if step >= _AT_LEAST and abs(likelihood - last) < _GAIN * samples.actions.shape[1]:
+            break
+        last = likelihood
+    return weights, variance, mixture, last
+
+
+class _Model:
+    """The quadratic that stands for the likelihood near a policy (Gauss–Newton), as evidence and prior."""
+
+    def __init__(self, samples: Samples, policy: Array, variance: float, mixture: Array) -> None:
+        self.samples, self.policy, self.variance = samples, policy, variance
+        self.place = distances(samples.actions, policy)
+        self.found = beliefs(samples.actions, policy, self.place, variance, mixture)
+
+    def posterior(self, rows: NDArray[np.bool_] | None = None, variance: float | None = None) -> Posterior:
+        """Of all samples, or of some, which then count as their part of all."""
+        samples, place, found = self.samples, self.place, self.found
+        noise = self.variance if variance is None else variance
+        free, tangential = found.free, found.tangential
+        # Neighbours in time say the same again: misfit and constraints go on from sample to sample.
+        along = correlation_time(place.radial[:, None], samples.groups)
+        across = correlation_time(np.sqrt(tangential)[:, None] * place.turn, samples.groups)
+        size = np.linalg.norm(place.normal, axis=1)
+        normal = place.normal / np.maximum(size, 1e-300)[:, None]
+        target = (place.radial + (place.normal * self.policy).sum(axis=1)) / np.maximum(size, 1e-300)
+        radial = (1.0 - free) * size**2 / (noise * along)
+        held, turned = free / (noise * along), tangential / across
+        points = turned[:, None] * (self.policy + place.turn) + held[:, None] * samples.actions
+        points /= np.maximum(turned + held, 1e-300)[:, None]
+        spread, worth = self._prior()
+        part = slice(None) if rows is None else rows
+        some = samples if rows is None else samples[rows]
+        evidence = inconsistency(some.moments(target[part, None] * normal[part], radial[part]))
+        evidence = evidence + some.risk(points[part], (turned + held)[part])
+        prior = some.risk(samples.actions[part], np.full(len(some), 1.0 / (spread * along)))
+        return Posterior(evidence, _scaled(prior, worth))
+
+    def _prior(self) -> tuple[float, Array]:
+        """Mean square of what constraints took in each coordinate, and what the risk is worth beside it."""
+        samples, held = self.samples, self.samples.counts * (1.0 - self.found.free)
+        d = samples.actions.shape[1]
+        away = np.maximum(((samples.actions - self.policy) ** 2).sum(axis=1) - self.place.radial**2, 0.0)
+        spread = float(held @ away / ((held.sum() + 1e-9) * (d - 1))) + self.variance
+        return spread, unit_information(d * samples.features.shape[1], samples.sizes)
+
+
+def _scaled(one: Quadratic, by: Array) -> Quadratic:
+    return Quadratic(by[:, None, None] * one.hessian, by[:, None] * one.linear, by * one.constant)
+
+
+def _sum(parts: Sequence[Posterior]) -> Posterior:
+    evidence, prior = parts[0].evidence, parts[0].prior
+    for part in parts[1:]:
+        evidence, prior = evidence + part.evidence, prior + part.prior
+    return Posterior(evidence, prior)

@@ -1,0 +1,123 @@
+"""What is believed of the weights: evidence of the data, and a prior worth little."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Array
+from ..learners import Solution
+from ..objectives import unvec
+from ..quadratic import SECONDARY_NOISE, Quadratic, eigensystem, minimum
+
+__all__ = ["Candidate", "Posterior", "RobustSolution", "unit_information"]
+
+
+def unit_information(weights: int, sizes: Array) -> Array:
+    """How much the standard risk counts beside the inconsistency, as priors go, shape (M,).
+
+    All samples together say as much, in all P directions together, as one
+    sample for each: enough to hold what the data leaves undetermined, and
+    nothing where it speaks.
+    """
+    return weights / np.maximum(sizes, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Twice the negative logarithm of a density over the weights of each model, in two parts.
+
+    Parameters
+    ----------
+    evidence : Quadratic
+        From the data's consistency, per variance of its residuals.
+    prior : Quadratic
+        The standard risk, by as much as it counts.
+    """
+
+    evidence: Quadratic
+    prior: Quadratic
+
+    def weights(self, actions: int) -> Array:
+        """The most probable weights, shape (M, d, p)."""
+        return unvec(minimum(self.evidence + self.prior), actions)
+
+    def spreads(self) -> tuple[Array, Array]:
+        """Covariance of the weights, due to the noise in the data and due to what it does not say, each (M, P, P).
+
+        With ``C = (A + B)⁻¹`` for evidence A and prior B, they are C A C and C B C, and add up to C.
+        """
+        eigenvalues, vectors = eigensystem(self.evidence.hessian + self.prior.hessian)
+        kept = eigenvalues > SECONDARY_NOISE * eigenvalues[:, -1:]
+        inverse = np.where(kept, 1.0 / np.where(kept, eigenvalues, 1.0), 0.0)
+        both = (vectors * inverse[:, None, :]) @ vectors.swapaxes(1, 2)
+        return both @ self.evidence.hessian @ both, both @ self.prior.hessian @ both
+
+    def determined(self) -> NDArray[np.intp]:
+        """In how many directions the data says more than the prior, shape (M,)."""
+        eigenvalues, vectors = eigensystem(self.evidence.hessian + self.prior.hessian)
+        kept = eigenvalues > SECONDARY_NOISE * eigenvalues[:, -1:]
+        scale = np.where(kept, 1.0 / np.sqrt(np.where(kept, eigenvalues, 1.0)), 0.0)
+        white = vectors * scale[:, None, :]
+        share, _ = eigensystem(white.swapaxes(1, 2) @ self.evidence.hessian @ white)
+        return np.asarray((share > 0.5).sum(axis=1), dtype=np.intp)
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A policy to choose from.
+
+    Parameters
+    ----------
+    name : str
+        How it was learnt.
+    weights : ndarray, shape (M, d, p)
+    posterior : Posterior
+    held_out : ndarray, shape (N, d)
+        Prediction of each sample by what is learnt from the other folds.
+    variance : float
+        Of the noise, per coordinate, misfit included.
+    """
+
+    name: str
+    weights: Array
+    posterior: Posterior
+    held_out: Array
+    variance: float
+
+
+@dataclass(frozen=True, eq=False)
+class RobustSolution(Solution):
+    """What a learner found that looks at the samples.
+
+    Parameters
+    ----------
+    method : str
+        Which of the candidates it is.
+    noise : float
+        Standard deviation of the noise on each action coordinate, misfit of the model included.
+    misfit : float
+        Standard deviation, per action coordinate, that no model of the policy is trusted to be below.
+    free_share : float
+        Estimated share of samples that nothing constrained.
+    free : ndarray, shape (N,)
+        Probability that each sample was free, in the order in which they were given.
+    from_noise, undetermined : ndarray, shape (M, d p, d p)
+        Covariance of the weights, due to noise in the data and due to what the data does not say.
+    held_out_score : float
+        Share of the observed motion that is explained where it is held out, as by ``Policy.score``.
+    compared : dict
+        Logarithm of each candidate's held-out inconsistency over that of the consistent one.
+    """
+
+    method: str = ""
+    noise: float = 0.0
+    misfit: float = 0.0
+    free_share: float = 0.0
+    free: Array = field(default_factory=lambda: np.zeros(0))
+    from_noise: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    undetermined: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    held_out_score: float = float("nan")
+    compared: dict[str, float] = field(default_factory=dict)
