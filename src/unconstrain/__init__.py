@@ -30,6 +30,7 @@ _HOME = {
     "ReceptiveFields": "receptive_fields",
     "Recording": "demonstration",
     "Robust": "robust",
+    "Segments": "robust",
     "Solution": "learners",
     "Stream": "streams",
     "Truth": "demonstration",

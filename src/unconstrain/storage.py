@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from . import features, learners, moments, policies, receptive_fields, validation
+from . import features, learners, moments, policies, receptive_fields, robust, validation
 from .errors import ModelFileError
 from .policies import Policy
 
@@ -43,6 +43,11 @@ _KNOWN: dict[str, type] = {
         learners.Inconsistency,
         learners.Solution,
         moments.Moments,
+        robust.Likelihood,
+        robust.NoiseCorrected,
+        robust.Robust,
+        robust.RobustSolution,
+        robust.Segments,
         policies.LocallyLinearPolicy,
         policies.ParametricPolicy,
         receptive_fields.ReceptiveFields,

@@ -346,7 +346,7 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
     def _learn(self, batches: Iterable[Batch]) -> Self:
         if isinstance(self._learner(), SampleLearner):
             batches = tuple(batches)
-            self._kept += batches
+            self._kept = (*self._samples_so_far(), *batches)
         self._folds = self._folds + self._summed(batches)
         self._conclude()
         return self
@@ -387,11 +387,6 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         if not isinstance(learner, SampleLearner):
             self.solution_ = self._solve(learner, self._folds)
             return
-        if not getattr(self, "_kept", ()):
-            raise SettingError(
-                f"learner: {type(learner).__name__} needs the samples, and this policy has kept their sums alone. "
-                f"Fit it with learner={type(learner).__name__}() from the start."
-            )
         folds = self._folds if centring is None else self._folds.in_features(centring)
         filled = tuple(folds.parts[i] for i in folds.filled)
         self.solution_ = learner.learn(self._samples(), FoldedMoments(filled, range(len(filled))))
@@ -404,9 +399,20 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         solution = learner.solve(folds.in_features(centring))
         return replace(solution, weights=solution.weights @ centring)
 
+    def _samples_so_far(self) -> tuple[Batch, ...]:
+        """The batches that were kept; a policy that was stored, or whose learner needed none, has not."""
+        kept: tuple[Batch, ...] = getattr(self, "_kept", ())
+        if not kept and self._folds.filled:
+            name = type(self._learner()).__name__
+            raise SettingError(
+                f"learner: {name} needs the samples, and this policy has their sums alone. "
+                f"Fit it with learner={name}() from the start."
+            )
+        return kept
+
     def _samples(self) -> Samples:
         """All samples that were kept, in their order."""
-        blocks = [block for batch in self._kept for block in batch.blocks()]
+        blocks = [block for batch in self._samples_so_far() for block in batch.blocks()]
         states, actions = (np.concatenate([block[i] for block in blocks]) for i in (0, 1))
         counts = np.concatenate([np.ones(len(b.states)) if b.weights is None else b.weights for b in blocks])
         dealt = np.concatenate([self._splitter.assign(block.states, block.groups) for block in blocks])

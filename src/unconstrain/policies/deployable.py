@@ -142,8 +142,8 @@ class Deployable:
 
     def __getstate__(self) -> Any:
         state: Any = super().__getstate__()
-        # Buffers are for this process; they are made again where they are needed.
-        return {name: value for name, value in state.items() if name != "_prepared"}
+        # Buffers are made again where they are needed; samples are no part of a policy that goes elsewhere.
+        return {name: value for name, value in state.items() if name not in ("_prepared", "_kept")}
 
 
 def _probes(form: ClosedForm) -> Array:

@@ -1,6 +1,6 @@
 """Beyond the paper: learners that look at the samples, hold under noise, and say when they cannot know."""
 
-from .learner import Likelihood, NoiseCorrected, Robust
+from .learner import Likelihood, NoiseCorrected, Robust, Segments
 from .posterior import RobustSolution
 from .samples import SampleLearner, Samples
 from .uncertainty import Uncertainty, uncertainty
@@ -12,6 +12,7 @@ __all__ = [
     "RobustSolution",
     "SampleLearner",
     "Samples",
+    "Segments",
     "Uncertainty",
     "uncertainty",
 ]

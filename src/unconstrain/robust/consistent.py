@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from functools import reduce
+from operator import add
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Array
 from ..learners import Hybrid
@@ -11,11 +15,12 @@ from ..objectives import inconsistency, standard_risk, vec
 from ..quadratic import NOISE, Quadratic, eigensystem
 from ..validation import FoldedMoments
 from .noise import corrected, correlation_time, noise_by_differences
-from .posterior import Candidate, Posterior, unit_information
+from .posterior import Candidate, Posterior, scaled, unit_information
 from .samples import Samples
+from .segments import constrained_error
 from .sphere import distances
 
-__all__ = ["noise_corrected", "softened"]
+__all__ = ["by_segments", "noise_corrected", "softened"]
 
 _ROUNDS = 3
 _STEPS = 6
@@ -75,6 +80,40 @@ def softened(samples: Samples, folds: FoldedMoments) -> Candidate:
     return Candidate("hybrid", weights, scaled, held_out, _mean(samples, radial**2))
 
 
+def by_segments(samples: Samples, labels: NDArray[np.intp], noise: float) -> Candidate:
+    """Minimise the constrained error with the projection of each segment, and the standard risk as far as a prior goes.
+
+    Segments are held out by fold; a projection is always from all of its segment.
+    """
+    d, ones = samples.actions.shape[1], np.ones(len(samples))
+    parts = [samples.folds == fold for fold in range(int(samples.folds.max()) + 1)]
+    errors = [constrained_error(samples[rows], labels[rows], noise) for rows in parts]
+    risks = [samples[rows].risk(samples.actions[rows], ones[rows]) for rows in parts]
+    sizes = samples.sizes
+    worth = unit_information(d * samples.features.shape[1], sizes)
+
+    def posterior(of: list[int], softness: Array) -> Posterior:
+        error, risk = (reduce(add, (one[i] for i in of)) for one in (errors, risks))
+        return Posterior(error, scaled(risk, softness))
+
+    everything, softness = list(range(len(parts))), np.full(len(sizes), 1e-2)
+    for _ in range(_STEPS):
+        whole = posterior(everything, softness)
+        weights = vec(whole.weights(d))
+        missed, taken = whole.evidence(weights), reduce(add, risks)(weights)
+        softness = np.clip(worth * missed / np.maximum(taken - missed, 1e-3 * taken + 1e-300), 1e-8, 1.0)
+    found = posterior(everything, softness)
+    held_out = np.empty_like(samples.actions)
+    for fold, rows in enumerate(parts):
+        rest = [i for i in everything if i != fold] or everything
+        held_out[rows] = samples[rows].predict(posterior(rest, softness).weights(d))
+    best = found.weights(d)
+    radial = distances(samples.actions, samples.predict(best)).radial
+    residual = np.maximum(missed, 1e-12 * reduce(add, risks).constant) / np.maximum(sizes, 1e-300)
+    time = correlation_time(radial[:, None], samples.groups)
+    return Candidate("segments", best, _per(found, time * residual), held_out, _mean(samples, radial**2))
+
+
 class _Corrected:
     """The two objectives of corrected moments, without what is not above the noise."""
 
@@ -86,9 +125,7 @@ class _Corrected:
         self.consistent = _certain(inconsistency(moments), standard_risk(plain).hessian, variance, sizes)
 
     def posterior(self, softness: Array) -> Posterior:
-        risk = self.risk
-        soft = Quadratic(softness[:, None, None] * risk.hessian, softness[:, None] * risk.linear, softness)
-        return Posterior(self.consistent, soft)
+        return Posterior(self.consistent, scaled(self.risk, softness))
 
     def softness(self) -> Array:
         """Variance along each action over that across it, by as much as a prior counts, found in a few steps."""
@@ -128,10 +165,7 @@ def _per(posterior: Posterior, variance: Array) -> Posterior:
     """The same in units of a variance, shape (M,)."""
     by = 1.0 / np.maximum(variance, 1e-300)
 
-    def scaled(one: Quadratic) -> Quadratic:
-        return Quadratic(by[:, None, None] * one.hessian, by[:, None] * one.linear, by * one.constant)
-
-    return Posterior(scaled(posterior.evidence), scaled(posterior.prior))
+    return Posterior(scaled(posterior.evidence, by), scaled(posterior.prior, by))
 
 
 def _mean(samples: Samples, values: Array) -> float:

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from ..arrays import Array, check_at_least
+from ..errors import SettingError
 from ..learners import Direct, Hybrid
 from ..projection import unit_actions
 from ..validation import FoldedMoments
-from .consistent import noise_corrected, softened
+from .consistent import by_segments, noise_corrected, softened
 from .likelihood import MISFIT, free_probability, maximise, settle
-from .posterior import Candidate, RobustSolution
+from .noise import noise_by_differences
+from .posterior import Candidate, Posterior, RobustSolution, scaled, unit_information
 from .samples import Samples
+from .segments import found_segments
 
-__all__ = ["Likelihood", "NoiseCorrected", "Robust"]
+__all__ = ["Likelihood", "NoiseCorrected", "Robust", "Segments"]
 
 NOISY = 0.015
 """Noise of more than this share of the actions' size is taken out of the sums."""
@@ -50,7 +54,7 @@ class Likelihood:
     """
 
     steps: int = 60
-    most: int = 4000
+    most: int = 2000
 
     def __post_init__(self) -> None:
         check_at_least("steps", self.steps, 1, whole=True)
@@ -93,6 +97,41 @@ class NoiseCorrected:
 
 
 @dataclass(frozen=True)
+class Segments:
+    """Learn where each constraint stays the same for a while; see :mod:`unconstrain.robust.segments`.
+
+    Needs the samples, not only their moments.
+
+    Parameters
+    ----------
+    labels : {"found", "groups"}
+        "groups": each demonstration has one constant constraint. "found": constraints change on the way, and where
+        they do is found from the actions, which must then be in the order of time.
+    noise : float, optional
+        Standard deviation of the noise on each action coordinate; by default from differences in time.
+    """
+
+    labels: Literal["found", "groups"] = "found"
+    noise: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.labels not in ("found", "groups"):
+            raise SettingError(f"labels: got {self.labels!r}, expected 'found' or 'groups'.")
+        if self.noise is not None:
+            check_at_least("noise", self.noise, 0.0)
+
+    def learn(self, samples: Samples, folds: FoldedMoments) -> RobustSolution:
+        """Learn from samples; ``folds`` are their moments."""
+        if _trivial(samples):
+            return _plain(samples, folds)
+        most = noise_by_differences(samples.actions, samples.groups)
+        noise = self.noise if self.noise is not None else float(np.sqrt(min(most, samples.energy)))
+        by_group = self.labels == "groups"
+        labels = samples.groups if by_group else found_segments(samples.actions, samples.groups, noise)
+        return _solution(samples, by_segments(samples, labels, noise), {})
+
+
+@dataclass(frozen=True)
 class Robust:
     """Learn under noise and in every constraint setting, with nothing to tune.
 
@@ -113,7 +152,7 @@ class Robust:
     """
 
     steps: int = 60
-    most: int = 4000
+    most: int = 2000
 
     def __post_init__(self) -> None:
         check_at_least("steps", self.steps, 1, whole=True)
@@ -156,11 +195,14 @@ def _solution(samples: Samples, chosen: Candidate, gaps: dict[str, float]) -> Ro
     policy = samples.predict(chosen.weights)
     variance, mixture = settle(samples, policy)
     free = free_probability(samples, policy, variance, mixture)
-    from_noise, undetermined = chosen.posterior.spreads()
     models, d, p = chosen.weights.shape
+    # What is known beforehand: the policy's size, as if each model had seen one such sample for each feature.
+    vague = samples.risk(samples.actions, np.full(len(samples), d / samples.energy))
+    belief = Posterior(chosen.posterior.evidence, scaled(vague, unit_information(p, samples.sizes)))
+    from_noise, undetermined = belief.spreads()
     return RobustSolution(
         chosen.weights @ samples.centring,
-        chosen.posterior.determined(),
+        belief.determined(),
         d * p,
         np.zeros(models),
         method=chosen.name,

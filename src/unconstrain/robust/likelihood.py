@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from ..arrays import Array
 from ..objectives import inconsistency
-from ..quadratic import Quadratic
 from .noise import correlation_time
-from .posterior import Candidate, Posterior, unit_information
+from .posterior import Candidate, Posterior, scaled, unit_information
 from .samples import Samples
 from .sphere import SPREADS, Beliefs, Distances, beliefs, distances
 
@@ -164,7 +163,7 @@ class _Model:
         evidence = inconsistency(some.moments(target[part, None] * normal[part], radial[part]))
         evidence = evidence + some.risk(points[part], (turned + held)[part])
         prior = some.risk(samples.actions[part], np.full(len(some), 1.0 / (spread * along)))
-        return Posterior(evidence, _scaled(prior, worth))
+        return Posterior(evidence, scaled(prior, worth))
 
     def _prior(self) -> tuple[float, Array]:
         """Mean square of what constraints took in each coordinate, and what the risk is worth beside it."""
@@ -173,10 +172,6 @@ class _Model:
         away = np.maximum(((samples.actions - self.policy) ** 2).sum(axis=1) - self.place.radial**2, 0.0)
         spread = float(held @ away / ((held.sum() + 1e-9) * (d - 1))) + self.variance
         return spread, unit_information(d * samples.features.shape[1], samples.sizes)
-
-
-def _scaled(one: Quadratic, by: Array) -> Quadratic:
-    return Quadratic(by[:, None, None] * one.hessian, by[:, None] * one.linear, by * one.constant)
 
 
 def _sum(parts: Sequence[Posterior]) -> Posterior:

@@ -24,6 +24,7 @@ from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from ..arrays import Array
 from ..moments import Moments
@@ -33,8 +34,6 @@ __all__ = ["corrected", "correlation_time", "noise_by_differences"]
 _ORDER = 4
 _LAGS = 20
 _QUIET = 0.05
-_MEDIAN = 0.4549
-"""Median of the square of a standard normal."""
 
 
 def noise_by_differences(actions: Array, groups: NDArray[np.intp]) -> float:
@@ -62,7 +61,8 @@ def noise_by_differences(actions: Array, groups: NDArray[np.intp]) -> float:
     if not same.any():
         return np.inf
     differences = sum(weight * actions[i : i + count] for i, weight in enumerate(weights))
-    return float(np.median(np.asarray(differences)[same] ** 2) / _MEDIAN / (weights**2).sum())
+    lengths = (np.asarray(differences)[same] ** 2).sum(axis=1)
+    return float(np.median(lengths) / chi2.median(actions.shape[1]) / (weights**2).sum())
 
 
 def correlation_time(residuals: Array, groups: NDArray[np.intp]) -> float:

@@ -12,7 +12,7 @@ from ..learners import Solution
 from ..objectives import unvec
 from ..quadratic import SECONDARY_NOISE, Quadratic, eigensystem, minimum
 
-__all__ = ["Candidate", "Posterior", "RobustSolution", "unit_information"]
+__all__ = ["Candidate", "Posterior", "RobustSolution", "scaled", "unit_information"]
 
 
 def unit_information(weights: int, sizes: Array) -> Array:
@@ -23,6 +23,13 @@ def unit_information(weights: int, sizes: Array) -> Array:
     nothing where it speaks.
     """
     return weights / np.maximum(sizes, 1.0)
+
+
+def scaled(objective: Quadratic, factors: Array) -> Quadratic:
+    """Each model's objective times its factor, shape (M,)."""
+    return Quadratic(
+        factors[:, None, None] * objective.hessian, factors[:, None] * objective.linear, factors * objective.constant
+    )
 
 
 @dataclass(frozen=True, eq=False)
