@@ -18,6 +18,7 @@ from numpy.testing import assert_allclose
 
 import unconstrain as uc
 from unconstrain import cli, experiments, report, storage
+from unconstrain.cli import fitting
 from unconstrain.errors import MissingExtraError
 from unconstrain.experiments import table1, washing
 
@@ -271,7 +272,7 @@ def test_direct_learning_does_not(files, tmp_path):
 
 
 def test_fit_says_what_it_did(files, tmp_path):
-    lines = run("fit", *files, "--model", "linear", "-o", tmp_path / "p.npz").splitlines()
+    lines = run("fit", *files, "--model", "linear", "--learner", "hybrid", "-o", tmp_path / "p.npz").splitlines()
     assert lines[:3] == [
         "Learnt from x, y as states and vx, vy as actions.",
         "8 demonstrations, 320 samples.",
@@ -283,12 +284,44 @@ def test_fit_says_what_it_did(files, tmp_path):
     assert lines[4] == f"policy: {tmp_path / 'p.npz'}"
 
 
+def test_fit_says_how_the_default_learner_went(files, tmp_path):
+    said = run("fit", *files, "--model", "linear", "-o", tmp_path / "p.npz").splitlines()[2]
+    assert re.fullmatch(
+        r"Learnt by .*: .*\. Noise and misfit are below 1 % of the actions, \d+% of the samples look free, "
+        r"and the data determined 100% of the weight directions\.",
+        said,
+    )
+
+
+def test_options_of_the_hybrid_mean_the_hybrid(files, tmp_path):
+    for option in (("--alpha", "auto"), ("--alpha", 0.3), ("--softness", 0.1)):
+        run("fit", *files, "--model", "linear", *option, "-o", tmp_path / "p.npz")
+        learner = storage.load(tmp_path / "p.npz").learner
+        assert isinstance(learner, uc.Hybrid)
+        assert getattr(learner, option[0].removeprefix("--")) == option[1]
+    assert "auto" in call("fit", *files, "--alpha", "much", "-o", tmp_path / "p.npz").err
+
+
+def test_much_data_is_learnt_from_sums(files, tmp_path, monkeypatch):
+    monkeypatch.setattr(fitting, "MUCH", 1000)
+    ran = call("fit", *files, "--model", "linear", "-o", tmp_path / "p.npz")
+    assert ran.code == 0
+    assert "are not kept in memory" in ran.err
+    assert isinstance(storage.load(tmp_path / "p.npz").learner, uc.Hybrid)
+
+
+def test_a_cluster_computes_no_samples(files, tmp_path):
+    said = refused("fit", *files, "--learner", "robust", "--scheduler", "tcp://nowhere:1", "-o", tmp_path / "p.npz")
+    assert "needs the samples" in said
+
+
 @pytest.mark.parametrize("learner", cli.LEARNERS)
 @pytest.mark.parametrize("model", cli.MODELS)
 def test_each_model_takes_each_learner(files, tmp_path, model, learner):
     said = run("fit", *files, "--model", model, "--learner", learner, "-o", tmp_path / "p.npz")
     assert ("local models" in said) == (model == "local")
-    assert ("The inconsistency determined" in said) == (learner != "direct")
+    assert ("The inconsistency determined" in said) == (learner in ("hybrid", "inconsistency"))
+    assert ("samples look free" in said) == (learner == "robust")
     assert type(storage.load(tmp_path / "p.npz").learner).__name__.lower() == learner
 
 
@@ -1002,7 +1035,7 @@ def test_demo_writes_a_row_for_each_method_and_surface(demonstrated):
     found = json.loads((demonstrated[1] / "washing.json").read_text())
     assert {(row["method"], row["surface"]) for row in found["rows"]} == {
         (method, surface)
-        for method in ("direct", "inconsistency", "hybrid")
+        for method in ("direct", "inconsistency", "hybrid", "robust")
         for surface in (
             [
                 "flat",

@@ -382,7 +382,7 @@ def test_the_wiping_policy_circles_presses_and_comes_back():
 
 def test_washing_has_a_row_for_each_method_and_surface(simulated):
     assert [(row["method"], row["surface"]) for row in simulated.rows] == [
-        (method, plate.name) for method in METHODS for plate in PLATES
+        (method, plate.name) for method in [*METHODS, "robust"] for plate in PLATES
     ]
     for row in simulated.rows:
         assert list(row) == ["method", "surface", "seen", "ncpe", "ncpe_sd", "nupe", "nupe_sd"]
@@ -394,14 +394,17 @@ def test_washing_has_a_row_for_each_method_and_surface(simulated):
 def test_on_unseen_plates_the_hybrid_wipes_best(simulated, metric):
     error = {method: mean_of(simulated, method, metric, seen=False) for method in METHODS}
     assert error["hybrid"] < min(error["direct"], error["inconsistency"])
+    assert mean_of(simulated, "robust", metric, seen=False) < min(error["direct"], error["inconsistency"])
 
 
 def test_washing_says_so_in_its_headlines(simulated):
     error = {method: mean_of(simulated, method, "nupe", seen=False) for method in METHODS}
-    values = ", ".join(f"{method} {error[method]:.4f}" for method in METHODS)
+    robust = mean_of(simulated, "robust", "nupe", seen=False)
+    values = ", ".join(f"{method} {value:.4f}" for method, value in [*error.items(), ("robust", robust)])
     assert washing.headlines(simulated)[1] == (
         f"nUPE on unseen surfaces, mean: {values}; hybrid is {error['hybrid'] / error['direct']:.2f} times direct, "
-        f"{error['hybrid'] / min(error['direct'], error['inconsistency']):.2f} times the better of the two"
+        f"{error['hybrid'] / min(error['direct'], error['inconsistency']):.2f} times the better of the two; "
+        f"robust, with nothing to set, is {robust / error['direct']:.2f} times direct"
     )
 
 

@@ -27,7 +27,7 @@ __all__ = ["Direct", "Hybrid", "Inconsistency", "Learner", "Solution"]
 
 Averaging = Literal["geometric", "arithmetic"]
 
-SOFTNESSES = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.2, 0.3, 0.5, 1.0, 3.0)
+SOFTNESSES = (1e-11, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.2, 0.3, 0.5, 1.0, 3.0)
 """What ``Hybrid(alpha="auto")`` tries."""
 
 

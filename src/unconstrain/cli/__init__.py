@@ -7,13 +7,13 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
 from .. import experiments
 from ..errors import ModelFileError, ReadError, SettingError, UnconstrainError
-from .fitting import check_writable, learn, policy_of
+from .fitting import Alpha, check_writable, default_learner, learn, learner_of, policy_of
 from .printing import Group, deliver, number, print_table, progress_bar, say_fit
 from .reading import (
     Numbers,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:  # everything heavy is imported by the command that needs it
 __all__ = ["main"]
 
 MODELS = ("local", "rbf", "linear")
-LEARNERS = ("hybrid", "inconsistency", "direct")
+LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
 
 
 @click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -102,10 +102,10 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
 @options_for_reading
 @click.option("-o", "--output", required=True, type=click.Path(dir_okay=False), help="File for the policy (.npz).")
 @click.option("--model", type=click.Choice(MODELS), default="local", show_default=True, help="What the policy is.")
-@click.option("--learner", type=click.Choice(LEARNERS), default="hybrid", show_default=True, help="What it minimises.")
+@click.option("--learner", type=click.Choice(LEARNERS), help="How it learns: robust, or hybrid on much data.")
 @click.option("--variance", type=float, help="Local: σ² of the receptive fields. By default from the data.")
 @click.option("--centres", type=click.IntRange(1), help="RBF: number of kernels, 25 by default.")
-@click.option("--alpha", type=float, help="Hybrid: weight of the standard risk in choosing the threshold.")
+@click.option("--alpha", type=Alpha(), help="Hybrid: weight of the standard risk in choosing the threshold, or auto.")
 @click.option("--softness", type=float, help="Hybrid: soften the split, such as 0.1; for noisy recordings.")
 @click.option(
     "--speed-power",
@@ -126,10 +126,10 @@ def fit(
     files: Sequence[str],
     output: str,
     model: str,
-    learner: str,
+    learner: str | None,
     variance: float | None,
     centres: int | None,
-    alpha: float | None,
+    alpha: float | Literal["auto"] | None,
     softness: float | None,
     speed_power: float,
     folds: int,
@@ -146,7 +146,8 @@ def fit(
 
     paths = expanded(files)
     check_writable((output, report), paths)
-    chosen = {"learner": _learner(learner, alpha, softness), "validation": validation.Folds(folds, hold_out)}
+    learner = learner or default_learner(paths, scheduler, alpha, softness)
+    chosen = {"learner": learner_of(learner, alpha, softness), "validation": validation.Folds(folds, hold_out)}
     fitted = policy_of(model, variance, centres, **chosen)
     stream = stream_of(paths, speed_power, **reading)
     learn(fitted, stream, scheduler)
@@ -360,20 +361,6 @@ def _plane(normal: tuple[float, ...] | None, dimensions: int, meaning: str) -> P
     if len(normal) != dimensions:
         raise SettingError(f"--plane: got {len(normal)} numbers, expected {dimensions}, {meaning}.")
     return Plane(np.array(normal))
-
-
-def _learner(name: str, alpha: float | None, softness: float | None) -> Any:
-    from ..learners import Direct, Hybrid, Inconsistency
-
-    given = {key: value for key, value in (("alpha", alpha), ("softness", softness)) if value is not None}
-    if name != "hybrid" and given:
-        raise SettingError(f"--{next(iter(given))}: belongs to the hybrid learner, got --learner {name}.")
-    if name != "hybrid":
-        return Direct() if name == "direct" else Inconsistency()
-    if alpha is not None and softness:
-        raise SettingError("--alpha: chooses a threshold, and --softness does without one; give one of the two.")
-    # A softened split needs no threshold on top.
-    return Hybrid(**given, threshold=0.0 if softness else None)  # type: ignore[arg-type]
 
 
 def _columns(path: Demonstration) -> Any:

@@ -1,10 +1,12 @@
-"""The steps of ``unconstrain fit``: where to write, which policy, where to compute."""
+"""The steps of ``unconstrain fit``: where to write, which policy and learner, where to compute."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
 
 from ..errors import SettingError
 
@@ -12,7 +14,56 @@ if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
     from ..policies import Policy
     from ..streams import Stream
 
-__all__ = ["check_writable", "learn", "policy_of"]
+__all__ = ["Alpha", "check_writable", "default_learner", "learn", "learner_of", "policy_of"]
+
+MUCH = 200_000_000
+"""Bytes of data beyond which the samples are not kept in memory, and so not looked at by the default learner."""
+
+
+class Alpha(click.ParamType):  # type: ignore[type-arg]
+    """A number, or auto."""
+
+    name = "float|auto"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Turn the text of the option into either."""
+        try:
+            return value if value == "auto" else float(value)
+        except ValueError:
+            self.fail(f"got {value!r}, expected a number or auto.", param, ctx)
+
+
+def default_learner(
+    paths: Sequence[str], scheduler: str | None, alpha: float | Literal["auto"] | None, softness: float | None
+) -> str:
+    """Which learner is meant where none is named."""
+    if scheduler is not None or alpha is not None or softness is not None:
+        return "hybrid"
+    size = sum(Path(path).stat().st_size for path in paths if Path(path).is_file())
+    if size <= MUCH:
+        return "robust"
+    click.echo(
+        f"Note: {size / 1e6:.0f} MB of data are not kept in memory, so this is --learner hybrid; on a part of them "
+        "--learner robust may do better.",
+        err=True,
+    )
+    return "hybrid"
+
+
+def learner_of(name: str, alpha: float | Literal["auto"] | None, softness: float | None) -> Any:
+    """Make the learner that the options say."""
+    from ..learners import Direct, Hybrid, Inconsistency
+    from ..robust import Robust
+
+    given = {key: value for key, value in (("alpha", alpha), ("softness", softness)) if value is not None}
+    if name != "hybrid":
+        if given:
+            raise SettingError(f"--{next(iter(given))}: belongs to the hybrid learner, got --learner {name}.")
+        return {"direct": Direct, "inconsistency": Inconsistency, "robust": Robust}[name]()
+    if alpha is not None and softness:
+        raise SettingError("--alpha: chooses a threshold, and --softness does without one; give one of the two.")
+    # A softened split needs no threshold on top.
+    return Hybrid(**given, threshold=0.0 if softness else None)  # type: ignore[arg-type]
 
 
 def check_writable(outputs: Sequence[str | None], paths: Sequence[str]) -> None:
@@ -42,6 +93,8 @@ def learn(policy: Policy, stream: Stream, scheduler: str | None) -> None:
     if scheduler is None:
         policy.fit_batches(stream)
         return
+    if type(policy.learner).__name__ == "Robust":
+        raise SettingError("--scheduler: a cluster computes sums, and --learner robust needs the samples; take hybrid.")
     from .. import cluster
 
     with cluster.connected(scheduler) as client:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
 
     from ..experiments.trials import Progress, Result
     from ..policies import Policy
+    from ..robust import RobustSolution
     from ..streams import Stream
 
 __all__ = ["Group", "deliver", "number", "print_table", "progress_bar", "say_fit", "show_warning"]
@@ -94,6 +95,8 @@ def say_fit(policy: Policy, stream: Stream | None, learner: str) -> None:
 
     Without a stream nothing is said that would need to look at the samples again.
     """
+    from ..robust import RobustSolution
+
     solution = policy.solution_
     models = f", {len(solution.weights)} local models" if len(solution.weights) > 1 else ""
     training = 0.0
@@ -102,7 +105,9 @@ def say_fit(policy: Policy, stream: Stream | None, learner: str) -> None:
         click.echo(f"{names} demonstrations, {samples} samples{models}.")
     elif models:
         click.echo(f"{models.removeprefix(', ')}.")
-    if learner != "direct":
+    if isinstance(solution, RobustSolution):
+        click.echo(_said_of_samples(solution))
+    elif learner != "direct":
         rest = "; the rest follows the standard risk." if learner == "hybrid" and solution.determined_share < 1 else "."
         click.echo(
             f"The inconsistency determined {solution.determined_share:.0%} of {solution.directions} weight directions"
@@ -123,6 +128,24 @@ def say_fit(policy: Policy, stream: Stream | None, learner: str) -> None:
             "--still help; otherwise the demonstrations may have too little in common.",
             err=True,
         )
+
+
+def _said_of_samples(solution: RobustSolution) -> str:
+    """Which way a robust learner went, and what it thinks of the samples."""
+    ways = {
+        "likelihood": "by likelihood: samples look free, or constrained at random",
+        "noise-corrected": "by consistency, with the noise taken out: constraints go with the state",
+        "hybrid": "by consistency, softened: there is little noise to take out",
+    }
+    least = solution.misfit * solution.weights.shape[1] ** 0.5
+    size = (
+        "below 1 % of the actions" if solution.noise <= 1.001 * least else f"about {solution.noise:.3g} on each action"
+    )
+    return (
+        f"Learnt {ways.get(solution.method, solution.method)}. Noise and misfit are {size}, "
+        f"{solution.free_share:.0%} of the samples look free, and the data determined "
+        f"{solution.determined_share:.0%} of the weight directions."
+    )
 
 
 def _walked(policy: Policy, stream: Stream) -> tuple[int, int, float]:

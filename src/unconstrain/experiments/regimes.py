@@ -263,15 +263,16 @@ def _oracle(policy: Policy, test: Sequence[Demonstration], count: int) -> tuple[
     whole = folds.whole if centring is None else folds.whole.in_features(centring)
     path = lexicographic_path(inconsistency(whole), standard_risk(whole))
     states, truth = stack(test).states, np.concatenate([d.truth.policy for d in test if d.truth is not None])
-    best, least = policy, np.inf
+    other = policy.with_learner(Direct())
+    best, least, plain = other.solution_, np.inf, other.solution_
     for threshold in (0.0, *np.logspace(-10, 0, count)):
         weights = unvec(path.at(path.split(threshold)), whole.cross.shape[1])
-        other = policy.with_learner(Direct())
-        other.solution_ = replace(other.solution_, weights=weights if centring is None else weights @ centring)
+        other.solution_ = replace(plain, weights=weights if centring is None else weights @ centring)
         missed = float(((other(states) - truth) ** 2).sum())
         if missed < least:
-            best, least = other, missed
-    return _errors(best, test)
+            best, least = other.solution_, missed
+    other.solution_ = best
+    return _errors(other, test)
 
 
 def _policy(system: str) -> Policy:

@@ -11,6 +11,7 @@ from ..closed_form import ClosedForm, exponents
 from ..features import Affine
 from ..learners import Learner
 from ..receptive_fields import ReceptiveFields, choose_variance, cover
+from ..robust import SampleLearner
 from ..validation import Validation
 from .base import Policy
 
@@ -51,7 +52,7 @@ class LocallyLinearPolicy(Policy):
         variance: float | None = None,
         at_least: float = 0.7,
         centres: ArrayLike | None = None,
-        learner: Learner | None = None,
+        learner: Learner | SampleLearner | None = None,
         validation: Validation | None = None,
     ) -> None:
         self.variance = variance

@@ -11,6 +11,7 @@ from ..closed_form import ClosedForm
 from ..errors import SettingError
 from ..features import FeatureMap, KMeansRBF, Placeable
 from ..learners import Learner
+from ..robust import SampleLearner
 from ..validation import Validation
 from .base import Policy
 
@@ -42,7 +43,7 @@ class ParametricPolicy(Policy):
     def __init__(
         self,
         features: FeatureMap | Placeable | None = None,
-        learner: Learner | None = None,
+        learner: Learner | SampleLearner | None = None,
         validation: Validation | None = None,
     ) -> None:
         self.features = features

@@ -119,7 +119,7 @@ def _fields(cases: list[Case], real: bool) -> str:
         plate = case.plate
         points = plate.grid(ARROWS)
         states = plate.place(points)
-        fields = {name: policy(states) @ plate.axes for name, policy in case.split.policies.items()}
+        fields = {name: case.split.policies[name](states) @ plate.axes for name in figures.METHODS}
         if not real:
             fields["truth"] = WipingPolicy()(states) @ plate.axes
         demo = case.demonstration
@@ -158,7 +158,7 @@ def _velocities(cases: list[Case]) -> str:
     for case in cases:
         demo = case.demonstration
         onto = null_space_projection(case.normal[None, :])
-        series = {name: project(onto, policy(demo.states)) for name, policy in case.split.policies.items()}
+        series = {name: project(onto, case.split.policies[name](demo.states)) for name in figures.METHODS}
         times = demo.times if demo.times is not None else np.arange(len(demo), dtype=np.float64)
         names = [f"v<sub>{axis}</sub> (m/s)" for axis in "xyz"]
         panels.append(figures.over_time(times, series | {"observed": demo.actions}, names, title=case.title))

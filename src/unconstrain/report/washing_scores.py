@@ -17,6 +17,9 @@ Row = dict[str, Any]
 KINDS = {"plane": "normal of the plane", "tool": "axis of the tool"}
 
 
+_COLUMNS = (*figures.METHODS, "robust")
+
+
 def scores(result: Result) -> str:
     """Method by surface, and the mean over those that were held out."""
     return _real_scores(result.rows) if "normal" in result.rows[0] else _simulated_scores(result.rows)
@@ -41,17 +44,18 @@ def bars(result: Result) -> str:
 
 def _simulated_scores(rows: list[Row]) -> str:
     header = ["surface", "learnt from"]
-    header += [f"{title}<br>{method}" for title in ("nCPE", "nUPE") for method in figures.METHODS]
+    header += [f"{title}<br>{method}" for title in ("nCPE", "nUPE") for method in _COLUMNS]
     surfaces = list(dict.fromkeys((row["surface"], row["seen"]) for row in rows))
     body = []
     for surface, seen in surfaces:
-        values = [_value(rows, method, surface, what) for what in ("ncpe", "nupe") for method in figures.METHODS]
+        values = [_value(rows, method, surface, what) for what in ("ncpe", "nupe") for method in _COLUMNS]
         body.append([escape(surface), "yes" if seen else "no", *map(html.number, values)])
     seen_count = sum(seen for _, seen in surfaces)
     unseen = [row for row in rows if not row["seen"]]
     body.append(["<b>mean of the unseen</b>", "", *_means(unseen, "ncpe"), *_means(unseen, "nupe")])
     note = (
-        "Squared errors as a share of the policy’s variance. In the last row, in brackets: relative to direct learning."
+        "Squared errors as a share of the policy’s variance. In the last row, in brackets: relative to direct "
+        "learning. Robust is the default learner of <i>fit</i>, with nothing set for this job."
     )
     return html.table(header, body, left=2, note=note, rules=(seen_count, len(surfaces)))
 
@@ -59,17 +63,13 @@ def _simulated_scores(rows: list[Row]) -> str:
 def _real_scores(rows: list[Row]) -> str:
     kinds = list(dict.fromkeys(row["normal"] for row in rows))
     header = ["held-out tilt"]
-    header += [f"{method}<br>{kind} normal" for kind in kinds for method in figures.METHODS]
+    header += [f"{method}<br>{kind} normal" for kind in kinds for method in _COLUMNS]
     surfaces = list(dict.fromkeys(row["surface"] for row in rows))
     of_kind = {kind: [row for row in rows if row["normal"] == kind] for kind in kinds}
     body = [
         [
             escape(surface),
-            *(
-                html.number(_value(of_kind[kind], method, surface, "ncpe"))
-                for kind in kinds
-                for method in figures.METHODS
-            ),
+            *(html.number(_value(of_kind[kind], method, surface, "ncpe")) for kind in kinds for method in _COLUMNS),
         ]
         for surface in surfaces
     ]
@@ -78,16 +78,14 @@ def _real_scores(rows: list[Row]) -> str:
         "nCPE: squared error along the surface, as a share of the observed motion’s variance; 0 is perfect, and 1 "
         "no better than one constant velocity. The surface’s normal is estimated in two ways that share "
         "nothing: from the plane through the positions, and from the axis of the tool. In the last row, in brackets: "
-        "relative to direct learning."
+        "relative to direct learning. Robust is the default learner of <i>fit</i>, with nothing set for this job."
     )
     return html.table(header, body, note=note, rules=(len(surfaces),))
 
 
 def _means(rows: list[Row], what: str) -> list[str]:
     """Mean of each method, with its ratio to direct learning."""
-    means = {
-        method: float(np.mean([row[what] for row in rows if row["method"] == method])) for method in figures.METHODS
-    }
+    means = {method: float(np.mean([row[what] for row in rows if row["method"] == method])) for method in _COLUMNS}
     cells = []
     for method, mean in means.items():
         ratio = mean / means["direct"] if means["direct"] > 0 else float("nan")

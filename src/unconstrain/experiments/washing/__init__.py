@@ -164,7 +164,8 @@ def headlines(result: Result) -> list[str]:
                 better = means["hybrid"] / min(means["direct"], means["inconsistency"])
                 said.append(
                     f"{label} on unseen surfaces{of}, mean: {values}; hybrid is {ratio:.2f} times direct, "
-                    f"{better:.2f} times the better of the two"
+                    f"{better:.2f} times the better of the two; robust, with nothing to set, is "
+                    f"{means['robust'] / means['direct']:.2f} times direct"
                 )
     return said + [_said(name, rows) for name, rows in _by_surface(result.tables["reproduction"]).items()]
 

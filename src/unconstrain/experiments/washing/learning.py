@@ -15,6 +15,7 @@ from ...errors import InvalidDataError
 from ...learners import Direct, Hybrid, Inconsistency, Learner
 from ...metrics import cpe, ncpe, nupe
 from ...policies import LocallyLinearPolicy, Policy
+from ...robust import Robust
 from ...rollouts import rollout
 from ...validation import Folds
 from .surfaces import Surface, simulated_split
@@ -68,16 +69,16 @@ def learn(settings: Settings, training: Sequence[Surface], held_out: Sequence[Su
     policies = fitted(settings, training)
     first, normal = held_out[0].demonstrations[0], held_out[0].normals[0]["plane"]
     rollouts = {
-        name: _followed(policy, first.states[0], Plane(normal), settings, name) for name, policy in policies.items()
+        name: _followed(policies[name], first.states[0], Plane(normal), settings, name) for name in learners(settings)
     }
     return Split(tuple(training), tuple(held_out), policies, rollouts)
 
 
 def fitted(settings: Settings, training: Sequence[Surface]) -> dict[str, Policy]:
-    """Method to policy, all from the same sums."""
-    base = LocallyLinearPolicy(settings.variance, settings.at_least, learner=Direct(), validation=Folds())
+    """Method to policy, all from the same samples; "robust" is what is learnt with nothing set for this job."""
+    base = LocallyLinearPolicy(settings.variance, settings.at_least, learner=Robust(), validation=Folds())
     base.fit_demonstrations([demo for surface in training for demo in surface.demonstrations])
-    return {name: base.with_learner(learner) for name, learner in learners(settings).items()}
+    return {name: base.with_learner(learner) for name, learner in learners(settings).items()} | {"robust": base}
 
 
 def simulated_rows(splits: Sequence[Split]) -> list[dict[str, Any]]:
