@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import BLOCK_ROWS, Array
+from .arrays import BLOCK_ROWS, Array, beside, is_foreign, namespace, on_host
 from .errors import InvalidDataError
 
 __all__ = ["PLACING_SAMPLES", "Batch", "FirstLook", "Groups", "mixed"]
@@ -23,13 +23,17 @@ PLACING_SAMPLES = 20_000
 
 Groups = Sequence[Hashable] | NDArray[np.generic]
 
+FOREIGN_BLOCK_ROWS = 2**20
+"""Rows of an array of another library that are summed together: its device may want much to do at once."""
+
 _ALL = np.uint64(2**64 - 1)
 
 
 class Batch(NamedTuple):
     """Samples that were checked: ``states`` (N, n), ``actions`` (N, d), ``weights`` (N,) and ``groups`` (N,) if given.
 
-    Of any real type; :meth:`blocks` gives float64.
+    Of any real type; :meth:`blocks` gives float64. States and actions may be
+    arrays of another library.
     """
 
     states: NDArray[Any]
@@ -39,22 +43,24 @@ class Batch(NamedTuple):
 
     def blocks(self) -> Iterator[Batch]:
         """Go through it by some rows at a time, without those of no weight."""
-        for start in range(0, len(self.states), BLOCK_ROWS):
-            part = self._at(slice(start, start + BLOCK_ROWS))
+        xp = namespace(self.states)
+        size = FOREIGN_BLOCK_ROWS if is_foreign(self.states) else BLOCK_ROWS
+        for start in range(0, self.states.shape[0], size):
+            rows = slice(start, start + size)
+            cut: list[Any] = [None if table is None else table[rows] for table in self]
+            part = Batch(*cut)
             if part.weights is not None and not part.weights.all():
-                part = part._at(part.weights > 0)  # a weight of zero is the same as not being there
-            if len(part.states):
-                states, actions = (np.asarray(table, dtype=np.float64) for table in part[:2])
+                part = part.at(np.flatnonzero(part.weights))  # a weight of zero is the same as not being there
+            if part.states.shape[0]:
+                states, actions = (xp.asarray(table, dtype=xp.float64) for table in part[:2])
                 yield part._replace(states=states, actions=actions)
 
-    def _at(self, rows: slice | NDArray[np.bool_]) -> Batch:
-        states, actions, weights, groups = self
-        return Batch(
-            states[rows],
-            actions[rows],
-            None if weights is None else weights[rows],
-            None if groups is None else groups[rows],
-        )
+    def at(self, rows: NDArray[np.intp]) -> Batch:
+        """Some of the samples, in any order."""
+        parts: list[Any] = [
+            None if part is None else namespace(part).take(part, beside(rows, part), axis=0) for part in self
+        ]
+        return Batch(*parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +98,11 @@ class FirstLook:
     states: Array
     groups: dict[Hashable, None] | None
 
+    @property
+    def different(self) -> Array:
+        """Its states in a fixed order: repetition and order of the samples must not move the features."""
+        return np.unique(self.states, axis=0)
+
     @classmethod
     def at(cls, batch: Batch) -> FirstLook | None:
         """Look at a batch; None if it is empty but for samples of no weight."""
@@ -104,7 +115,7 @@ class FirstLook:
 
     @classmethod
     def _at_block(cls, block: Batch, largest_key: np.uint64) -> FirstLook:
-        states, actions, weights, groups = block
+        states, actions, weights, groups = on_host(block.states), on_host(block.actions), block.weights, block.groups
         counts = np.ones(len(states)) if weights is None else weights
         weight = float(counts.sum())
         shares = counts / weight
