@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal, Protocol
 
 import numpy as np
@@ -19,8 +20,9 @@ from numpy.typing import NDArray
 from .arrays import Array, check_at_least
 from .errors import SettingError
 from .moments import Moments
-from .objectives import inconsistency, standard_risk, unvec
+from .objectives import inconsistency, standard_risk, unvec, vec
 from .quadratic import SECONDARY_NOISE, Path, Quadratic, eigensystem, lexicographic_path, minimum
+from .threads import side_by_side
 from .validation import FoldedMoments
 
 __all__ = ["Direct", "Hybrid", "Inconsistency", "Learner", "Solution"]
@@ -162,16 +164,20 @@ def _solve(
     path_of: Callable[[Moments], Path],
     score_of: Callable[[Moments], Quadratic],
 ) -> Solution:
+    def judge(training: Moments, held_out: Moments) -> Array:
+        return score_of(held_out)(path_of(training).weights)
+
     whole = folds.whole
-    path = path_of(whole)
+    # With nothing to hold out, the data has to judge itself.
+    rounds = folds.rounds() or [(whole, whole)] if learner.threshold is None else []
+    path, *judged = side_by_side(
+        [partial(path_of, whole), *(partial(judge, *pair) for pair in rounds)], *vec(whole.cross).shape
+    )
     scores = None
     if learner.threshold is not None:
         splits = path.split(learner.threshold)
     else:
-        # With nothing to hold out, the data has to judge itself.
-        rounds = folds.rounds() or [(whole, whole)]
-        judged = np.stack([score_of(held_out)(path_of(training).weights) for training, held_out in rounds])
-        scores = _average(judged, [held_out for _, held_out in rounds], learner.averaging)
+        scores = _average(np.stack(judged), [held_out for _, held_out in rounds], learner.averaging)
         splits = np.maximum(_last_best(scores), path.lowest)
     directions = path.eigenvalues.shape[1]
     weights = unvec(path.at(splits), whole.cross.shape[1])

@@ -214,8 +214,10 @@ class Sums:
         models, d, p = self._shape
         if not self._sums:
             return Moments.zero(models, d, p)
-        weight, energy, cross, *products = self._sums
-        xp = namespace(weight)
+        xp = namespace(self._sums[0])
+        # The first three as copies: what is added later must not change them.
+        weight, energy, cross = (xp.asarray(each, copy=True) for each in self._sums[:3])
+        products = self._sums[3:]
         if models == 1:
             full = xp.stack(products)[None]  # (1, metrics, p, p)
         else:
@@ -288,7 +290,9 @@ def _halves(xp: Any, table: Array) -> Array:
 
 def _each_with_each(xp: Any, first: Array, second: Array) -> Array:
     """Products of each column of one table with each of another, row by row."""
-    products: Array = xp.reshape(first[:, :, None] * second[:, None, :], (first.shape[0], -1))
+    products: Array = xp.reshape(
+        first[:, :, None] * second[:, None, :], (first.shape[0], first.shape[1] * second.shape[1])
+    )
     return products
 
 

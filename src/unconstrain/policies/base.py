@@ -14,6 +14,7 @@ from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from ..arrays import (
+    BLOCK_ROWS,
     Array,
     as_groups,
     as_matrix,
@@ -213,7 +214,8 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         """
         check_is_fitted(self, "solution_")
         states = self._checked_states(X)
-        blocks = (states[start : start + _ROWS] for start in range(0, states.shape[0], _ROWS))
+        rows = BLOCK_ROWS if is_foreign(states) else _ROWS
+        blocks = (states[start : start + rows] for start in range(0, states.shape[0], rows))
         actions: Array = namespace(states).concat([self._predict_block(block) for block in blocks])
         return actions[:, 0] if self._flat else actions
 
@@ -342,7 +344,8 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
     def _add(self, batch: Batch, sums: Sequence[Sums]) -> None:
         """Add samples to the sums of their folds."""
         folds = self._splitter.assign(on_host(batch.states), batch.groups)
-        order = np.argsort(folds, kind="stable")  # so that each fold is in one piece
+        # Each fold in one piece; of small integers NumPy sorts by counting.
+        order = np.argsort(folds.astype(np.min_scalar_type(len(sums))), kind="stable")
         starts = np.searchsorted(folds[order], np.arange(len(sums) + 1))
         states, actions, weights, _ = batch.at(order)
         weights = beside(np.ones(len(order)) if weights is None else weights, states)
