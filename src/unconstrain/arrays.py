@@ -12,7 +12,7 @@ of another library. Such an array stays on its device.
 from __future__ import annotations
 
 import importlib
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from numbers import Integral
 from types import ModuleType
 from typing import Any, NoReturn
@@ -38,6 +38,7 @@ __all__ = [
     "namespace",
     "on_host",
     "require_extra",
+    "slices",
 ]
 
 Array = NDArray[np.float64]
@@ -207,6 +208,12 @@ def as_groups(values: Sequence[Hashable] | NDArray[np.generic], length: int) -> 
     return names
 
 
+def slices(table: Any, rows: int) -> Iterator[slice]:
+    """Slices that go through a table by so many rows at a time, the last by what is left."""
+    samples = table.shape[0]
+    return (slice(start, min(start + rows, samples)) for start in range(0, samples, rows))
+
+
 def check_at_least(name: str, value: Any, least: float, *, strict: bool = False, whole: bool = False) -> None:
     """Check that a numeric setting is finite, not below a bound and, on demand, a whole number.
 
@@ -275,7 +282,7 @@ def _foreign_as_real(values: Any, what: str, convert: bool) -> Any:
 
 
 def _finite(values: Array, what: str) -> Array:
-    if all(_is_sensible(values[start : start + BLOCK_ROWS]) for start in range(0, values.shape[0], BLOCK_ROWS)):
+    if all(_is_sensible(values[rows, ...]) for rows in slices(values, BLOCK_ROWS)):
         return values
     return _refuse(on_host(values).astype(np.float64, copy=False), what)
 

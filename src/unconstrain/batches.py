@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import BLOCK_ROWS, Array, beside, is_foreign, namespace, on_host
+from .arrays import BLOCK_ROWS, Array, beside, is_foreign, namespace, on_host, slices
 from .errors import InvalidDataError
 
 __all__ = ["PLACING_SAMPLES", "Batch", "FirstLook", "Groups", "mixed"]
@@ -44,10 +44,8 @@ class Batch(NamedTuple):
     def blocks(self) -> Iterator[Batch]:
         """Go through it by some rows at a time, without those of no weight."""
         xp = namespace(self.states)
-        size = FOREIGN_BLOCK_ROWS if is_foreign(self.states) else BLOCK_ROWS
-        for start in range(0, self.states.shape[0], size):
-            rows = slice(start, start + size)
-            cut: list[Any] = [None if table is None else table[rows] for table in self]
+        for rows in slices(self.states, FOREIGN_BLOCK_ROWS if is_foreign(self.states) else BLOCK_ROWS):
+            cut: list[Any] = [None if table is None else table[rows, ...] for table in self]
             part = Batch(*cut)
             if part.weights is not None and not part.weights.all():
                 part = part.at(np.flatnonzero(part.weights))  # a weight of zero is the same as not being there

@@ -157,7 +157,7 @@ def gather_blocks(
     sums = Sums(models, actions, features, at_rest)
     for block in blocks:
         for rows in sums.pieces(block[0]):
-            sums.add(*(part[rows] for part in block))
+            sums.add(*(part[rows, :] for part in block))
     return sums.moments
 
 
@@ -219,7 +219,7 @@ class Sums:
         weight, energy, cross = (xp.asarray(each, copy=True) for each in self._sums[:3])
         products = self._sums[3:]
         if models == 1:
-            full = xp.stack(products)[None]  # (1, metrics, p, p)
+            full = xp.stack(products)[None, ...]  # (1, metrics, p, p)
         else:
             halves = xp.reshape(products[0], (models, -1, p * (p + 1) // 2))
             full = xp.take(halves, beside(_places(p).ravel(), weight), axis=2)
@@ -230,7 +230,7 @@ class Sums:
             weight,
             energy,
             xp.reshape(cross, (models, d, p)),
-            xp.asarray(full[:, 0], copy=True),
+            xp.asarray(full[:, 0, :, :], copy=True),
             xp.reshape(hessian, (models, p * d, p * d)),
         )
 
@@ -257,8 +257,9 @@ def _products_of_one(
     pointed = directions * root
     resting: Array | float = 0.0
     if not xp.all(moving):
-        resting = _gram((features * root)[~moving])
-        features, root, pointed = features[moving], root[moving], pointed[moving]
+        still, moves = xp.nonzero(~moving)[0], xp.nonzero(moving)[0]
+        resting = _gram(xp.take(features, still, axis=0) * xp.take(root, still, axis=0))
+        features, root, pointed = (xp.take(part, moves, axis=0) for part in (features, root, pointed))
     whole = _gram(features if xp.all(root == 1.0) else features * root)
     largest = int(xp.argmax(xp.sum(pointed**2, axis=0)))  # subtracting for a small one would leave rounding
     d = pointed.shape[1]

@@ -25,6 +25,7 @@ from ..arrays import (
     is_foreign,
     namespace,
     on_host,
+    slices,
 )
 from ..batches import Batch, FirstLook, Groups
 from ..demonstration import Demonstration, stack
@@ -214,9 +215,8 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         """
         check_is_fitted(self, "solution_")
         states = self._checked_states(X)
-        rows = BLOCK_ROWS if is_foreign(states) else _ROWS
-        blocks = (states[start : start + rows] for start in range(0, states.shape[0], rows))
-        actions: Array = namespace(states).concat([self._predict_block(block) for block in blocks])
+        blocks = slices(states, BLOCK_ROWS if is_foreign(states) else _ROWS)
+        actions: Array = namespace(states).concat([self._predict_block(states[rows, :]) for rows in blocks])
         return actions[:, 0] if self._flat else actions
 
     def __call__(self, states: ArrayLike) -> Array:
@@ -351,9 +351,9 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         weights = beside(np.ones(len(order)) if weights is None else weights, states)
         for fold, (start, stop) in zip(sums, pairwise(starts), strict=True):
             here = slice(start, stop)
-            mine = states[here], actions[here], weights[here]
+            mine = states[here, :], actions[here, :], weights[here]
             for rows in fold.pieces(mine[0]):
-                fold.add(*self._block(*(part[rows] for part in mine)))
+                fold.add(*self._block(*(part[rows, ...] for part in mine)))
 
     def _block(self, states: Array, actions: Array, weights: Array) -> tuple[Array, Array, Array]:
         """Features, actions, and how much each sample counts in each model."""

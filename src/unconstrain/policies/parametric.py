@@ -58,9 +58,9 @@ class ParametricPolicy(Policy):
 
     def _features(self, states: Array) -> Array:
         features = self.features_(states)
-        if np.ndim(features) != 2 or len(features) != len(states):
+        if np.ndim(features) != 2 or np.shape(features)[0] != states.shape[0]:
             raise SettingError(
-                f"features: got an array of shape {np.shape(features)} for {len(states)} states, "
+                f"features: got an array of shape {tuple(np.shape(features))} for {states.shape[0]} states, "
                 "expected (samples, features)."
             )
         return as_matrix(features, "features")
