@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,9 +170,9 @@ def _solve(
     whole = folds.whole
     # With nothing to hold out, the data has to judge itself.
     rounds = folds.rounds() or [(whole, whole)] if learner.threshold is None else []
-    path, *judged = side_by_side(
-        [partial(path_of, whole), *(partial(judge, *pair) for pair in rounds)], *vec(whole.cross).shape
-    )
+    calls: list[Callable[[], Any]] = [partial(path_of, whole), *(partial(judge, *pair) for pair in rounds)]
+    models, size = vec(whole.cross).shape
+    path, *judged = side_by_side(calls, len(calls) * models * size**3, size)
     scores = None
     if learner.threshold is not None:
         splits = path.split(learner.threshold)

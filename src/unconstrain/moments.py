@@ -170,24 +170,24 @@ class Sums:
     Parameters
     ----------
     models, actions, features : int
-        M, d and p.
+        M, d and p; together the attribute ``shape``.
     at_rest : float
         Actions of at most this length have no direction.
     """
 
     def __init__(self, models: int, actions: int, features: int, at_rest: float = 0.0) -> None:
-        self._shape, self._at_rest = (models, actions, features), at_rest
+        self.shape, self._at_rest = (models, actions, features), at_rest
         self._sums: list[Array] = []
 
-    def pieces(self, table: Array) -> Iterator[slice]:
-        """Rows of a table to add at a time, so that what is made of them stays in cache."""
-        models, d, p = self._shape
+    def pieces(self, table: Array, start: int = 0, stop: int | None = None) -> Iterator[slice]:
+        """Rows of a table, or of some of it, to add at a time, so that what is made of them stays in cache."""
+        models, d, p = self.shape
         columns = p if models == 1 else d * d * p * p // 4
         numbers, most = (_FOREIGN_BLOCK, 2**20) if is_foreign(table) else (_BLOCK, 8192)
         rows = min(max(512, numbers // columns), most)
-        samples = table.shape[0]
+        samples = (table.shape[0] if stop is None else stop) - start
         number = -(-samples // rows)
-        return (slice(samples * i // number, samples * (i + 1) // number) for i in range(number))
+        return (slice(start + samples * i // number, start + samples * (i + 1) // number) for i in range(number))
 
     def add(self, features: Array, actions: Array, weights: Array) -> None:
         """Add some samples, of shapes as in :func:`gather`."""
@@ -197,7 +197,7 @@ class Sums:
         directions, lengths = unit_actions(u)
         moving = lengths > self._at_rest
         further = [xp.sum(w, axis=0), w.T @ lengths**2]
-        if self._shape[0] == 1:
+        if self.shape[0] == 1:
             further += [(w * u).T @ phi, *_products_of_one(xp, phi, directions, moving, w)]
         else:
             directions = xp.where(moving[:, None], directions, 0.0)
@@ -211,7 +211,7 @@ class Sums:
     @property
     def moments(self) -> Moments:
         """What was added, summed."""
-        models, d, p = self._shape
+        models, d, p = self.shape
         if not self._sums:
             return Moments.zero(models, d, p)
         xp = namespace(self._sums[0])

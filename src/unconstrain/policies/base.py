@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from copy import deepcopy
+from functools import partial
 from itertools import chain, pairwise
 from typing import Any, Self
 
@@ -34,6 +35,7 @@ from ..learners import Hybrid, Learner, Solution
 from ..moments import Moments, Sums
 from ..objectives import inconsistency, vec
 from ..projection import unit_actions
+from ..threads import side_by_side
 from ..validation import FoldedMoments, Folds, Splitter, Validation
 from .deployable import Deployable
 
@@ -44,6 +46,9 @@ AT_REST = 1e-12
 
 _ROWS = 4096
 """Rows that are predicted together, so that what is made of them stays in cache."""
+
+_SPREAD = 200
+"""Weights from which on folds are summed in threads: with fewer, steps are so short that threads get in each other's way."""
 
 
 class Policy(Deployable, RegressorMixin, BaseEstimator):
@@ -346,14 +351,23 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         folds = self._splitter.assign(on_host(batch.states), batch.groups)
         # Each fold in one piece; of small integers NumPy sorts by counting.
         order = np.argsort(folds.astype(np.min_scalar_type(len(sums))), kind="stable")
-        starts = np.searchsorted(folds[order], np.arange(len(sums) + 1))
+        starts = np.searchsorted(folds[order], np.arange(len(sums) + 1)).tolist()
         states, actions, weights, _ = batch.at(order)
         weights = beside(np.ones(len(order)) if weights is None else weights, states)
-        for fold, (start, stop) in zip(sums, pairwise(starts), strict=True):
-            here = slice(start, stop)
-            mine = states[here, :], actions[here, :], weights[here]
-            for rows in fold.pieces(mine[0]):
-                fold.add(*self._block(*(part[rows, ...] for part in mine)))
+
+        def add(fold: Sums, start: int, stop: int) -> None:
+            for rows in fold.pieces(states, start, stop):
+                fold.add(*self._block(states[rows, :], actions[rows, :], weights[rows]))
+
+        ends = zip(sums, pairwise(starts), strict=True)
+        calls = [partial(add, fold, start, stop) for fold, (start, stop) in ends if start < stop]
+        if is_foreign(states):  # what runs where is for its library to say
+            for call in calls:
+                call()
+        else:
+            models, d, p = sums[0].shape
+            work = 0.5 * len(order) * models * (d * p) ** 2
+            side_by_side(calls, work if d * p >= _SPREAD else 0.0, d * p)
 
     def _block(self, states: Array, actions: Array, weights: Array) -> tuple[Array, Array, Array]:
         """Features, actions, and how much each sample counts in each model."""
