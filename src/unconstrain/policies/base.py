@@ -48,7 +48,7 @@ _ROWS = 4096
 """Rows that are predicted together, so that what is made of them stays in cache."""
 
 _SPREAD = 200
-"""Weights from which on folds are summed in threads: with fewer, steps are so short that threads get in each other's way."""
+"""Weights from which on folds are summed in threads: with fewer, steps are short and threads mostly wait."""
 
 
 class Policy(Deployable, RegressorMixin, BaseEstimator):
