@@ -116,15 +116,15 @@ class FirstLook:
         states, actions, weights, groups = on_host(block.states), on_host(block.actions), block.weights, block.groups
         counts = np.ones(len(states)) if weights is None else weights
         weight = float(counts.sum())
-        shares = counts / weight
-        mean = shares @ states
+        shares = (counts / weight)[:, None]
+        mean = (shares * states).sum(axis=0)
         keys = mixed((states + 0.0).view(np.uint64).T, 0)
         low = _smallest(keys, largest_key)
         keys, first = np.unique(keys[low], return_index=True)
         return cls(
             weight,
             mean,
-            weight * (shares @ (states - mean) ** 2),
+            weight * (shares * (states - mean) ** 2).sum(axis=0),
             np.abs(states).max(axis=0),
             actions.shape[1],
             float(np.abs(actions).max()),

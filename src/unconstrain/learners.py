@@ -22,7 +22,7 @@ from .errors import SettingError
 from .moments import Moments
 from .objectives import inconsistency, standard_risk, unvec, vec
 from .quadratic import SECONDARY_NOISE, Path, Quadratic, eigensystem, lexicographic_path, minimum
-from .threads import side_by_side
+from .threads import workers
 from .validation import FoldedMoments
 
 __all__ = ["Direct", "Hybrid", "Inconsistency", "Learner", "Solution"]
@@ -172,7 +172,8 @@ def _solve(
     rounds = folds.rounds() or [(whole, whole)] if learner.threshold is None else []
     calls: list[Callable[[], Any]] = [partial(path_of, whole), *(partial(judge, *pair) for pair in rounds)]
     models, size = vec(whole.cross).shape
-    path, *judged = side_by_side(calls, len(calls) * models * size**3, size)
+    with workers() as threads:
+        path, *judged = threads.run(calls, len(calls) * models * size**3)
     scores = None
     if learner.threshold is not None:
         splits = path.split(learner.threshold)

@@ -35,7 +35,7 @@ from ..learners import Hybrid, Learner, Solution
 from ..moments import Moments, Sums
 from ..objectives import inconsistency, vec
 from ..projection import unit_actions
-from ..threads import side_by_side
+from ..threads import Workers, workers
 from ..validation import FoldedMoments, Folds, Splitter, Validation
 from .deployable import Deployable
 
@@ -341,12 +341,13 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         like = self._nothing()
         models, d, p = like.parts[0].cross.shape
         sums = [Sums(models, d, p, self._at_rest) for _ in like.parts]
-        for batch in batches:
-            for block in batch.blocks():
-                self._add(block, sums)
+        with workers() as threads:
+            for batch in batches:
+                for block in batch.blocks():
+                    self._add(block, sums, threads)
         return FoldedMoments(tuple(each.moments.on_host() for each in sums), like.held_out)
 
-    def _add(self, batch: Batch, sums: Sequence[Sums]) -> None:
+    def _add(self, batch: Batch, sums: Sequence[Sums], threads: Workers) -> None:
         """Add samples to the sums of their folds."""
         folds = self._splitter.assign(on_host(batch.states), batch.groups)
         # Each fold in one piece; of small integers NumPy sorts by counting.
@@ -361,13 +362,10 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
 
         ends = zip(sums, pairwise(starts), strict=True)
         calls = [partial(add, fold, start, stop) for fold, (start, stop) in ends if start < stop]
-        if is_foreign(states):  # what runs where is for its library to say
-            for call in calls:
-                call()
-        else:
-            models, d, p = sums[0].shape
-            work = 0.5 * len(order) * models * (d * p) ** 2
-            side_by_side(calls, work if d * p >= _SPREAD else 0.0, d * p)
+        models, d, p = sums[0].shape
+        # Of tensors, what runs where is for their library to say.
+        worth = d * p >= _SPREAD and not is_foreign(states)
+        threads.run(calls, 0.5 * len(order) * models * (d * p) ** 2 if worth else 0.0)
 
     def _block(self, states: Array, actions: Array, weights: Array) -> tuple[Array, Array, Array]:
         """Features, actions, and how much each sample counts in each model."""
