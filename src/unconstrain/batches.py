@@ -45,8 +45,9 @@ class Batch(NamedTuple):
         """Go through it by some rows at a time, without those of no weight."""
         xp = namespace(self.states)
         for rows in slices(self.states, FOREIGN_BLOCK_ROWS if is_foreign(self.states) else BLOCK_ROWS):
-            cut: list[Any] = [None if table is None else table[rows, ...] for table in self]
-            part = Batch(*cut)
+            weights = None if self.weights is None else self.weights[rows]
+            groups = None if self.groups is None else self.groups[rows]
+            part = Batch(self.states[rows, :], self.actions[rows, :], weights, groups)
             if part.weights is not None and not part.weights.all():
                 part = part.at(np.flatnonzero(part.weights))  # a weight of zero is the same as not being there
             if part.states.shape[0]:
