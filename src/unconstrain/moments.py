@@ -20,8 +20,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from functools import reduce
-from itertools import combinations_with_replacement
-from operator import add
+from itertools import combinations, combinations_with_replacement
+from operator import add, sub
 from typing import Any
 
 import numpy as np
@@ -219,7 +219,7 @@ class Sums:
         weight, energy, cross = (xp.asarray(each, copy=True) for each in self._sums[:3])
         products = self._sums[3:]
         if models == 1:
-            full = xp.stack(products)[None, ...]  # (1, metrics, p, p)
+            full = xp.stack(_by_metric(products, d))[None, ...]  # (1, metrics, p, p)
         else:
             halves = xp.reshape(products[0], (models, -1, p * (p + 1) // 2))
             full = xp.take(halves, beside(_places(p).ravel(), weight), axis=2)
@@ -245,12 +245,11 @@ _FOREIGN_BLOCK = 2**26
 def _products_of_one(
     xp: Any, features: Array, directions: Array, moving: NDArray[np.bool_], weights: Array
 ) -> list[Array]:
-    """``Σ w φφᵀ`` for the metrics 1 and û_k û_m (k ≤ m) of one model, each (p, p).
+    """Products from which those of each metric follow (:func:`_by_metric`), for one model, each (p, p).
 
-    With ``F_k = diag(√w û_k) φ`` they are ``F_kᵀF_m``. Off the diagonal,
-    ``F_kᵀF_m + F_mᵀF_k = (F_k + F_m)ᵀ(F_k + F_m) − F_kᵀF_k − F_mᵀF_m`` (and
-    both terms are equal), so that every product is of a matrix with its own
-    transpose, which BLAS does at half the price. One on the diagonal
+    With ``F_k = diag(√w û_k) φ`` they are ``Σ w φφᵀ``, ``F_kᵀF_k`` for each
+    k, and ``(F_k + F_m)ᵀ(F_k + F_m)`` for each k < m: all of a matrix with its
+    own transpose, which BLAS does at half the price. One ``F_kᵀF_k``
     follows from the others, since ``Σ û_k² = 1``.
     """
     root = xp.sqrt(weights)
@@ -264,12 +263,18 @@ def _products_of_one(
     largest = int(xp.argmax(xp.sum(pointed**2, axis=0)))  # subtracting for a small one would leave rounding
     d = pointed.shape[1]
     own = {k: _gram(features * pointed[:, k, None]) for k in range(d) if k != largest}
-    own[largest] = whole - sum(own.values())
-    products = [whole + resting]
-    for k, m in combinations_with_replacement(range(d), 2):
-        both = own[k] if k == m else _gram(features * (pointed[:, k] + pointed[:, m])[:, None])
-        products.append(both if k == m else 0.5 * (both - own[k] - own[m]))
-    return products
+    own[largest] = reduce(sub, own.values(), whole) if d > 1 else whole + 0.0
+    both = [_gram(features * (pointed[:, k] + pointed[:, m])[:, None]) for k, m in combinations(range(d), 2)]
+    return [whole + resting, *(own[k] for k in range(d)), *both]
+
+
+def _by_metric(products: list[Array], d: int) -> list[Array]:
+    """``Σ w φφᵀ`` for the metrics 1 and û_k û_m (k ≤ m)."""
+    # ``(F_k + F_m)ᵀ(F_k + F_m) = F_kᵀF_k + F_mᵀF_m + 2 F_kᵀF_m``, since F_kᵀF_m is symmetric.
+    own = products[1 : d + 1]
+    both = dict(zip(combinations(range(d), 2), products[d + 1 :], strict=True))
+    pairs = combinations_with_replacement(range(d), 2)
+    return [products[0], *(own[k] if k == m else 0.5 * (both[k, m] - own[k] - own[m]) for k, m in pairs)]
 
 
 def _gram(table: Array) -> Array:

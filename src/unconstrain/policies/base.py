@@ -325,7 +325,8 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         return self
 
     def _learn(self, batches: Iterable[Batch]) -> Self:
-        self._folds = self._folds + self._summed(batches)
+        summed = self._summed(batches)
+        self._folds = self._folds + summed if self._folds.filled else summed
         self._conclude()
         return self
 
