@@ -117,20 +117,19 @@ class FirstLook:
         states, actions, weights, groups = on_host(block.states), on_host(block.actions), block.weights, block.groups
         counts = np.ones(len(states)) if weights is None else weights
         weight = float(counts.sum())
-        shares = (counts / weight)[:, None]
-        mean = (shares * states).sum(axis=0)
-        keys = mixed((states + 0.0).view(np.uint64).T, 0)
-        low = _smallest(keys, largest_key)
-        keys, first = np.unique(keys[low], return_index=True)
+        columns, shares = np.ascontiguousarray(states.T), counts / weight  # sums along memory are fast
+        mean = (shares * columns).sum(axis=1)
+        keys = mixed((columns + 0.0).view(np.uint64), 0)
+        keys, first = _smallest(keys, largest_key)
         return cls(
             weight,
             mean,
-            weight * (shares * (states - mean) ** 2).sum(axis=0),
-            np.abs(states).max(axis=0),
+            weight * (shares * (columns - mean[:, None]) ** 2).sum(axis=1),
+            np.abs(columns).max(axis=1),
             actions.shape[1],
             float(np.abs(actions).max()),
-            keys[:PLACING_SAMPLES],
-            states[low][first[:PLACING_SAMPLES]],
+            keys,
+            states[first],
             None if groups is None else dict.fromkeys(in_order(groups)),
         )
 
@@ -175,14 +174,17 @@ class FirstLook:
         return whole
 
 
-def _smallest(keys: NDArray[np.uint64], largest: np.uint64) -> NDArray[np.intp]:
-    """Where the smallest different keys are, and few others: finding them is much faster than sorting all."""
+def _smallest(keys: NDArray[np.uint64], largest: np.uint64) -> tuple[NDArray[np.uint64], NDArray[np.intp]]:
+    """The smallest different keys, ascending, and where each is first; finding them is faster than sorting all."""
     low = np.flatnonzero(keys <= largest)
+    few = low
     if len(low) > 2 * PLACING_SAMPLES:
-        fewer = low[keys[low] <= np.partition(keys[low], PLACING_SAMPLES)[PLACING_SAMPLES]]
-        if len(np.unique(keys[fewer])) >= PLACING_SAMPLES:  # or else many are equal
-            return fewer
-    return low
+        few = low[keys[low] <= np.partition(keys[low], PLACING_SAMPLES)[PLACING_SAMPLES]]
+    for places in (few, low):
+        different, first = np.unique(keys[places], return_index=True)
+        if len(different) >= PLACING_SAMPLES or len(places) == len(low):
+            break  # or else many of the few are equal
+    return different[:PLACING_SAMPLES], places[first[:PLACING_SAMPLES]]
 
 
 def in_order(names: Groups) -> list[Hashable]:
