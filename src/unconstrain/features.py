@@ -26,7 +26,7 @@ _LEAST_SPREAD = 1e10 * np.sqrt(SMALLEST_VARIANCE)
 
 
 class FeatureMap(Protocol):
-    """What a policy needs of its features: to be called."""
+    """What a policy needs of its features: to be called, by several threads at once where there are many."""
 
     def __call__(self, states: Array, /) -> Array:
         """Compute features (N, p) of states (N, n)."""

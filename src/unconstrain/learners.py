@@ -148,7 +148,7 @@ class Hybrid:
 
     def _path(self, moments: Moments) -> Path:
         consistent, risk = inconsistency(moments), standard_risk(moments)
-        return lexicographic_path(consistent + self.softness * risk, risk)
+        return lexicographic_path(consistent + self.softness * risk if self.softness else consistent, risk)
 
     def _score(self, moments: Moments) -> Quadratic:
         return inconsistency(moments) + self.alpha * standard_risk(moments)

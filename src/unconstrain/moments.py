@@ -238,7 +238,7 @@ class Sums:
 _BLOCK = 2**20
 """Numbers in the largest temporary: more do not stay in cache, fewer give BLAS too little to do at once."""
 
-_FOREIGN_BLOCK = 2**26
+_FOREIGN_BLOCK = 2**25
 """The same where arrays are of another library, and may be on a device that wants much to do at once."""
 
 

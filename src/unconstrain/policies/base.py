@@ -88,7 +88,8 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         Parameters
         ----------
         X : array_like, shape (N, n)
-            States.
+            States. These and the actions may be arrays of any library that
+            follows the array API standard; they are summed where they are.
         y : array_like, shape (N, d) or (N,)
             Observed actions, each the projection of the policy by an unknown constraint.
         sample_weight : array_like, shape (N,), optional
@@ -217,6 +218,7 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         Returns
         -------
         ndarray, shape (N, d), or (N,) where it was fitted to (N,) actions
+            Of the library and on the device of the states.
         """
         check_is_fitted(self, "solution_")
         states = self._checked_states(X)
@@ -383,11 +385,12 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
     def _predict_block(self, states: Array) -> Array:
         weights, models = self.solution_.weights, self._shares(states)
         features = self._features(states)
-        if models is not None:  # each model's features, weighted by its share, side by side: one product for all
-            models = models[:, :, None] * features[:, None, :]
-            features = namespace(states).reshape(models, (states.shape[0], -1))
-        columns = weights.transpose(0, 2, 1).reshape(-1, weights.shape[1])
-        return features @ beside(columns, states)
+        if models is None:
+            return features @ beside(weights[0].T, states)
+        each = namespace(states).tensordot(features, beside(weights, states), axes=((1,), (2,)))  # (N, M, d)
+        if is_foreign(each):
+            return (models[:, None, :] @ each)[:, 0, :]
+        return np.einsum("nm,nmd->nd", models, each)  # NumPy is slow at many small products
 
     def __sklearn_tags__(self) -> Any:
         """Say that actions may have several columns."""
