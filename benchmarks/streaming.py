@@ -74,24 +74,24 @@ def measured(samples: int) -> dict[str, float]:
     return found
 
 
+def _rate(smaller: dict[str, float], larger: dict[str, float]) -> float:
+    return (larger["samples"] - smaller["samples"]) / (larger["computing"] - smaller["computing"])
+
+
 def main(samples: int = SAMPLES) -> list[Row]:
     """Rows of all."""
-    small, large = measured(SMALL), measured(samples)
     # What is done once (importing, solving) is no growth: rates are of what came on top of the smaller one,
-    # in processor time, which does not count other work on the machine.
-    # The middle one is too large to be kept in memory after the first walk, as the large one is.
-    middle = measured(samples // 5) if samples >= 100 * SMALL else small
-    rate = (large["samples"] - middle["samples"]) / (large["computing"] - middle["computing"])
-    ratio = float("nan")
-    if middle is not small:
-        ratio = (middle["samples"] - small["samples"]) / (middle["computing"] - small["computing"]) / rate
+    # in processor time, which does not count other work on the machine. All are read in both walks: 32 MB and
+    # less would be kept in memory after the first.
+    small, middle, large = (measured(samples * part // 10) for part in (4, 7, 10))
+    before, beyond = _rate(small, middle), _rate(middle, large)
     what = f"{samples:.0e} samples from Parquet, d = 2, M = {KERNELS_ON_AXIS**2}"
     return [
         row(f"peak memory, {what}", large["peak_mb"], "MB", 1000.0, 300.0),
         row("of it Python and its libraries", large["before_mb"], "MB"),
         row(f"time, one thread, {what}", large["seconds"], "s"),
-        row("samples in a second of one core", rate, "1/s"),
-        row(f"processor time per sample beyond {middle['samples']:.0e} against before", ratio, "×", 1.1),
+        row("samples in a second of one core", _rate(small, large), "1/s"),
+        row(f"processor time per sample beyond {middle['samples']:.0e} against before", before / beyond, "×", 1.1),
     ]
 
 
