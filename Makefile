@@ -9,12 +9,12 @@ DEV_STAMP := $(VENV)/.installed-dev
 DEMO_DIR := build/demo
 DOCS_DIR := build/docs
 
-.PHONY: help demo test check docs bench clean
+.PHONY: help demo test check docs bench bench-gpu clean
 .DELETE_ON_ERROR:
 
 help: ## show this list
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null || \
-		sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1  \2/p' $(MAKEFILE_LIST)
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null || \
+		sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1  \2/p' $(MAKEFILE_LIST)
 
 demo: $(USER_STAMP) ## learn a wiping movement end to end and write a report to look at
 	@scripts/install-system graphics || echo "make demo: going on; the arm will be drawn as lines." >&2
@@ -34,8 +34,11 @@ docs: $(DEV_STAMP) ## build the documentation; warnings are errors
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs $(DOCS_DIR)
 	@echo "The documentation is in $(CURDIR)/$(DOCS_DIR)/index.html"
 
-bench: $(DEV_STAMP) ## time the sums, the solves and the kinematics
-	@$(BIN)/python benchmarks/arm.py
+bench: $(DEV_STAMP) ## time everything against floors and peers; BENCH='--full --against FILE' for more
+	@$(BIN)/python benchmarks/run.py $(BENCH)
+
+bench-gpu: $(DEV_STAMP) ## time the sums on this processor and on a GPU, if there is one
+	@$(BIN)/python benchmarks/gpu.py
 
 clean: ## remove everything built; .venv stays
 	rm -rf build dist htmlcov .coverage .coverage.* docs/_build docs/auto_examples docs/generated docs/sg_execution_times.rst

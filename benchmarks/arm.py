@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from time import perf_counter
 
 import numpy as np
+from table import Row, row, script, side_by_side
 from threadpoolctl import threadpool_limits
 
 from unconstrain.demonstration import stack
@@ -16,21 +16,9 @@ from unconstrain.policies import LocallyLinearPolicy
 from unconstrain.systems.arm import LWR3
 from unconstrain.validation import Folds
 
-REPEATS = 7
 
-
-def median_ms(call: Callable[[], object]) -> float:
-    """Median time of a call, ms."""
-    times = []
-    for _ in range(REPEATS):
-        start = perf_counter()
-        call()
-        times.append(1e3 * (perf_counter() - start))
-    return float(np.median(times))
-
-
-def main() -> None:
-    """Print the table."""
+def main() -> list[Row]:
+    """Rows of all."""
     settings = table2.Settings()
     rng = np.random.default_rng(0)
     states, actions, groups = stack(table2.demonstrate(settings, 3, settings.demonstrations, rng))
@@ -39,7 +27,7 @@ def main() -> None:
     features, weights = policy.features_(states), policy.fields_.weights(states)
     learner = Hybrid(settings.alpha, softness=settings.softness)
     postures = rng.uniform(LWR3.lower, LWR3.upper, (10_000, LWR3.joints))
-    rows = [
+    calls: list[tuple[str, Callable[[], object]]] = [
         (
             f"sums, {len(states):,} samples × {weights.shape[1]} fields × 7-DOF",
             lambda: gather(features, actions, weights),
@@ -48,11 +36,10 @@ def main() -> None:
         ("whole fit: fields, sums in folds, hybrid", lambda: policy.set_params(learner=learner).fit(states, actions)),
         ("10,000 Jacobians", lambda: LWR3.jacobian(postures)),
     ]
-    print(f"{'one thread, median of ' + str(REPEATS):60} ms")
     with threadpool_limits(1):
-        for name, call in rows:
-            print(f"{name:60} {median_ms(call):.1f}")
+        times = side_by_side([call for _, call in calls])
+    return [row(f"arm, {name}", 1e3 * value, "ms") for (name, _), value in zip(calls, np.median(times, 0), strict=True)]
 
 
 if __name__ == "__main__":
-    main()
+    script(main)

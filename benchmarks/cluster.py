@@ -6,13 +6,12 @@ has to give: on a busy one, less than two.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from time import perf_counter
 from typing import Any
 
 import numpy as np
+from table import Row, row, script, seconds
 
 import unconstrain as uc
 from unconstrain import cluster
@@ -58,15 +57,8 @@ def alone(parts: int) -> None:
     uc.ParametricPolicy(FEATURES).fit_batches(Together(parts))
 
 
-def seconds(call: Callable[[], object]) -> float:
-    """How long a call takes."""
-    start = perf_counter()
-    call()
-    return perf_counter() - start
-
-
-def main() -> list[dict[str, Any]]:
-    """Print the table and return its rows."""
+def main() -> list[Row]:
+    """Rows of all."""
     import dask
     from distributed import Client, LocalCluster
 
@@ -92,17 +84,14 @@ def main() -> list[dict[str, Any]]:
     )
     ratio, most = (float(np.median(np.array(serial) / np.array(times))) for times in (parallel, bound))
     what = f"{PROCESSES} processes of dask, {PARTS * ROWS:.1e} samples, d = 2, M = 100"
-    rows = [
-        {"what": f"{what}: serial", "value": float(np.median(serial)), "unit": "s", "at_least": None, "aim": None},
-        {"what": f"{what}: dask", "value": float(np.median(parallel)), "unit": "s", "at_least": None, "aim": None},
-        {"what": f"{what}: serial / dask", "value": ratio, "unit": "×", "at_least": 1.5, "aim": 1.8},
-        {"what": f"{what}: serial / halves apart", "value": most, "unit": "×", "at_least": None, "aim": None},
-        {"what": f"{what}: difference of the sums", "value": difference, "unit": "1", "at_least": None, "aim": None},
+    return [
+        row(f"{what}: serial", float(np.median(serial)), "s"),
+        row(f"{what}: dask", float(np.median(parallel)), "s"),
+        row(f"{what}: serial / dask", ratio, "×", 1.5, 1.8, more_is_better=True),
+        row(f"{what}: serial / halves apart", most, "×"),
+        row(f"{what}: difference of the sums", difference, "1"),
     ]
-    for row in rows:
-        print(f"{row['what']:76} {row['value']:10.4g} {row['unit']:2} at least {row['at_least'] or '-'}")
-    return rows
 
 
 if __name__ == "__main__":
-    main()
+    script(main)

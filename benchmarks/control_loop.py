@@ -9,9 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import Any
 
 import numpy as np
+from table import Row, row, script
 
 import unconstrain as uc
 from unconstrain.arrays import Array
@@ -82,33 +82,23 @@ def in_onnx(policy: uc.LocallyLinearPolicy, folder: Path, states: Array) -> floa
     return median_us(lambda state: graph.run(None, {"states": state[None]}), states)
 
 
-def main() -> list[dict[str, Any]]:
-    """Print the table and return its rows."""
+def main() -> list[Row]:
+    """Rows of all."""
     policy = arm_policy()
     states = np.random.default_rng(1).uniform(-2, 2, (CALLS, JOINTS))
     out = np.empty(JOINTS)
     what = f"{FIELDS} fields, {JOINTS}-DOF"
     rows = [
-        (f"step, {what}", median_us(policy.step, states), 20.0, 8.0),
-        (f"step into a buffer, {what}", median_us(lambda state: policy.step(state, out), states), 20.0, 8.0),
-        (
-            f"predict of one state, {what}",
-            median_us(lambda state: policy.predict(state[None]), states[:200]),
-            None,
-            None,
-        ),
+        row(f"step, {what}", median_us(policy.step, states), "µs", 20.0, 8.0),
+        row(f"step into a buffer, {what}", median_us(lambda state: policy.step(state, out), states), "µs", 20.0, 8.0),
+        row(f"predict of one state, {what}", median_us(lambda state: policy.predict(state[None]), states[:200]), "µs"),
     ]
     with TemporaryDirectory() as made:
         if shutil.which("cc"):
-            rows.append((f"exported C, {what}", in_c(policy, Path(made), states), 3.0, 1.0))
-        rows.append((f"exported ONNX, one state, {what}", in_onnx(policy, Path(made), states), 15.0, None))
-    print(f"{'one state, median of ' + str(REPEATS):60} {'µs':>8} {'at most':>8} {'aim':>8}")
-    for name, value, least, aim in rows:
-        print(f"{name:60} {value:8.2f} {least or '-':>8} {aim or '-':>8}")
-    return [
-        {"what": name, "value": value, "unit": "µs", "at_least": least, "aim": aim} for name, value, least, aim in rows
-    ]
+            rows.append(row(f"exported C, {what}", in_c(policy, Path(made), states), "µs", 3.0, 1.0))
+        rows.append(row(f"exported ONNX, one state, {what}", in_onnx(policy, Path(made), states), "µs", 15.0))
+    return rows
 
 
 if __name__ == "__main__":
-    main()
+    script(main)

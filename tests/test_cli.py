@@ -1077,7 +1077,7 @@ def test_demo_says_where_it_looked_for_recordings(tmp_path, monkeypatch):
 
 def test_doctor_finds_everything_that_the_tests_need():
     found = {one["what"]: one for one in json.loads(run("doctor", "--json"))}
-    assert list(found) == ["Python", "viz", "data", "arm", "sim", "onnx", "cluster", "graphics"]
+    assert list(found) == ["Python", "viz", "data", "arm", "sim", "onnx", "cluster", "arrays", "graphics"]
     assert found["graphics"]["found"] in ("egl", "osmesa", "the system's own")
     assert all(one["mend"] == "" for one in found.values())
     assert run("doctor").rstrip().endswith("Everything is there.")
@@ -1093,7 +1093,7 @@ def test_doctor_tells_how_to_mend_what_is_missing(monkeypatch):
     mends = {one.what: one.mend for one in doctor.examine()}
     assert mends["viz"] == "pip install 'unconstrain[viz]'"
     assert mends["graphics"] == "apt-get install libegl1 libegl-mesa0"
-    assert run("doctor").rstrip().endswith("2 of 8 are missing something.")
+    assert run("doctor").rstrip().endswith("2 of 9 are missing something.")
     versions["mujoco"] = None
     assert {one.what: one.found for one in doctor.examine()}["graphics"] == "needs sim"
     versions.pop("mujoco")

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import naive
 from unconstrain import moments as module
-from unconstrain.moments import Moments, gather, total
+from unconstrain.moments import Moments, Sums, gather, total
 from unconstrain.objectives import inconsistency, standard_risk, unvec, vec
 
 NAMES = ("weight", "energy", "cross", "gram", "consistent")
@@ -140,3 +140,40 @@ def test_sums_of_one_model_equal_the_paper_s_where_an_axis_hardly_moves():
     moments = gather(features, actions)
     assert_allclose(moments.consistent[0], H, atol=1e-13 * np.abs(H).max())
     assert_allclose(vec(moments.cross)[0], g)
+
+
+@pytest.mark.parametrize("models", [1, 3])
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_sums_are_those_of_the_naive_twin(models, d):
+    features, actions, counts = table(11, samples=60, d=d, models=models)
+    actions[::7] = 0.0
+    moments = gather(features, actions, counts)
+    for m in range(models):
+        energy, g, H = naive.inconsistency_terms(features, actions, counts[:, m])
+        _, _, M = naive.risk_terms(features, actions, counts[:, m])
+        assert_allclose(moments.energy[m], energy, rtol=1e-12)
+        assert_allclose(vec(moments.cross)[m], g, rtol=0, atol=1e-12 * np.abs(g).max())
+        assert_allclose(moments.consistent[m], H, rtol=0, atol=1e-12 * np.abs(H).max())
+        assert_allclose(standard_risk(moments).hessian[m], M, rtol=0, atol=1e-12 * np.abs(M).max())
+
+
+@pytest.mark.parametrize("models", [1, 3])
+def test_sums_of_blocks_are_those_of_all(models):
+    features, actions, counts = table(12, samples=50, models=models)
+    sums = Sums(models, 2, 3)
+    assert_array_equal(sums.moments.gram, np.zeros((models, 3, 3)))
+    for rows in (slice(0, 7), slice(7, 7), slice(7, 50)):
+        sums.add(features[rows], actions[rows], counts[rows])
+    found, whole = sums.moments, gather(features, actions, counts)
+    sums.add(features, actions, counts)  # does not change what was found
+    for mine, theirs in zip(found.sums, whole.sums, strict=True):
+        assert_allclose(mine, theirs, atol=1e-12)
+    assert_allclose(sums.moments.consistent, 2 * whole.consistent, atol=1e-12)
+
+
+def test_pieces_are_all_rows_once():
+    table = np.empty((30_001, 3))
+    pieces = list(Sums(1, 2, 3).pieces(table))
+    assert len(pieces) > 1
+    assert_array_equal(np.concatenate([np.arange(30_001)[rows] for rows in pieces]), np.arange(30_001))
+    assert list(Sums(1, 2, 3).pieces(table[:0])) == []

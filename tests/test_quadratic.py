@@ -166,3 +166,39 @@ def test_each_problem_has_its_own_split():
     at = path.at(np.array([1, 3]))
     assert_array_equal(at[0], path.weights[0, :, 1])
     assert_array_equal(at[1], path.weights[1, :, 3])
+
+
+@pytest.mark.parametrize("size", [1, 4, 20])
+def test_every_split_of_the_path_is_that_of_the_naive_twin(size):
+    problems = [(draw(20 + m, 3 * size, size), draw(30 + m, 3 * size, size)) for m in range(3)]
+    firsts, seconds = ([least_squares(*pair[i]) for pair in problems] for i in (0, 1))
+    path = lexicographic_path(stacked(*firsts), stacked(*seconds))
+    for m, (first, second) in enumerate(zip(firsts, seconds, strict=True)):
+        for k in range(size + 1):
+            expected = naive.hybrid(first.hessian[0], first.linear[0], second.hessian[0], second.linear[0], k)
+            assert_allclose(path.weights[m, :, k], expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+
+
+def test_small_eigenvalues_do_not_spoil_the_splits_that_leave_them_out():
+    # What is divided by 1e-9 is huge, and must not be added to and taken off again.
+    Q = np.linalg.qr(np.random.default_rng(40).standard_normal((6, 6)))[0]
+    spectrum = np.array([1e-9, 1e-6, 1e-3, 0.5, 1.0, 2.0])
+    H = Q @ np.diag(spectrum) @ Q.T
+    first = Quadratic(0.5 * (H + H.T)[None], np.ones((1, 6)), np.ones(1))
+    second = least_squares(*draw(41, 12, 6))
+    path = lexicographic_path(first, second)
+    for k in range(2, 7):
+        expected = naive.hybrid(first.hessian[0], first.linear[0], second.hessian[0], second.linear[0], k)
+        assert_allclose(path.weights[0, :, k], expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+
+
+def test_one_split_is_that_of_the_whole_path():
+    path = lexicographic_path(least_squares(*draw(42, 3, 5)), least_squares(*draw(43, 8, 5)))
+    for k in range(6):
+        assert_allclose(path.at(np.array([k])), path.weights[..., k], rtol=1e-12, atol=1e-12)
+
+
+def test_the_basis_is_orthonormal_in_the_metric_of_the_second_objective():
+    second = least_squares(*draw(44, 8, 5))
+    path = lexicographic_path(least_squares(*draw(45, 8, 5)), second)
+    assert_allclose(path.basis[0].T @ second.hessian[0] @ path.basis[0], np.eye(5), atol=1e-12)

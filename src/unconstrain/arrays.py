@@ -1,14 +1,18 @@
-"""Shapes, checks at the door, and optional imports.
+"""Shapes, checks at the door, other array libraries, and optional imports.
 
 Letters used in shapes throughout: ``T`` samples of one demonstration, ``N``
 samples in all, ``n`` state dimensions, ``d`` action dimensions, ``p``
 features, ``P = d p`` weights, ``M`` models (receptive fields; 1 when global).
+
+The mathematics is written in terms of the array API standard: ``xp`` is the
+library that an array belongs to, and is NumPy for everything that is no array
+of another library. Such an array stays on its device.
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from numbers import Integral
 from types import ModuleType
 from typing import Any, NoReturn
@@ -28,8 +32,13 @@ __all__ = [
     "as_table",
     "as_vector",
     "as_weights",
+    "beside",
     "check_at_least",
+    "is_foreign",
+    "namespace",
+    "on_host",
     "require_extra",
+    "slices",
 ]
 
 Array = NDArray[np.float64]
@@ -42,6 +51,46 @@ BLOCK_ROWS = 2**16
 
 SMALLEST_VARIANCE = 1e-100
 """Variances down to this are refused, and states that spread less count as one: their squares lose digits."""
+
+
+def is_foreign(values: Any) -> bool:
+    """Whether this is an array of another library than NumPy that follows the array API standard."""
+    if isinstance(values, np.ndarray | np.generic):
+        return False
+    kind = type(values)
+    return hasattr(kind, "__array_namespace__") or kind.__module__.partition(".")[0] in _WRAPPED
+
+
+_WRAPPED = ("torch", "cupy")
+"""Libraries whose arrays need ``array_api_compat`` to follow the standard."""
+
+
+def namespace(array: Any) -> Any:
+    """The library of an array, with the functions of the array API standard: NumPy unless it is another's.
+
+    Raises
+    ------
+    MissingExtraError
+        If it is another's and ``array_api_compat`` is not installed.
+    """
+    return require_extra("array_api_compat", "arrays").array_namespace(array) if is_foreign(array) else np
+
+
+def beside(values: NDArray[Any], like: Any) -> Any:
+    """The same numbers in the library and on the device of another array; unchanged where that is NumPy."""
+    if not is_foreign(like):
+        return values
+    return namespace(like).asarray(np.array(values), device=like.device)
+
+
+def on_host(array: Any) -> NDArray[Any]:
+    """The same numbers as a NumPy array; unchanged where it is one."""
+    if not is_foreign(array):
+        return np.asarray(array)
+    for leave in ("cpu", "get"):  # of PyTorch, of CuPy
+        if hasattr(array, leave):
+            return np.asarray(getattr(array, leave)())
+    return np.asarray(array)
 
 
 def as_matrix(values: ArrayLike, what: str, *, convert: bool = True) -> Array:
@@ -70,12 +119,12 @@ def as_matrix(values: ArrayLike, what: str, *, convert: bool = True) -> Array:
     matrix = _as_real(values, what, convert)
     if matrix.ndim != 2:
         raise InvalidDataError(
-            f"{what}: got an array of shape {matrix.shape}, expected two dimensions (samples, columns). "
+            f"{what}: got an array of shape {tuple(matrix.shape)}, expected two dimensions (samples, columns). "
             "Reshape your data: one row for each sample."
         )
-    if matrix.size == 0:
+    if 0 in matrix.shape:
         raise InvalidDataError(
-            f"{what}: got an empty array of shape {matrix.shape}, expected at least one row and one column."
+            f"{what}: got an empty array of shape {tuple(matrix.shape)}, expected at least one row and one column."
         )
     return _finite(matrix, what)
 
@@ -106,7 +155,7 @@ def as_vector(values: ArrayLike, what: str, length: int | None = None) -> Array:
     InvalidDataError
         If it is ragged, not one-dimensional, of the wrong length, or holds NaN or infinity.
     """
-    vector = _as_real(values, what)
+    vector = _as_real(on_host(values) if is_foreign(values) else values, what)
     if vector.ndim != 1:
         raise InvalidDataError(f"{what}: got an array of shape {vector.shape}, expected one dimension.")
     if length is not None and len(vector) != length:
@@ -140,7 +189,7 @@ def as_groups(values: Sequence[Hashable] | NDArray[np.generic], length: int) -> 
         If the number is wrong, or one of them is missing or cannot be compared with the others.
     """
     try:
-        names = np.asarray(values)
+        names = on_host(values)
     except ValueError as error:  # NumPy's word for rows of different lengths
         raise InvalidDataError(f"groups: the values are of different lengths, expected {length} names.") from error
     if names.shape != (length,):
@@ -157,6 +206,12 @@ def as_groups(values: Sequence[Hashable] | NDArray[np.generic], length: int) -> 
                 f"groups: got values that cannot be compared ({error}), expected names or numbers, none missing."
             ) from error
     return names
+
+
+def slices(table: Any, rows: int) -> Iterator[slice]:
+    """Slices that go through a table by so many rows at a time, the last by what is left."""
+    samples = table.shape[0]
+    return (slice(start, min(start + rows, samples)) for start in range(0, samples, rows))
 
 
 def check_at_least(name: str, value: Any, least: float, *, strict: bool = False, whole: bool = False) -> None:
@@ -203,6 +258,8 @@ def require_extra(module: str, extra: str) -> ModuleType:
 
 
 def _as_real(values: ArrayLike, what: str, convert: bool = True) -> Array:
+    if is_foreign(values):
+        return _foreign_as_real(values, what, convert)
     try:
         raw = np.asarray(values)
     except ValueError as error:  # NumPy's word for rows of different lengths
@@ -217,14 +274,29 @@ def _as_real(values: ArrayLike, what: str, convert: bool = True) -> Array:
         raise InvalidDataError(f"{what}: got values that are not numbers ({error}).") from error
 
 
+def _foreign_as_real(values: Any, what: str, convert: bool) -> Any:
+    xp = namespace(values)
+    if not xp.isdtype(values.dtype, ("real floating", "integral")):
+        raise InvalidDataError(f"{what}: got values of type {values.dtype}, expected real numbers.")
+    return xp.asarray(values, dtype=xp.float64) if convert else values
+
+
 def _finite(values: Array, what: str) -> Array:
-    if all(_is_sensible(values[start : start + BLOCK_ROWS]) for start in range(0, len(values), BLOCK_ROWS)):
+    if all(_is_sensible(values[rows, ...]) for rows in slices(values, BLOCK_ROWS)):
         return values
-    return _refuse(values.astype(np.float64, copy=False), what)
+    return _refuse(on_host(values).astype(np.float64, copy=False), what)
 
 
 def _is_sensible(block: Array) -> bool:
-    return bool((np.abs(block.astype(np.float64, copy=False)) <= LARGEST).all())  # which NaN is not, either
+    # A sum of squares that is small enough says it of each, at a fraction of the price; NaN and infinity are not.
+    xp = namespace(block)
+    doubles = xp.asarray(block, dtype=xp.float64)
+    if xp is np and (doubles.flags.c_contiguous or doubles.flags.f_contiguous):
+        flat = doubles.ravel(order="K")
+        with np.errstate(over="ignore", invalid="ignore"):
+            if np.einsum("i,i->", flat, flat) <= LARGEST**2:  # without waking BLAS' threads
+                return True
+    return bool(xp.all(xp.abs(doubles) <= LARGEST))
 
 
 def _refuse(values: Array, what: str) -> NoReturn:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import BLOCK_ROWS, Array
+from .arrays import BLOCK_ROWS, Array, beside, is_foreign, namespace, on_host, slices
 from .errors import InvalidDataError
 
 __all__ = ["PLACING_SAMPLES", "Batch", "FirstLook", "Groups", "mixed"]
@@ -23,13 +23,17 @@ PLACING_SAMPLES = 20_000
 
 Groups = Sequence[Hashable] | NDArray[np.generic]
 
+FOREIGN_BLOCK_ROWS = 2**20
+"""Rows of an array of another library that are summed together: its device may want much to do at once."""
+
 _ALL = np.uint64(2**64 - 1)
 
 
 class Batch(NamedTuple):
     """Samples that were checked: ``states`` (N, n), ``actions`` (N, d), ``weights`` (N,) and ``groups`` (N,) if given.
 
-    Of any real type; :meth:`blocks` gives float64.
+    Of any real type; :meth:`blocks` gives float64. States and actions may be
+    arrays of another library.
     """
 
     states: NDArray[Any]
@@ -39,22 +43,23 @@ class Batch(NamedTuple):
 
     def blocks(self) -> Iterator[Batch]:
         """Go through it by some rows at a time, without those of no weight."""
-        for start in range(0, len(self.states), BLOCK_ROWS):
-            part = self._at(slice(start, start + BLOCK_ROWS))
+        xp = namespace(self.states)
+        for rows in slices(self.states, FOREIGN_BLOCK_ROWS if is_foreign(self.states) else BLOCK_ROWS):
+            weights = None if self.weights is None else self.weights[rows]
+            groups = None if self.groups is None else self.groups[rows]
+            part = Batch(self.states[rows, :], self.actions[rows, :], weights, groups)
             if part.weights is not None and not part.weights.all():
-                part = part._at(part.weights > 0)  # a weight of zero is the same as not being there
-            if len(part.states):
-                states, actions = (np.asarray(table, dtype=np.float64) for table in part[:2])
+                part = part.at(np.flatnonzero(part.weights))  # a weight of zero is the same as not being there
+            if part.states.shape[0]:
+                states, actions = (xp.asarray(table, dtype=xp.float64) for table in part[:2])
                 yield part._replace(states=states, actions=actions)
 
-    def _at(self, rows: slice | NDArray[np.bool_]) -> Batch:
-        states, actions, weights, groups = self
-        return Batch(
-            states[rows],
-            actions[rows],
-            None if weights is None else weights[rows],
-            None if groups is None else groups[rows],
-        )
+    def at(self, rows: NDArray[np.intp]) -> Batch:
+        """Some of the samples, in any order."""
+        parts: list[Any] = [
+            None if part is None else namespace(part).take(part, beside(rows, part), axis=0) for part in self
+        ]
+        return Batch(*parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +97,11 @@ class FirstLook:
     states: Array
     groups: dict[Hashable, None] | None
 
+    @property
+    def different(self) -> Array:
+        """Its states in a fixed order: repetition and order of the samples must not move the features."""
+        return np.unique(self.states, axis=0)
+
     @classmethod
     def at(cls, batch: Batch) -> FirstLook | None:
         """Look at a batch; None if it is empty but for samples of no weight."""
@@ -104,23 +114,22 @@ class FirstLook:
 
     @classmethod
     def _at_block(cls, block: Batch, largest_key: np.uint64) -> FirstLook:
-        states, actions, weights, groups = block
+        states, actions, weights, groups = on_host(block.states), on_host(block.actions), block.weights, block.groups
         counts = np.ones(len(states)) if weights is None else weights
         weight = float(counts.sum())
-        shares = counts / weight
-        mean = shares @ states
-        keys = mixed((states + 0.0).view(np.uint64).T, 0)
-        low = keys <= largest_key
-        keys, first = np.unique(keys[low], return_index=True)
+        columns, shares = np.ascontiguousarray(states.T), counts / weight  # sums along memory are fast
+        mean = (shares * columns).sum(axis=1)
+        keys = mixed((columns + 0.0).view(np.uint64), 0)
+        keys, first = _smallest(keys, largest_key)
         return cls(
             weight,
             mean,
-            weight * (shares @ (states - mean) ** 2),
-            np.abs(states).max(axis=0),
+            weight * (shares * (columns - mean[:, None]) ** 2).sum(axis=1),
+            np.abs(columns).max(axis=1),
             actions.shape[1],
             float(np.abs(actions).max()),
-            keys[:PLACING_SAMPLES],
-            states[low][first[:PLACING_SAMPLES]],
+            keys,
+            states[first],
             None if groups is None else dict.fromkeys(in_order(groups)),
         )
 
@@ -163,6 +172,19 @@ class FirstLook:
         for look in looks:
             whole = look if whole is None else whole if look is None else whole + look
         return whole
+
+
+def _smallest(keys: NDArray[np.uint64], largest: np.uint64) -> tuple[NDArray[np.uint64], NDArray[np.intp]]:
+    """The smallest different keys, ascending, and where each is first; finding them is faster than sorting all."""
+    low = np.flatnonzero(keys <= largest)
+    few = low
+    if len(low) > 2 * PLACING_SAMPLES:
+        few = low[keys[low] <= np.partition(keys[low], PLACING_SAMPLES)[PLACING_SAMPLES]]
+    for places in (few, low):
+        different, first = np.unique(keys[places], return_index=True)
+        if len(different) >= PLACING_SAMPLES or len(places) == len(low):
+            break  # or else many of the few are equal
+    return different[:PLACING_SAMPLES], places[first[:PLACING_SAMPLES]]
 
 
 def in_order(names: Groups) -> list[Hashable]:

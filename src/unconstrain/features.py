@@ -14,7 +14,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import SMALLEST_VARIANCE, Array, as_matrix, check_at_least
+from .arrays import SMALLEST_VARIANCE, Array, as_matrix, beside, check_at_least, namespace
 from .closed_form import ClosedForm, exponents
 from .errors import InvalidDataError, SettingError
 
@@ -26,7 +26,7 @@ _LEAST_SPREAD = 1e10 * np.sqrt(SMALLEST_VARIANCE)
 
 
 class FeatureMap(Protocol):
-    """What a policy needs of its features: to be called."""
+    """What a policy needs of its features: to be called, by several threads at once where there are many."""
 
     def __call__(self, states: Array, /) -> Array:
         """Compute features (N, p) of states (N, n)."""
@@ -58,7 +58,10 @@ class Affine:
 
     def __call__(self, states: Array) -> Array:
         """Compute features (N, n + 1) of states (N, n)."""
-        return np.column_stack([(states - self.centre) / self.scale, np.ones(len(states))])
+        xp = namespace(states)
+        centre, scale = (beside(np.asarray(part, np.float64), states) for part in (self.centre, self.scale))
+        scaled = (states - centre) / scale
+        return xp.concat([scaled, xp.ones_like(scaled[:, :1])], axis=1)
 
     def closed_form(self, weights: Array) -> ClosedForm:
         """Write a policy ``W φ(x)`` with weights (d, n + 1) as one formula."""
@@ -111,7 +114,8 @@ class NormalisedRBF:
 
     def support(self, states: Array) -> Array:
         """Weight of the nearest kernel, from 1 at its centre to 0 far from all, shape (N,)."""
-        return gaussian(squared_distances(states, self.centres).min(axis=1), self.variance)
+        distances = squared_distances(states, self.centres)
+        return gaussian(namespace(distances).min(distances, axis=1), self.variance)
 
     def closed_form(self, weights: Array) -> ClosedForm:
         """Write a policy ``W φ(x)`` with weights (d, p) as one formula."""
@@ -228,7 +232,9 @@ class KMeansRBF:
 def gaussian(squared: Array, variance: float) -> Array:
     """Weights ``exp(−δ² / 2σ²)`` at squared distances."""
     with np.errstate(over="ignore"):  # to −inf: no weight at all
-        return np.exp(-0.5 * squared / variance)
+        exponents = squared * (-0.5 / variance)
+    weights: Array = namespace(exponents).exp(exponents)
+    return weights
 
 
 def squared_distances(states: Array, centres: Array) -> Array:
@@ -237,29 +243,35 @@ def squared_distances(states: Array, centres: Array) -> Array:
     Both are taken relative to the centres' mean, so that a large common
     offset costs no digits.
     """
-    if states.shape[1] != centres.shape[1]:
-        raise InvalidDataError(
-            f"states: got {states.shape[1]} columns, expected {centres.shape[1]} as the centres have."
-        )
-    origin = centres.mean(axis=0)
-    near, far = states - origin, centres - origin
-    squared = (near**2).sum(axis=1)[:, None] + (far**2).sum(axis=1) - 2.0 * near @ far.T
-    return np.maximum(squared, 0.0)
+    near, far = _apart(states, centres)
+    xp = namespace(near)
+    squared = -2.0 * (far @ near.T)  # (M, N): sums over centres then run along rows
+    squared += xp.sum(near * near, axis=1)
+    squared += xp.sum(far * far, axis=1)[:, None]
+    nearest: Array = xp.clip(squared, 0.0, None).T
+    return nearest
 
 
 def shares(states: Array, centres: Array, variance: float) -> Array:
     """Gaussian weights that sum to one at each state, by log-sum-exp, shape (N, M)."""
     # ‖x‖² is common to all centres and cancels; leaving it out keeps far states exact.
+    near, far = _apart(states, centres)
+    xp = namespace(near)
+    exponents = far @ near.T  # (M, N): sums over centres then run along rows
+    exponents -= 0.5 * xp.sum(far * far, axis=1)[:, None]
+    exponents -= xp.max(exponents, axis=0)
+    with np.errstate(over="ignore"):  # to −inf: no share at all
+        exponents *= 1.0 / variance
+    weights: Array = xp.exp(exponents)
+    weights *= 1.0 / xp.sum(weights, axis=0)
+    return weights.T
+
+
+def _apart(states: Array, centres: Array) -> tuple[Array, Array]:
+    """States and centres from the centres' mean."""
     if states.shape[1] != centres.shape[1]:
         raise InvalidDataError(
             f"states: got {states.shape[1]} columns, expected {centres.shape[1]} as the centres have."
         )
     origin = centres.mean(axis=0)
-    far = centres - origin
-    exponents = (states - origin) @ far.T - 0.5 * (far**2).sum(axis=1)
-    exponents -= exponents.max(axis=1, keepdims=True)
-    with np.errstate(over="ignore"):  # to −inf: no share at all
-        exponents /= variance
-    weights = np.exp(exponents, out=exponents)
-    weights /= weights.sum(axis=1, keepdims=True)
-    return weights
+    return states - beside(origin, states), beside(centres - origin, states)

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from functools import partial
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,9 @@ from numpy.typing import NDArray
 from .arrays import Array, check_at_least
 from .errors import SettingError
 from .moments import Moments
-from .objectives import inconsistency, standard_risk, unvec
+from .objectives import inconsistency, standard_risk, unvec, vec
 from .quadratic import SECONDARY_NOISE, Path, Quadratic, eigensystem, lexicographic_path, minimum, softened_minima
+from .threads import workers
 from .validation import FoldedMoments
 
 __all__ = ["Direct", "Hybrid", "Inconsistency", "Learner", "Solution"]
@@ -170,7 +172,7 @@ class Hybrid:
 
     def _path(self, moments: Moments) -> Path:
         consistent, risk = inconsistency(moments), standard_risk(moments)
-        return lexicographic_path(consistent + self.softness * risk, risk)
+        return lexicographic_path(consistent + self.softness * risk if self.softness else consistent, risk)
 
     def _score(self, moments: Moments) -> Quadratic:
         assert self.alpha != "auto"
@@ -202,16 +204,21 @@ def _solve(
     path_of: Callable[[Moments], Path],
     score_of: Callable[[Moments], Quadratic],
 ) -> Solution:
+    def judge(training: Moments, held_out: Moments) -> Array:
+        return score_of(held_out)(path_of(training).weights)
+
     whole = folds.whole
-    path = path_of(whole)
+    # With nothing to hold out, the data has to judge itself.
+    rounds = folds.rounds() or [(whole, whole)] if learner.threshold is None else []
+    calls: list[Callable[[], Any]] = [partial(path_of, whole), *(partial(judge, *pair) for pair in rounds)]
+    models, size = vec(whole.cross).shape
+    with workers() as threads:
+        path, *judged = threads.run(calls, len(calls) * models * size**3)
     scores = None
     if learner.threshold is not None:
         splits = path.split(learner.threshold)
     else:
-        # With nothing to hold out, the data has to judge itself.
-        rounds = folds.rounds() or [(whole, whole)]
-        judged = np.stack([score_of(held_out)(path_of(training).weights) for training, held_out in rounds])
-        scores = _average(judged, [held_out for _, held_out in rounds], learner.averaging)
+        scores = _average(np.stack(judged), [held_out for _, held_out in rounds], learner.averaging)
         splits = np.maximum(_last_best(scores), path.lowest)
     directions = path.eigenvalues.shape[1]
     weights = unvec(path.at(splits), whole.cross.shape[1])

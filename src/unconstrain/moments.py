@@ -17,17 +17,20 @@ the direction of rounding would claim that the policy is zero along it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from functools import reduce
-from operator import add
+from itertools import combinations, combinations_with_replacement
+from operator import add, sub
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .arrays import Array
+from .arrays import Array, beside, is_foreign, namespace, on_host
 from .projection import unit_actions
 
-__all__ = ["Moments", "gather", "gather_blocks", "total"]
+__all__ = ["Moments", "Sums", "gather", "gather_blocks", "total"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +105,7 @@ class Moments:
         """
         models, d, p = self.cross.shape
         new = change.shape[1]
-        back = np.swapaxes(change, -1, -2)
+        back = change.mT
         blocks = self.consistent.reshape(models, p, d, p, d).transpose(0, 2, 4, 1, 3)  # (M, d, d, p, p)
         moved = change[:, None, None] @ blocks @ back[:, None, None]
         return Moments(
@@ -112,6 +115,10 @@ class Moments:
             change @ self.gram @ back,
             moved.transpose(0, 3, 1, 4, 2).reshape(models, new * d, new * d),
         )
+
+    def on_host(self) -> Moments:
+        """The same as NumPy arrays."""
+        return Moments(*map(on_host, self.sums))
 
 
 def total(parts: Iterable[Moments]) -> Moments:
@@ -125,6 +132,8 @@ def gather(features: Array, actions: Array, weights: Array | None = None, at_res
     Parameters
     ----------
     features : ndarray, shape (N, p)
+        These and the following may be arrays of any library that follows the
+        array API standard; so are the sums then. Summed in float64.
     actions : ndarray, shape (N, d)
     weights : ndarray, shape (N, M), optional
         How much each sample counts in each model, not negative; ones for a
@@ -136,7 +145,7 @@ def gather(features: Array, actions: Array, weights: Array | None = None, at_res
     -------
     Moments
     """
-    counts = np.ones((len(features), 1)) if weights is None else weights
+    counts = namespace(features).ones_like(features[:, :1]) if weights is None else weights
     block = features, actions, counts
     return gather_blocks([block], counts.shape[1], actions.shape[1], features.shape[1], at_rest)
 
@@ -145,77 +154,157 @@ def gather_blocks(
     blocks: Iterable[tuple[Array, Array, Array]], models: int, actions: int, features: int, at_rest: float = 0.0
 ) -> Moments:
     """Sum over blocks of samples, each (features, actions, weights) as in :func:`gather`."""
-    single = models == 1
-    pairs = features**2 if single else features * (features + 1) // 2
-    metrics = 1 + actions * (actions + 1) // 2
-    products = np.zeros((models, metrics, pairs))
-    weight, energy, cross = np.zeros(models), np.zeros(models), np.zeros((models, actions, features))
-    rows = max(64, _BLOCK // (actions * features if single else metrics * pairs))
+    sums = Sums(models, actions, features, at_rest)
     for block in blocks:
-        for start in range(0, len(block[0]), rows):
-            phi, u, w = (part[start : start + rows] for part in block)
-            directions, lengths = unit_actions(u)
-            directions[lengths <= at_rest] = 0.0
-            products += (_products_of_one if single else _products_of_many)(phi, directions, w)
-            weight += w.sum(axis=0)
-            energy += w.T @ lengths**2
-            cross += (w.T @ (u[:, :, None] * phi[:, None, :]).reshape(len(u), -1)).reshape(cross.shape)
-    return Moments(weight, energy, cross, *_unpacked(products, actions, features))
+        for rows in sums.pieces(block[0]):
+            sums.add(*(part[rows, :] for part in block))
+    return sums.moments
 
 
-_BLOCK = 2**18
-"""Numbers in the largest temporary: about a core's share of cache."""
+class Sums:
+    """Moments in the making: samples are added block by block, and Hessians are put together at the end.
+
+    ``û_k û_m`` and 1 are called metrics here: a Hessian consists of one
+    product ``Σ w û_k û_m φφᵀ`` for each k ≤ m, and the Gram matrix is that of 1.
+
+    Parameters
+    ----------
+    models, actions, features : int
+        M, d and p; together the attribute ``shape``.
+    at_rest : float
+        Actions of at most this length have no direction.
+    """
+
+    def __init__(self, models: int, actions: int, features: int, at_rest: float = 0.0) -> None:
+        self.shape, self._at_rest = (models, actions, features), at_rest
+        self._sums: list[Array] = []
+
+    def pieces(self, table: Array, start: int = 0, stop: int | None = None) -> Iterator[slice]:
+        """Rows of a table, or of some of it, to add at a time, so that what is made of them stays in cache."""
+        models, d, p = self.shape
+        columns = p if models == 1 else d * d * p * p // 4
+        numbers, most = (_FOREIGN_BLOCK, 2**20) if is_foreign(table) else (_BLOCK, 8192)
+        rows = min(max(512, numbers // columns), most)
+        samples = (table.shape[0] if stop is None else stop) - start
+        number = -(-samples // rows)
+        return (slice(start + samples * i // number, start + samples * (i + 1) // number) for i in range(number))
+
+    def add(self, features: Array, actions: Array, weights: Array) -> None:
+        """Add some samples, of shapes as in :func:`gather`."""
+        xp = namespace(features)
+        phi, u, w = (xp.asarray(part, dtype=xp.float64) for part in (features, actions, weights))
+        u = xp.stack([u[:, k] for k in range(u.shape[1])]).T  # columns in one piece: there are few, and long
+        directions, lengths = unit_actions(u)
+        moving = lengths > self._at_rest
+        further = [xp.sum(w, axis=0), w.T @ lengths**2]
+        if self.shape[0] == 1:
+            further += [(w * u).T @ phi, *_products_of_one(xp, phi, directions, moving, w)]
+        else:
+            directions = xp.where(moving[:, None], directions, 0.0)
+            further += [w.T @ _each_with_each(xp, u, phi), w.T @ _each_with_each(xp, *_metrics(xp, phi, directions))]
+        if not self._sums:
+            self._sums = further
+        else:
+            for number, sums in enumerate(further):
+                self._sums[number] += sums
+
+    @property
+    def moments(self) -> Moments:
+        """What was added, summed."""
+        models, d, p = self.shape
+        if not self._sums:
+            return Moments.zero(models, d, p)
+        xp = namespace(self._sums[0])
+        # The first three as copies: what is added later must not change them.
+        weight, energy, cross = (xp.asarray(each, copy=True) for each in self._sums[:3])
+        products = self._sums[3:]
+        if models == 1:
+            full = xp.stack(_by_metric(products, d))[None, ...]  # (1, metrics, p, p)
+        else:
+            halves = xp.reshape(products[0], (models, -1, p * (p + 1) // 2))
+            full = xp.take(halves, beside(_places(p).ravel(), weight), axis=2)
+            full = xp.reshape(full, (models, -1, p, p))
+        hessian = xp.take(full, beside(1 + _places(d).ravel(), weight), axis=1)
+        hessian = xp.permute_dims(xp.reshape(hessian, (models, d, d, p, p)), (0, 3, 1, 4, 2))
+        return Moments(
+            weight,
+            energy,
+            xp.reshape(cross, (models, d, p)),
+            xp.asarray(full[:, 0, :, :], copy=True),
+            xp.reshape(hessian, (models, p * d, p * d)),
+        )
 
 
-def _products_of_one(features: Array, directions: Array, weights: Array) -> Array:
-    """``Σ w φφᵀ`` for the metrics 1 and û_k û_m (k ≤ m) of one model, shape (1, metrics, p²).
+_BLOCK = 2**20
+"""Numbers in the largest temporary: more do not stay in cache, fewer give BLAS too little to do at once."""
 
-    With ``F_k = diag(√w û_k) φ`` they are ``F_kᵀF_m``. Off the diagonal,
-    ``F_kᵀF_m + F_mᵀF_k = (F_k + F_m)ᵀ(F_k + F_m) − F_kᵀF_k − F_mᵀF_m`` (and
-    both terms are equal), so that every product is of a matrix with its own
-    transpose, which BLAS does at half the price. The largest diagonal one
+_FOREIGN_BLOCK = 2**25
+"""The same where arrays are of another library, and may be on a device that wants much to do at once."""
+
+
+def _products_of_one(
+    xp: Any, features: Array, directions: Array, moving: NDArray[np.bool_], weights: Array
+) -> list[Array]:
+    """Products from which those of each metric follow (:func:`_by_metric`), for one model, each (p, p).
+
+    With ``F_k = diag(√w û_k) φ`` they are ``Σ w φφᵀ``, ``F_kᵀF_k`` for each
+    k, and ``(F_k + F_m)ᵀ(F_k + F_m)`` for each k < m: all of a matrix with its
+    own transpose, which BLAS does at half the price. One ``F_kᵀF_k``
     follows from the others, since ``Σ û_k² = 1``.
     """
-    rooted = np.sqrt(weights) * features
-    moving = directions.any(axis=1)
-    still = rooted[~moving]
-    seen = rooted if moving.all() else rooted[moving]
-    pointed = [seen * directions[moving, k, None] for k in range(directions.shape[1])]
-    whole = seen.T @ seen
-    largest = int(np.argmax([(f**2).sum() for f in pointed]))  # subtracting for a small one would leave rounding
-    own = [np.zeros_like(whole) if k == largest else f.T @ f for k, f in enumerate(pointed)]
-    own[largest] = whole - sum(own, start=np.zeros_like(whole))
-    products = [whole + still.T @ still]
-    for k, m in zip(*np.triu_indices(len(pointed)), strict=True):
-        if k == m:
-            products.append(own[k])
-        else:
-            both = pointed[k] + pointed[m]
-            products.append(0.5 * (both.T @ both - own[k] - own[m]))
-    return np.stack(products).reshape(1, len(products), -1)
+    root = xp.sqrt(weights)
+    pointed = directions * root
+    resting: Array | float = 0.0
+    if not xp.all(moving):
+        still, moves = xp.nonzero(~moving)[0], xp.nonzero(moving)[0]
+        resting = _gram(xp.take(features, still, axis=0) * xp.take(root, still, axis=0))
+        features, root, pointed = (xp.take(part, moves, axis=0) for part in (features, root, pointed))
+    whole = _gram(features if xp.all(root == 1.0) else features * root)
+    largest = int(xp.argmax(xp.sum(pointed**2, axis=0)))  # subtracting for a small one would leave rounding
+    d = pointed.shape[1]
+    own = {k: _gram(features * pointed[:, k, None]) for k in range(d) if k != largest}
+    own[largest] = reduce(sub, own.values(), whole) if d > 1 else whole + 0.0
+    both = [_gram(features * (pointed[:, k] + pointed[:, m])[:, None]) for k, m in combinations(range(d), 2)]
+    return [whole + resting, *(own[k] for k in range(d)), *both]
 
 
-def _products_of_many(features: Array, directions: Array, weights: Array) -> Array:
-    """The same for many models, half of each: one product ``Wᵀ ((1, vech ûûᵀ) ⊗ vech φφᵀ)``."""
-    first, second = np.triu_indices(directions.shape[1])
-    row, column = np.triu_indices(features.shape[1])
-    metrics = np.column_stack([np.ones(len(features)), directions[:, first] * directions[:, second]])
-    squares = features[:, row] * features[:, column]
-    sums = weights.T @ (metrics[:, :, None] * squares[:, None, :]).reshape(len(features), -1)
-    return sums.reshape(weights.shape[1], metrics.shape[1], len(row))
+def _by_metric(products: list[Array], d: int) -> list[Array]:
+    """``Σ w φφᵀ`` for the metrics 1 and û_k û_m (k ≤ m)."""
+    # ``(F_k + F_m)ᵀ(F_k + F_m) = F_kᵀF_k + F_mᵀF_m + 2 F_kᵀF_m``, since F_kᵀF_m is symmetric.
+    own = products[1 : d + 1]
+    both = dict(zip(combinations(range(d), 2), products[d + 1 :], strict=True))
+    pairs = combinations_with_replacement(range(d), 2)
+    return [products[0], *(own[k] if k == m else 0.5 * (both[k, m] - own[k] - own[m]) for k, m in pairs)]
 
 
-def _unpacked(products: Array, d: int, p: int) -> tuple[Array, Array]:
-    """Gram (M, p, p) and consistent (M, d p, d p) from the products of each metric."""
-    models, metrics, pairs = products.shape
-    if pairs == p * p:
-        full = products.reshape(models, metrics, p, p)
-    else:
-        row, column = np.triu_indices(p)
-        full = np.empty((models, metrics, p, p))
-        full[..., row, column] = full[..., column, row] = products
-    first, second = np.triu_indices(d)
-    consistent = np.empty((models, p, d, p, d))
-    for metric, (k, m) in enumerate(zip(first, second, strict=True), start=1):
-        consistent[:, :, k, :, m] = consistent[:, :, m, :, k] = full[:, metric]
-    return full[:, 0].copy(), consistent.reshape(models, p * d, p * d)
+def _gram(table: Array) -> Array:
+    return table.T @ table
+
+
+def _metrics(xp: Any, features: Array, directions: Array) -> tuple[Array, Array]:
+    """Metrics of each sample, 1 first, and half of its φφᵀ: (N, metrics) and (N, p (p + 1) / 2)."""
+    half, other = _halves(xp, directions), _halves(xp, features)
+    return xp.concat([xp.ones_like(half[:, :1]), half], axis=1), other
+
+
+def _halves(xp: Any, table: Array) -> Array:
+    """Products of the columns, each pair once."""
+    first, second = (beside(index, table) for index in np.triu_indices(table.shape[1]))
+    halves: Array = xp.take(table, first, axis=1) * xp.take(table, second, axis=1)
+    return halves
+
+
+def _each_with_each(xp: Any, first: Array, second: Array) -> Array:
+    """Products of each column of one table with each of another, row by row."""
+    products: Array = xp.reshape(
+        first[:, :, None] * second[:, None, :], (first.shape[0], first.shape[1] * second.shape[1])
+    )
+    return products
+
+
+def _places(size: int) -> NDArray[np.intp]:
+    """Where each entry of a symmetric matrix is among its pairs k ≤ m, row by row."""
+    places = np.zeros((size, size), dtype=np.intp)
+    row, column = np.triu_indices(size)
+    places[row, column] = places[column, row] = np.arange(len(row))
+    return places

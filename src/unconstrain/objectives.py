@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arrays import Array
+from .arrays import Array, beside, namespace
 from .moments import Moments
 from .quadratic import Quadratic
 
@@ -28,15 +28,19 @@ def standard_risk(moments: Moments) -> Quadratic:
     ``E_2 = Σ w ‖u − π̃(x)‖²``
     """
     models, d, p = moments.cross.shape
-    hessian = np.einsum("mij,kl->mikjl", moments.gram, np.eye(d)).reshape(models, p * d, p * d)
+    each = beside(np.eye(d), moments.gram)[:, None, :]  # eye[k, l] at (k, j, l)
+    hessian = namespace(moments.gram).reshape(moments.gram[:, :, None, :, None] * each, (models, p * d, p * d))
     return Quadratic(hessian, vec(moments.cross), moments.energy)
 
 
 def vec(weights: Array) -> Array:
     """Matrices (..., d, p) laid out by columns, shape (..., d p)."""
-    return np.swapaxes(weights, -1, -2).reshape(*weights.shape[:-2], -1)
+    d, p = weights.shape[-2:]
+    laid: Array = namespace(weights).reshape(weights.mT, (*weights.shape[:-2], d * p))
+    return laid
 
 
 def unvec(vector: Array, actions: int) -> Array:
     """The inverse of :func:`vec`: shape (..., d p) to (..., d, p)."""
-    return np.swapaxes(vector.reshape(*vector.shape[:-1], -1, actions), -1, -2)
+    matrices: Array = namespace(vector).reshape(vector, (*vector.shape[:-1], -1, actions)).mT
+    return matrices

@@ -5,9 +5,12 @@ Every projection here is symmetric and idempotent, ``P = Pᵀ = P²``.
 
 from __future__ import annotations
 
+from functools import reduce
+from operator import add
+
 import numpy as np
 
-from .arrays import Array
+from .arrays import Array, namespace
 from .errors import InvalidDataError
 
 __all__ = ["RANK_TOLERANCE", "ROW_TOLERANCE", "action_projection", "null_space_projection", "project", "unit_actions"]
@@ -75,12 +78,17 @@ def unit_actions(actions: Array) -> tuple[Array, Array]:
         Unit vectors; zero where the action is zero, since that has no direction.
     lengths : ndarray, shape (...)
     """
+    # Column by column: there are few, and reducing along a short last axis is slow.
+    xp = namespace(actions)
+    actions = xp.asarray(actions)
+    columns = range(actions.shape[-1])
     # Scaled by the largest entry first: lengths of 1e-200 must not square to zero.
-    scale = np.abs(actions).max(axis=-1, keepdims=True, initial=0.0)
-    scaled = actions / np.where(scale > 0, scale, 1.0)
-    lengths = np.linalg.norm(scaled, axis=-1, keepdims=True)
-    directions = scaled / np.where(lengths > 0, lengths, 1.0)
-    return directions, (lengths * scale)[..., 0]
+    size, nothing = xp.abs(actions), xp.zeros_like(actions[..., :1])[..., 0]
+    scale = reduce(xp.maximum, (size[..., k] for k in columns), nothing)
+    scaled = actions / xp.where(scale > 0, scale, 1.0)[..., None]
+    lengths = xp.sqrt(reduce(add, (scaled[..., k] ** 2 for k in columns), nothing))
+    scaled /= xp.where(lengths > 0, lengths, 1.0)[..., None]
+    return scaled, lengths * scale
 
 
 def action_projection(actions: Array) -> Array:

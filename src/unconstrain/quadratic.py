@@ -3,32 +3,40 @@
 Everything here has a leading axis of M independent problems.
 
 The derivation of :func:`lexicographic_path`, for one problem. Let
-``H = V Λ Vᵀ`` with ascending eigenvalues, ``a = Vᵀ g``, ``c = Λ⁻¹ a``,
-``B = Vᵀ M V`` and ``b = Vᵀ m``. When the k smallest eigenvalues count as
-undetermined, V₂ is the first k columns of V and eqs 7–13 read, in the
-coordinates of V,
+``H = V Λ Vᵀ`` with ascending eigenvalues, and let V₂ be the first k columns
+of V: the directions that count as undetermined. Eqs 7–13 ask for the
+minimum of the second objective over all w that agree with ``Λ⁻¹ Vᵀ g`` along
+the other columns.
 
-    w₁ = (0, c[k:])                                                    (7)
-    z  = B[:k, :k]⁻¹ (b[:k] − B[:k, k:] c[k:])                         (12)
-    w  = (z, c[k:])                                                    (13)
+With ``Vᵀ M V = L Lᵀ`` (Cholesky) the columns of ``A = V L⁻ᵀ`` are the
+eigenvectors, made orthonormal in the metric of the second objective one after
+the other, the smallest eigenvalue first. L is lower triangular, so
 
-V₂ for a larger threshold contains V₂ for a smaller one, so ``B[:k, :k]`` is
-a leading block of one matrix: with ``B = L Lᵀ`` its factor is the leading
-block of L for *every* k. And because L is lower triangular, its leading
-block is applied to a vector by applying L to the vector padded with zeros.
-So all k are solved together by two triangular solves with P + 1 columns.
+- the first k columns of A span what those of V span, for *every* k, and
+- of ``w = A s`` the entries of s from k on depend on the columns of V from k
+  on alone: they are those of ``γ = Lᵀ Λ⁻¹ Vᵀ g`` (eq. 7), whatever k is.
+
+In these coordinates the second objective is ``‖s‖² − 2 sᵀβ`` with
+``β = Aᵀ m = L⁻¹ Vᵀ m``. It falls apart into its entries; the free ones, below
+k, are those of β (eq. 12). So the solution at split k is
+
+    s = (β[:k], γ[k:])                                                (13)
+
+and the solutions at all splits are sums from the left of ``A diag(β)`` and
+from the right of ``A diag(γ)``: one factorisation, and P numbers for each.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
+from scipy.linalg.blas import dtrsm
 
-from .arrays import Array
+from .arrays import Array, is_foreign, namespace
 
 __all__ = [
     "NOISE",
@@ -75,11 +83,14 @@ class Quadratic:
         ndarray, shape (M,) or (M, K)
             Not below zero: what rounding leaves there is cut off.
         """
+        xp = namespace(weights)
         many = weights if weights.ndim == 3 else weights[..., None]
         with np.errstate(over="ignore", invalid="ignore"):  # overflow is for the caller to see, as inf
-            bent = self.hessian @ many - 2.0 * self.linear[..., None]
-            values = self.constant[:, None] + np.einsum("mpk,mpk->mk", many, bent)
-        values = np.where(np.isfinite(values), np.maximum(values, 0.0), np.inf)
+            bent = self.hessian @ many
+            bent -= 2.0 * self.linear[..., None]
+            bent *= many
+            values = self.constant[:, None] + xp.sum(bent, axis=1)
+        values = xp.where(xp.isfinite(values), xp.clip(values, 0.0, None), xp.inf)
         return values if weights.ndim == 3 else values[:, 0]
 
     def __add__(self, other: Quadratic) -> Quadratic:
@@ -101,36 +112,63 @@ class Path:
     ----------
     eigenvalues : ndarray, shape (M, P)
         Of the first objective's Hessian, ascending.
-    weights : ndarray, shape (M, P, P + 1)
-        ``weights[m, :, k]`` solves problem m when its k smallest eigenvalues
-        count as undetermined.
     lowest : ndarray of int, shape (M,)
         Splits below this one would divide by rounding noise; there the path
         repeats the solution at this one.
+    basis : ndarray, shape (M, P, P)
+        The A of the derivation above.
+    undetermined, determined : ndarray, shape (M, P)
+        Its β and γ.
     """
 
     eigenvalues: Array
-    weights: Array
     lowest: NDArray[np.intp]
+    basis: Array
+    undetermined: Array
+    determined: Array
+
+    @cached_property
+    def weights(self) -> Array:
+        """Weights at every split, shape (M, P, P + 1).
+
+        ``weights[m, :, k]`` solves problem m when its k smallest eigenvalues
+        count as undetermined.
+        """
+        xp = namespace(self.basis)
+        left = _running(self.basis * self.undetermined[:, None, :])
+        right = xp.flip(_running(xp.flip(self.basis * self.determined[:, None, :], axis=-1)), axis=-1)
+        weights: Array = left + right
+        if not xp.any(self.lowest > 0):
+            return weights
+        splits = xp.arange(weights.shape[-1], device=weights.device)
+        lowest = xp.asarray(self.lowest)[:, None, None]
+        return xp.where(splits < lowest, xp.take_along_axis(weights, lowest, axis=2), weights)
 
     def at(self, splits: NDArray[np.intp]) -> Array:
         """Weights at one split for each problem, shape (M, P)."""
-        chosen = np.broadcast_to(np.asarray(splits)[:, None, None], (*self.weights.shape[:2], 1))
-        return np.take_along_axis(self.weights, chosen, axis=2)[..., 0]
+        xp = namespace(self.basis)
+        kept = xp.where(splits > self.lowest, splits, self.lowest)[:, None]
+        left = xp.arange(self.basis.shape[-1], device=self.basis.device) < kept
+        weights: Array = (self.basis @ xp.where(left, self.undetermined, self.determined)[..., None])[..., 0]
+        return weights
 
     def threshold(self, splits: NDArray[np.intp]) -> Array:
         """The λ_t of eq. 7 at a split, as a share of the largest eigenvalue, shape (M,).
 
         The largest eigenvalue that counts as undetermined, or 0 if none does.
         """
-        below = np.take_along_axis(self.eigenvalues, np.maximum(splits - 1, 0)[:, None], axis=1)[:, 0]
+        xp = namespace(self.eigenvalues)
+        below = xp.take_along_axis(self.eigenvalues, xp.clip(splits - 1, 0, None)[:, None], axis=1)[:, 0]
         largest = self.eigenvalues[:, -1]
-        return np.where((splits > 0) & (largest > 0), below / np.where(largest > 0, largest, 1.0), 0.0)
+        shares: Array = xp.where((splits > 0) & (largest > 0), below / xp.where(largest > 0, largest, 1.0), 0.0)
+        return shares
 
     def split(self, threshold: float) -> NDArray[np.intp]:
         """How many eigenvalues do not exceed ``threshold`` times the largest, shape (M,)."""
-        count = (self.eigenvalues <= threshold * self.eigenvalues[:, -1:]).sum(axis=1)
-        return np.maximum(count, self.lowest)
+        xp = namespace(self.eigenvalues)
+        count = xp.sum(xp.astype(self.eigenvalues <= threshold * self.eigenvalues[:, -1:], xp.int64), axis=1)
+        splits: NDArray[np.intp] = xp.where(count > self.lowest, count, self.lowest)
+        return splits
 
 
 def lexicographic_path(first: Quadratic, second: Quadratic | None = None) -> Path:
@@ -150,42 +188,42 @@ def lexicographic_path(first: Quadratic, second: Quadratic | None = None) -> Pat
     -------
     Path
     """
+    xp = namespace(first.hessian)
     eigenvalues, vectors = eigensystem(first.hessian)
-    size = eigenvalues.shape[1]
     largest = eigenvalues[:, -1:]
     noise = (eigenvalues <= NOISE * largest) | (largest <= UNDERFLOW)
-    lowest = noise.sum(axis=1)
-    determined = _across(vectors, first.linear) / np.where(noise, 1.0, eigenvalues)
-
-    splits = np.maximum(np.arange(size + 1), lowest[:, None])  # (M, P + 1)
-    undetermined = np.arange(size)[:, None] < splits[:, None, :]  # (M, P, P + 1)
-    coordinates = np.where(undetermined, 0.0, determined[..., None])
-    if second is not None:
-        coordinates += _fill(second, vectors, coordinates, undetermined)
-    return Path(eigenvalues, vectors @ coordinates, lowest)
+    lowest = xp.sum(xp.astype(noise, xp.int64), axis=1)
+    determined = xp.where(noise, 0.0, _across(vectors, first.linear) / xp.where(noise, 1.0, eigenvalues))
+    if second is None:
+        return Path(eigenvalues, lowest, vectors, xp.zeros_like(determined), determined)
+    lower = _factor(second.hessian, vectors)
+    basis = _solve_lower(lower, vectors.mT).mT
+    return Path(eigenvalues, lowest, basis, _across(basis, second.linear), _across(lower, determined))
 
 
 def minimum(objective: Quadratic) -> Array:
     """Minimise one objective alone, shape (M, P); of least norm where it is not unique."""
-    size = objective.linear.shape[1]
-    lower, _ = _factor(objective.hessian, np.broadcast_to(np.eye(size), objective.hessian.shape))
-    return _solve_lower(lower, _solve_lower(lower, objective.linear), transposed=True)
+    xp = namespace(objective.linear)
+    axes = xp.eye(objective.linear.shape[1], dtype=xp.float64, device=objective.linear.device)
+    axes = xp.broadcast_to(axes, objective.hessian.shape)
+    basis = _solve_lower(_factor(objective.hessian, axes), axes).mT
+    weights: Array = (basis @ _across(basis, objective.linear)[..., None])[..., 0]
+    return weights
 
 
 def softened_minima(first: Quadratic, second: Quadratic, softnesses: Sequence[float]) -> Array:
     """Minimise ``first + s second`` for each s, at the price of one factorisation, shape (M, P, K).
 
-    With ``second.hessian = L Lᵀ`` and ``L⁻¹ first.hessian L⁻ᵀ = Q Λ Qᵀ`` every
-    minimum is ``L⁻ᵀ Q (Λ + s)⁻¹ Qᵀ L⁻¹ (linear₁ + s linear₂)``.
+    With ``second.hessian = L Lᵀ``, ``L⁻¹ first.hessian L⁻ᵀ = Q Λ Qᵀ`` and the
+    basis ``A = L⁻ᵀ Q`` every minimum is ``A (Λ + s)⁻¹ Aᵀ (linear₁ + s linear₂)``.
     """
-    size = first.linear.shape[1]
-    lower, _ = _factor(second.hessian, np.broadcast_to(np.eye(size), second.hessian.shape))
-    half = _solve_lower(lower, first.hessian)
-    eigenvalues, vectors = eigensystem(_solve_lower(lower, half.swapaxes(-1, -2)))
-    along, beside = (_across(vectors, _solve_lower(lower, one.linear)) for one in (first, second))
-    shares = np.asarray(softnesses)
-    scaled = (along[..., None] + shares * beside[..., None]) / (np.maximum(eigenvalues, 0.0)[..., None] + shares)
-    return _solve_lower(lower, vectors @ scaled, transposed=True)
+    axes = np.broadcast_to(np.eye(first.linear.shape[1]), first.hessian.shape)
+    whitening = _solve_lower(_factor(second.hessian, axes), axes).mT
+    eigenvalues, vectors = eigensystem(whitening.mT @ first.hessian @ whitening)
+    basis, shares = whitening @ vectors, np.asarray(softnesses)
+    linear = _across(basis, first.linear)[..., None] + shares * _across(basis, second.linear)[..., None]
+    minima: Array = basis @ (linear / (np.maximum(eigenvalues, 0.0)[..., None] + shares))
+    return minima
 
 
 def eigensystem(hessian: Array) -> tuple[Array, Array]:
@@ -194,57 +232,57 @@ def eigensystem(hessian: Array) -> tuple[Array, Array]:
     Scaled to one, and without what is too small to matter: LAPACK gives up
     on some matrices whose entries span hundreds of orders of magnitude.
     """
-    size = np.abs(hessian).max(axis=(-2, -1), keepdims=True)
-    unit = np.where(size > UNDERFLOW, size, 1.0)
+    xp = namespace(hessian)
+    size = xp.max(xp.abs(hessian), axis=(-2, -1), keepdims=True)
+    unit = xp.where(size > UNDERFLOW, size, 1.0)
     scaled = hessian / unit
-    eigenvalues, vectors = np.linalg.eigh(np.where(np.abs(scaled) > 1e-60, scaled, 0.0))
+    eigenvalues, vectors = xp.linalg.eigh(xp.where(xp.abs(scaled) > 1e-60, scaled, 0.0))
     return eigenvalues * unit[..., 0], vectors
 
 
-def _fill(second: Quadratic, vectors: Array, coordinates: Array, undetermined: NDArray[np.bool_]) -> Array:
-    """The z of eq. 12 for every split, padded with zeros, shape (M, P, P + 1)."""
-    lower, metric = _factor(second.hessian, vectors)
-    gap = _across(vectors, second.linear)[..., None] - metric @ coordinates
-    reduced = np.where(undetermined, _solve_lower(lower, gap), 0.0)
-    return _solve_lower(lower, reduced, transposed=True)
-
-
-def _factor(hessian: Array, vectors: Array) -> tuple[Array, Array]:
-    """Cholesky factor of ``Vᵀ M V``, and that matrix, both (M, P, P).
+def _factor(hessian: Array, vectors: Array) -> Array:
+    """Cholesky factor of ``Vᵀ M V``, shape (M, P, P).
 
     Where M is singular, its null directions are given the weight of its
     largest eigenvalue first. The linear term has no part in them, so they
     stay zero, which is the solution of least norm. An M that is nothing but
     underflow, as of a field that no sample is near, counts as zero.
     """
-    metric = np.swapaxes(vectors, -1, -2) @ hessian @ vectors
+    xp = namespace(hessian)
     try:
-        lower: Array = np.linalg.cholesky(metric).astype(np.float64, copy=False)
-        pivots = np.diagonal(lower, axis1=-2, axis2=-1) ** 2
-        if (pivots.min(axis=-1) > SECONDARY_NOISE * pivots.max(axis=-1)).all():
-            return lower, metric
-    except np.linalg.LinAlgError:
+        lower: Array = xp.linalg.cholesky(vectors.mT @ hessian @ vectors)
+        pivots = xp.linalg.diagonal(lower) ** 2
+        if xp.all(xp.min(pivots, axis=-1) > SECONDARY_NOISE * xp.max(pivots, axis=-1)):
+            return lower
+    except (np.linalg.LinAlgError, RuntimeError):  # PyTorch's is a RuntimeError
         pass
     eigenvalues, axes = eigensystem(hessian)
     largest = eigenvalues[:, -1:]
-    floored = np.where(eigenvalues > SECONDARY_NOISE * largest, eigenvalues, largest)
-    floored = np.where(largest > UNDERFLOW, floored, 1.0)
-    rotated = np.swapaxes(axes, -1, -2) @ vectors
-    metric = np.swapaxes(rotated, -1, -2) @ (floored[..., None] * rotated)
-    return np.linalg.cholesky(metric).astype(np.float64, copy=False), metric
+    floored = xp.where(eigenvalues > SECONDARY_NOISE * largest, eigenvalues, largest)
+    floored = xp.where(largest > UNDERFLOW, floored, 1.0)
+    rotated = axes.mT @ vectors
+    replaced: Array = xp.linalg.cholesky(rotated.mT @ (floored[..., None] * rotated))
+    return replaced
 
 
 def _across(vectors: Array, vector: Array) -> Array:
     """``Vᵀ g`` for each problem, shape (M, P)."""
-    return np.einsum("mpq,mp->mq", vectors, vector)
+    across: Array = (vectors.mT @ vector[..., None])[..., 0]
+    return across
 
 
-def _solve_lower(lower: Array, right: Array, *, transposed: bool = False) -> Array:
-    """Solve ``L y = r`` or ``Lᵀ y = r`` for each problem."""
-    trans = "T" if transposed else "N"
+def _running(columns: Array) -> Array:
+    """Sums of the first 0 to P columns, shape (M, P, P + 1)."""
+    xp = namespace(columns)
+    return xp.cumulative_sum(columns, axis=-1, include_initial=True)
+
+
+def _solve_lower(lower: Array, right: Array) -> Array:
+    """Solve ``L y = r`` for each problem."""
+    if is_foreign(lower):  # the standard knows no triangular matrices
+        solved: Array = namespace(lower).linalg.solve(lower, right)
+        return solved
     return np.stack(
-        [
-            solve_triangular(factor, side, lower=True, trans=trans, check_finite=False)
-            for factor, side in zip(lower, right, strict=True)
-        ]
-    )
+        # BLAS has columns first: Lᵀ and rᵀ as they lie, and r on the right.
+        [dtrsm(1.0, factor.T, side.T, side=1, lower=0) for factor, side in zip(lower, right, strict=True)]
+    ).mT

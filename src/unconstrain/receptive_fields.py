@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import SMALLEST_VARIANCE, Array, as_matrix, check_at_least
+from .arrays import SMALLEST_VARIANCE, Array, as_matrix, check_at_least, namespace
 from .errors import SettingError
 from .features import gaussian, shares, squared_distances
 
@@ -44,7 +44,8 @@ class ReceptiveFields:
 
     def support(self, states: Array) -> Array:
         """Weight in the nearest field, from 1 at a centre to 0 far from all, shape (N,)."""
-        return gaussian(squared_distances(states, self.centres).min(axis=1), self.variance)
+        distances = squared_distances(states, self.centres)
+        return gaussian(namespace(distances).min(distances, axis=1), self.variance)
 
 
 def cover(states: Array, variance: float, at_least: float = 0.7) -> ReceptiveFields:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from itertools import accumulate
+from operator import add
 from typing import Literal
 
 import numpy as np
@@ -196,12 +197,10 @@ class FoldedMoments:
         if len(filled) < 2:
             return []
         # Everything but one from the sums before and after it: subtracting would leave rounding behind.
-        nothing = 0.0 * self.parts[0]
-        before = list(accumulate((self.parts[i] for i in filled), initial=nothing))
-        after = list(accumulate((self.parts[i] for i in reversed(filled)), initial=nothing))[::-1]
-        return [
-            (before[place] + after[place + 1], self.parts[i]) for place, i in enumerate(filled) if i in self.held_out
-        ]
+        before = list(accumulate(self.parts[i] for i in filled[:-1]))
+        after = list(accumulate(self.parts[i] for i in reversed(filled[1:])))[::-1]
+        others = [after[0], *map(add, before[:-1], after[1:]), before[-1]]
+        return [(rest, self.parts[i]) for rest, i in zip(others, filled, strict=True) if i in self.held_out]
 
     def in_features(self, change: Array) -> FoldedMoments:
         """Change the features of every part; see :meth:`Moments.in_features`."""

@@ -15,6 +15,7 @@ EXTRAS = {
     "sim": ("mujoco", "pillow"),
     "onnx": ("onnx", "onnxruntime"),
     "cluster": ("dask", "distributed"),
+    "arrays": ("array-api-compat",),
 }
 """What each extra brings."""
 
@@ -25,6 +26,7 @@ SERVES = {
     "sim": "wiping with contact",
     "onnx": "export to ONNX",
     "cluster": "learning on many machines",
+    "arrays": "learning from tensors",
 }
 
 

@@ -6,23 +6,38 @@ from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from copy import deepcopy
 from dataclasses import replace
+from functools import partial
 from itertools import chain, pairwise
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from ..arrays import Array, as_groups, as_matrix, as_table, as_weights, check_at_least
+from ..arrays import (
+    BLOCK_ROWS,
+    Array,
+    as_groups,
+    as_matrix,
+    as_table,
+    as_weights,
+    beside,
+    check_at_least,
+    is_foreign,
+    namespace,
+    on_host,
+    slices,
+)
 from ..batches import Batch, FirstLook, Groups
 from ..demonstration import Demonstration, stack
 from ..errors import InvalidDataError, SettingError
 from ..learners import Hybrid, Learner, Solution
-from ..moments import Moments, gather_blocks
+from ..moments import Moments, Sums
 from ..objectives import inconsistency, vec
 from ..projection import unit_actions
 from ..robust import RobustSolution, SampleLearner, Samples, Uncertainty, uncertainty
+from ..threads import Workers, workers
 from ..validation import FoldedMoments, Folds, Splitter, Validation
 from .deployable import Deployable
 
@@ -32,6 +47,10 @@ AT_REST = 1e-12
 """Actions shorter than this share of the largest at first look are rounding around rest."""
 
 _ROWS = 4096
+"""Rows that are predicted together, so that what is made of them stays in cache."""
+
+_SPREAD = 200
+"""Weights from which on folds are summed in threads: with fewer, steps are short and threads mostly wait."""
 
 
 class Policy(Deployable, RegressorMixin, BaseEstimator):
@@ -45,8 +64,8 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
     _flat: bool
 
     @abstractmethod
-    def _place(self, states: Array) -> None:
-        """Fix features and fields on some different states."""
+    def _place(self, look: FirstLook) -> None:
+        """Fix features and fields on what was seen at first look."""
 
     @abstractmethod
     def _features(self, states: Array) -> Array:
@@ -72,7 +91,8 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         Parameters
         ----------
         X : array_like, shape (N, n)
-            States.
+            States. These and the actions may be arrays of any library that
+            follows the array API standard; they are summed where they are.
         y : array_like, shape (N, d) or (N,)
             Observed actions, each the projection of the policy by an unknown constraint.
         sample_weight : array_like, shape (N,), optional
@@ -204,15 +224,18 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         Returns
         -------
         ndarray, shape (N, d), or (N,) where it was fitted to (N,) actions
+            Of the library and on the device of the states.
         """
         check_is_fitted(self, "solution_")
         states = self._checked_states(X)
-        actions = np.concatenate([self._predict_block(states[rows]) for rows in _chunks(np.arange(len(states)))])
+        blocks = slices(states, BLOCK_ROWS if is_foreign(states) else _ROWS)
+        actions: Array = namespace(states).concat([self._predict_block(states[rows, :]) for rows in blocks])
         return actions[:, 0] if self._flat else actions
 
     def __call__(self, states: ArrayLike) -> Array:
         """Be a policy: the same as :meth:`predict`, always of shape (N, d)."""
-        return self.predict(states).reshape(-1, self.n_outputs_)
+        actions = self.predict(states)
+        return actions[:, None] if self._flat else actions
 
     def uncertainty(self, X: ArrayLike) -> Uncertainty:
         """How far the unconstrained policy may be from :meth:`predict`, and why.
@@ -263,8 +286,9 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         missed = moved = 0.0
         for states, actions, weights, _ in self._checked(X, y, sample_weight, reset=False).blocks():
             directions, lengths = unit_actions(actions)
-            counts = np.ones(len(states)) if weights is None else weights
-            missed += float(counts @ (lengths - (directions * self(states)).sum(axis=1)) ** 2)
+            xp = namespace(lengths)
+            counts = xp.ones_like(lengths) if weights is None else beside(weights, lengths)
+            missed += float(counts @ (lengths - xp.sum(directions * self(states), axis=1)) ** 2)
             moved += float(counts @ lengths**2)
         return 1.0 - missed / moved if moved > 0 else 0.0
 
@@ -304,20 +328,23 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         states = self._checked_states(X, reset=reset, convert=False)
         if y is None:
             raise InvalidDataError("requires y to be passed, but the target y is None: expected the observed actions.")
+        if is_foreign(y) != is_foreign(states):
+            y = beside(on_host(y), states)
         actions, flat = as_table(y, "actions", convert=False)
-        if len(actions) != len(states):
+        samples = states.shape[0]
+        if actions.shape[0] != samples:
             raise InvalidDataError(
-                f"got {len(states)} states and {len(actions)} actions (inconsistent numbers of samples), "
+                f"got {samples} states and {actions.shape[0]} actions (inconsistent numbers of samples), "
                 "expected one action for each state."
             )
         if reset:
             self._flat, self.n_outputs_ = flat, actions.shape[1]
         elif actions.shape[1] != self.n_outputs_:
             raise InvalidDataError(f"actions: got {actions.shape[1]} columns, expected {self.n_outputs_} as before.")
-        weights = None if sample_weight is None else as_weights(sample_weight, len(states))
+        weights = None if sample_weight is None else as_weights(sample_weight, samples)
         if weights is not None and not weights.any():
             raise InvalidDataError("sample_weight: all weights are zero, expected at least one that counts.")
-        return Batch(states, actions, weights, None if groups is None else as_groups(groups, len(states)))
+        return Batch(states, actions, weights, None if groups is None else as_groups(groups, samples))
 
     def _checked_states(self, X: ArrayLike, *, reset: bool = False, convert: bool = True) -> Array:
         if isinstance(X, list | tuple):
@@ -325,6 +352,10 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         try:
             # scikit-learn checks names, sparse input and the number of columns; the numbers are ours to check.
             kind = np.float64 if convert else "numeric"
+            if is_foreign(X):
+                table = as_matrix(X, "states", convert=convert)
+                validate_data(self, table, reset=reset, skip_check_array=True)
+                return table
             table = validate_data(self, X, reset=reset, dtype=kind, ensure_all_finite=False)
         except ValueError as error:
             raise InvalidDataError(str(error)) from error
@@ -337,8 +368,7 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         validation = self.validation if self.validation is not None else Folds()
         self._at_rest = AT_REST * look.fastest
         self._splitter = Splitter(validation, look, more)
-        # In a fixed order: repetition and order of the samples must not move the features.
-        self._place(np.unique(look.states, axis=0))
+        self._place(look)
         self._folds = self._nothing()
         self._kept = ()
         return self
@@ -347,7 +377,8 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         if isinstance(self._learner(), SampleLearner):
             batches = tuple(batches)
             self._kept = (*self._samples_so_far(), *batches)
-        self._folds = self._folds + self._summed(batches)
+        summed = self._summed(batches)
+        self._folds = self._folds + summed if self._folds.filled else summed
         self._conclude()
         return self
 
@@ -360,21 +391,34 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         return FoldedMoments((empty,) * validation.count, validation.held_out)
 
     def _summed(self, batches: Iterable[Batch]) -> FoldedMoments:
-        folds = self._nothing()
-        return sum((self._gather(block, folds) for batch in batches for block in batch.blocks()), start=folds)
-
-    def _gather(self, batch: Batch, like: FoldedMoments) -> FoldedMoments:
-        states, actions, counts, groups = batch
-        weights = np.ones(len(states)) if counts is None else counts
-        folds = self._splitter.assign(states, groups)
-        order = np.argsort(folds, kind="stable")
-        starts = np.searchsorted(folds[order], np.arange(len(like.parts) + 1))
+        like = self._nothing()
         models, d, p = like.parts[0].cross.shape
-        parts = []
-        for start, stop in pairwise(starts):
-            blocks = (self._block(states[rows], actions[rows], weights[rows]) for rows in _chunks(order[start:stop]))
-            parts.append(gather_blocks(blocks, models, d, p, self._at_rest))
-        return FoldedMoments(tuple(parts), like.held_out)
+        sums = [Sums(models, d, p, self._at_rest) for _ in like.parts]
+        with workers() as threads:
+            for batch in batches:
+                for block in batch.blocks():
+                    self._add(block, sums, threads)
+        return FoldedMoments(tuple(each.moments.on_host() for each in sums), like.held_out)
+
+    def _add(self, batch: Batch, sums: Sequence[Sums], threads: Workers) -> None:
+        """Add samples to the sums of their folds."""
+        folds = self._splitter.assign(on_host(batch.states), batch.groups)
+        # Each fold in one piece; of small integers NumPy sorts by counting.
+        order = np.argsort(folds.astype(np.min_scalar_type(len(sums))), kind="stable")
+        starts = np.searchsorted(folds[order], np.arange(len(sums) + 1)).tolist()
+        states, actions, weights, _ = batch.at(order)
+        weights = beside(np.ones(len(order)) if weights is None else weights, states)
+
+        def add(fold: Sums, start: int, stop: int) -> None:
+            for rows in fold.pieces(states, start, stop):
+                fold.add(*self._block(states[rows, :], actions[rows, :], weights[rows]))
+
+        ends = zip(sums, pairwise(starts), strict=True)
+        calls = [partial(add, fold, start, stop) for fold, (start, stop) in ends if start < stop]
+        models, d, p = sums[0].shape
+        # Of tensors, what runs where is for their library to say.
+        worth = d * p >= _SPREAD and not is_foreign(states)
+        threads.run(calls, 0.5 * len(order) * models * (d * p) ** 2 if worth else 0.0)
 
     def _block(self, states: Array, actions: Array, weights: Array) -> tuple[Array, Array, Array]:
         """Features, actions, and how much each sample counts in each model."""
@@ -413,9 +457,9 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
     def _samples(self) -> Samples:
         """All samples that were kept, in their order."""
         blocks = [block for batch in self._samples_so_far() for block in batch.blocks()]
-        states, actions = (np.concatenate([block[i] for block in blocks]) for i in (0, 1))
+        states, actions = (np.concatenate([on_host(block[i]) for block in blocks]) for i in (0, 1))
         counts = np.concatenate([np.ones(len(b.states)) if b.weights is None else b.weights for b in blocks])
-        dealt = np.concatenate([self._splitter.assign(block.states, block.groups) for block in blocks])
+        dealt = np.concatenate([self._splitter.assign(on_host(block.states), block.groups) for block in blocks])
         named = [None if b.groups is None else np.asarray(b.groups) for b in blocks]
         groups = np.zeros(len(states)) if any(n is None for n in named) else np.concatenate(named)  # type: ignore[arg-type]
         centring, p = self._centring(), self._folds.parts[0].gram.shape[-1]
@@ -439,15 +483,14 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         weights, models = self.solution_.weights, self._shares(states)
         features = self._features(states)
         if models is None:
-            return features @ weights[0].T
-        return np.einsum("nm,nmd->nd", models, np.tensordot(features, weights, axes=(1, 2)))
+            return features @ beside(weights[0].T, states)
+        each = namespace(states).tensordot(features, beside(weights, states), axes=((1,), (2,)))  # (N, M, d)
+        if is_foreign(each):
+            return (models[:, None, :] @ each)[:, 0, :]
+        return np.einsum("nm,nmd->nd", models, each)  # NumPy is slow at many small products
 
     def __sklearn_tags__(self) -> Any:
         """Say that actions may have several columns."""
         tags = super().__sklearn_tags__()
         tags.target_tags.multi_output = True
         return tags
-
-
-def _chunks(rows: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
-    return (rows[start : start + _ROWS] for start in range(0, len(rows), _ROWS))

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted
 
 from ..arrays import Array, as_matrix
+from ..batches import FirstLook
 from ..closed_form import ClosedForm, exponents
 from ..features import Affine
 from ..learners import Learner
@@ -61,7 +62,8 @@ class LocallyLinearPolicy(Policy):
         self.learner = learner
         self.validation = validation
 
-    def _place(self, states: Array) -> None:
+    def _place(self, look: FirstLook) -> None:
+        states = look.different
         variance = self.variance if self.variance is not None else choose_variance(states, self.at_least)
         if self.centres is None:
             self.fields_ = cover(states, variance, self.at_least)

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted
 
 from ..arrays import Array, as_matrix
+from ..batches import FirstLook
 from ..closed_form import ClosedForm
 from ..errors import SettingError
 from ..features import FeatureMap, KMeansRBF, Placeable
@@ -50,17 +51,17 @@ class ParametricPolicy(Policy):
         self.learner = learner
         self.validation = validation
 
-    def _place(self, states: Array) -> None:
+    def _place(self, look: FirstLook) -> None:
         features = self.features if self.features is not None else KMeansRBF()
         if not callable(features) and not isinstance(features, Placeable):
             raise SettingError(f"features: got {features!r}, expected a function of states such as NormalisedRBF.")
-        self.features_ = features.place(states) if isinstance(features, Placeable) else features
+        self.features_ = features.place(look.different) if isinstance(features, Placeable) else features
 
     def _features(self, states: Array) -> Array:
         features = self.features_(states)
-        if np.ndim(features) != 2 or len(features) != len(states):
+        if np.ndim(features) != 2 or np.shape(features)[0] != states.shape[0]:
             raise SettingError(
-                f"features: got an array of shape {np.shape(features)} for {len(states)} states, "
+                f"features: got an array of shape {tuple(np.shape(features))} for {states.shape[0]} states, "
                 "expected (samples, features)."
             )
         return as_matrix(features, "features")
