@@ -31,15 +31,16 @@ from ..arrays import (
 )
 from ..batches import Batch, FirstLook, Groups
 from ..demonstration import Demonstration, stack
-from ..errors import InvalidDataError, SettingError
+from ..errors import InvalidDataError
 from ..learners import Hybrid, Learner, Solution
 from ..moments import Moments, Sums
 from ..objectives import inconsistency, vec
 from ..projection import unit_actions
-from ..robust import RobustSolution, SampleLearner, Samples, Uncertainty, uncertainty
+from ..robust import RobustSolution, SampleLearner
 from ..threads import Workers, workers
 from ..validation import FoldedMoments, Folds, Splitter, Validation
 from .deployable import Deployable
+from .looking import Looking
 
 __all__ = ["Policy"]
 
@@ -53,13 +54,12 @@ _SPREAD = 200
 """Weights from which on folds are summed in threads: with fewer, steps are short and threads mostly wait."""
 
 
-class Policy(Deployable, RegressorMixin, BaseEstimator):
+class Policy(Deployable, Looking, RegressorMixin, BaseEstimator):
     """What both policies share: fitting from a stream, predicting, stepping, changing the learner."""
 
     learner: Learner | SampleLearner | None
     validation: Validation | None
     _folds: FoldedMoments
-    _kept: tuple[Batch, ...]
     _splitter: Splitter
     _flat: bool
 
@@ -237,40 +237,6 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
         actions = self.predict(states)
         return actions[:, None] if self._flat else actions
 
-    def uncertainty(self, X: ArrayLike) -> Uncertainty:
-        """How far the unconstrained policy may be from :meth:`predict`, and why.
-
-        Parameters
-        ----------
-        X : array_like, shape (N, n)
-            States.
-
-        Returns
-        -------
-        Uncertainty
-            Standard deviations of each action coordinate, (N, d): from noise, from what the data does not
-            determine, and in total.
-
-        Raises
-        ------
-        SettingError
-            If the learner does not look at samples; :class:`~unconstrain.Robust` does.
-        """
-        check_is_fitted(self, "solution_")
-        if not isinstance(self.solution_, RobustSolution):
-            raise SettingError(
-                f"uncertainty: {type(self._learner()).__name__} does not tell it. Fit with learner=Robust()."
-            )
-        states, centring = self._checked_states(X), self._centring()
-        features, shares = self._features(states), self._shares(states)
-        unchanged, alone = np.eye(features.shape[1])[None], np.ones((len(states), 1))
-        return uncertainty(
-            self.solution_,
-            features,
-            alone if shares is None else shares,
-            unchanged if centring is None else centring,
-        )
-
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
         """Share of the observed motion that the policy, projected onto each action, explains.
 
@@ -442,39 +408,6 @@ class Policy(Deployable, RegressorMixin, BaseEstimator):
             return learner.solve(folds)
         solution = learner.solve(folds.in_features(centring))
         return replace(solution, weights=solution.weights @ centring)
-
-    def _samples_so_far(self) -> tuple[Batch, ...]:
-        """The batches that were kept; a policy that was stored, or whose learner needed none, has not."""
-        kept: tuple[Batch, ...] = getattr(self, "_kept", ())
-        if not kept and self._folds.filled:
-            name = type(self._learner()).__name__
-            raise SettingError(
-                f"learner: {name} needs the samples, and this policy has their sums alone. "
-                f"Fit it with learner={name}() from the start."
-            )
-        return kept
-
-    def _samples(self) -> Samples:
-        """All samples that were kept, in their order."""
-        blocks = [block for batch in self._samples_so_far() for block in batch.blocks()]
-        states, actions = (np.concatenate([on_host(block[i]) for block in blocks]) for i in (0, 1))
-        counts = np.concatenate([np.ones(len(b.states)) if b.weights is None else b.weights for b in blocks])
-        dealt = np.concatenate([self._splitter.assign(on_host(block.states), block.groups) for block in blocks])
-        named = [None if b.groups is None else np.asarray(b.groups) for b in blocks]
-        groups = np.zeros(len(states)) if any(n is None for n in named) else np.concatenate(named)  # type: ignore[arg-type]
-        centring, p = self._centring(), self._folds.parts[0].gram.shape[-1]
-        alone = np.ones((len(states), 1))
-        weights, shares = self._weights(states), self._shares(states)
-        return Samples(
-            self._features(states),
-            actions,
-            counts,
-            alone if weights is None else weights,
-            alone if shares is None else shares,
-            np.unique(groups, return_inverse=True)[1],
-            np.unique(dealt, return_inverse=True)[1],
-            np.eye(p)[None] if centring is None else centring,
-        )
 
     def _learner(self) -> Learner | SampleLearner:
         return self.learner if self.learner is not None else Hybrid()
