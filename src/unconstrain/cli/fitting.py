@@ -12,7 +12,9 @@ if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
     from ..policies import Policy
     from ..streams import Stream
 
-__all__ = ["check_writable", "learn", "policy_of"]
+__all__ = ["MODELS", "check_writable", "learn", "policy_of"]
+
+MODELS = ("local", "rbf", "linear")
 
 
 def check_writable(outputs: Sequence[str | None], paths: Sequence[str]) -> None:

@@ -15,9 +15,10 @@ import numpy as np
 
 from ..experiments.trials import Result
 from . import figure4, figure5, plain, table1, table2, washing
+from .diagnosis import diagnosis_page
 from .fit import policy_page
 
-__all__ = ["page", "policy_page", "write"]
+__all__ = ["diagnosis_page", "page", "policy_page", "write"]
 
 # An experiment without a page of its own gets its rows as a table.
 _PAGES = {

@@ -3,7 +3,7 @@
 from .learner import Likelihood, NoiseCorrected, Robust
 from .posterior import RobustSolution
 from .samples import SampleLearner, Samples
-from .uncertainty import Uncertainty, uncertainty
+from .uncertainty import Uncertainty, covariances, uncertainty
 
 __all__ = [
     "Likelihood",
@@ -13,5 +13,6 @@ __all__ = [
     "SampleLearner",
     "Samples",
     "Uncertainty",
+    "covariances",
     "uncertainty",
 ]
