@@ -130,9 +130,10 @@ class Diagnosis:
     free: Array | None
 
     def to_json(self) -> dict[str, Any]:
-        """All but what there is for each sample."""
+        """All but what there is for each sample; None for what is not finite."""
         plain = {one.name: getattr(self, one.name) for one in fields(self)}
         kept = {name: value for name, value in plain.items() if name not in ("undetermined", "from_noise", "free")}
+        kept["jitter"] = self.jitter if np.isfinite(self.jitter) else None
         return kept | {name: [vars(one) for one in plain[name]] for name in ("regions", "movements")}
 
 
@@ -193,7 +194,7 @@ def _typical(actions: Array, solution: RobustSolution) -> float:
         )
     if typical == 0.0:
         raise InvalidDataError("all actions are zero, expected some motion: nothing can be said about a policy.")
-    if not solution.compared:
+    if np.isnan(solution.held_out_score):
         raise InvalidDataError(
             "too little could be held out, expected at least two different samples or demonstrations in motion."
         )
@@ -296,6 +297,8 @@ def _about_noise(found: Diagnosis) -> str:
 
 def _about_method(found: Diagnosis) -> str:
     """Which candidate was taken, and what speaks for it; see :class:`~unconstrain.Robust`."""
+    if "likelihood" not in found.compared or len(found.compared) < 2:
+        return f"Policy: learnt as {found.method}; nothing was compared with it."
     other = found.compared["likelihood"]
     times = f"its inconsistency where held out is {other:.2f} times that of the consistent policy"
     if found.method == "likelihood":

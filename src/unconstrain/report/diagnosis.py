@@ -51,8 +51,8 @@ def diagnosis_page(
     return html.document(
         title,
         "What was recorded is the wish of the demonstrator with whatever the surroundings took away. This page says "
-        "how well the wish can be told from these recordings: how much noise is in the way, where the constraints varied "
-        "too little, and which further demonstration would help most.",
+        "how well the wish can be told from these recordings: how much noise is in the way, where the constraints "
+        "varied too little, and which further demonstration would help most.",
         _tiles(found, demos),
         f"<ul>{said}</ul>",
         html.section("Where the policy is not known", _map(found, demos, states, actions)),
@@ -176,6 +176,8 @@ def _freedom(found: Diagnosis) -> str:
 
 
 def _chosen(found: Diagnosis) -> str:
+    if not found.compared:
+        return html.paragraph(f"Nothing was compared with the policy, which was learnt as {escape(found.method)}.")
     rows = [
         [escape(name), html.number(times), "yes" if name == found.method else "no"]
         for name, times in found.compared.items()
