@@ -47,7 +47,7 @@ def main() -> None:
     \b
     unconstrain demo                      the car-washing job, with a report
     unconstrain inspect *.csv             what is in your recordings
-    unconstrain diagnose *.csv            noise, what is not known, what to record next
+    unconstrain diagnose *.csv            noise, and what to record next
     unconstrain fit *.csv -o policy.npz   learn from them
     """  # noqa: D301 - click's mark for lines that stay as they are
 

@@ -21,7 +21,7 @@ __all__ = ["diagnose"]
 MOST_ROWS = 8
 
 
-@click.command(epilog="\b\nExample:\n  unconstrain diagnose wipe_*.csv --state x,y,z --differentiate -o diagnosis.html")
+@click.command(epilog="\b\nExample:\n  unconstrain diagnose wipe_*.csv --state x,y,z --by savgol -o a.html")
 @options_for_reading
 @click.option("--model", type=click.Choice(MODELS), default="local", show_default=True, help="What the policy is.")
 @click.option("--variance", type=float, help="Local: σ² of the receptive fields. By default from the data.")
@@ -37,7 +37,7 @@ def diagnose(
     as_json: bool,
     **reading: Any,
 ) -> None:
-    """Say what the demonstrations in FILEs tell of the policy, and what to record next.
+    """Say what FILEs do not tell, and what to record next.
 
     How much noise there is, where the constraints varied too little, and which demonstrations look free.
     """

@@ -6,7 +6,7 @@ Both come with the extra ``viz`` and are imported when first used.
 """
 
 from .arms import arm_on_plate
-from .curves import RATIO_COLOURS, bands, bars, dots, over_time, ratios, spectra, step_scores
+from .curves import RATIO_COLOURS, bands, bars, dots, over_time, ratio_table, ratios, spectra, step_scores
 from .overview import overview
 from .planes import Quad, broken, known_map, paths, vector_field
 from .spaces import movements
@@ -29,6 +29,7 @@ __all__ = [
     "over_time",
     "overview",
     "paths",
+    "ratio_table",
     "ratios",
     "spectra",
     "step_scores",
