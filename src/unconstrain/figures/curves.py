@@ -269,7 +269,7 @@ def ratio_table(
     made = figure(title, "", "", height=30 * len(rows) + 190)
     logs = np.log10(np.where(values > 0, values, np.nan))
     end = float(np.log10(top))
-    texts = [["" if np.isnan(one) else f"{one:.3g}" for one in line] for line in values]
+    texts = [[_short(one) for one in line] for line in values]
     ticks = [-end, -end / 2, 0.0, end / 2, end]
     bar = {"title": {"text": scale, "side": "right"}, "thickness": 14, "outlinewidth": 0, "tickvals": ticks}
     bar |= {"ticktext": [f"{10.0**tick:.2g}" for tick in ticks], "len": 0.92, "y": 0.0, "yanchor": "bottom"}
@@ -282,6 +282,13 @@ def ratio_table(
     made.update_xaxes(showgrid=False, ticks="", type="category", tickangle=-35)
     made.update_yaxes(showgrid=False, ticks="", type="category", autorange="reversed")
     return made
+
+
+def _short(value: float) -> str:
+    """A ratio in five characters at most."""
+    if np.isnan(value):
+        return ""
+    return f"{value:.3g}" if value < 999.5 else f"{value:.2g}".replace("e+0", "e") if value >= 9950 else f"{value:.0f}"
 
 
 def _log(made: Any, **axis: Any) -> None:

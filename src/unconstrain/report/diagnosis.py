@@ -165,7 +165,7 @@ def _freedom(found: Diagnosis) -> str:
         height=360,
     )
     picture.update_yaxes(range=[0.0, 1.0])
-    picture.update_xaxes(showticklabels=len(shown) <= 40)
+    picture.update_xaxes(showticklabels=len(shown) <= 40, tickangle=-90 if len(shown) > 12 else 0)
     more = f" The first {len(shown)} of {len(found.movements)} are drawn." if len(found.movements) > len(shown) else ""
     caption = (
         "One bar for each demonstration, the mean over its samples: above "

@@ -24,9 +24,9 @@ def page(result: Result) -> str:
     return html.document(
         "Learners in every regime of constraints and noise",
         f"{_systems(result)} under constraints of many kinds, from none to some that are drawn at random, with and "
-        "without noise on the recorded actions. Every learner sees the same recordings. The <b>oracle</b> sees the truth as "
-        "well, and takes with it the best point on the paper’s path between consistency and risk. What counts is "
-        f"<b>nUPE</b>, how far the learnt policy is from the true one where nothing holds it back. {_said(result)}",
+        "without noise on the recorded actions. Every learner sees the same recordings. The <b>oracle</b> sees the "
+        "truth as well, and takes with it the best point on the paper’s path between consistency and risk. What counts "
+        f"is <b>nUPE</b>, how far the learnt policy is from the true one where nothing holds it back. {_said(result)}",
         html.section("Summary", _summary(result)),
         html.section("Regime by regime", *(_cells(result, noise, index) for index, noise in enumerate(noises))),
         html.section("What they know of their data", _knowledge(result)),
