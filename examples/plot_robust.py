@@ -64,7 +64,8 @@ plt.show()
 #
 # Turn and scale every action so that the learnt policy at its state is (1, 0). Whatever constrained it, it then lies
 # on the circle with the diameter from 0 to (1, 0), but for the noise; free samples are at its right end. This is what
-# the likelihood knows beside consistency.
+# the likelihood knows beside consistency. No free sample is certain to be one: it could have been turned by less than
+# the noise.
 
 states, actions, _ = uc.stack(noisy)
 policy = robust(states)
@@ -87,7 +88,8 @@ plt.show()
 # -----------------
 #
 # :meth:`policy.uncertainty <unconstrain.ParametricPolicy.uncertainty>` tells what noise leaves open from what the data
-# does not say. The second is small along the recordings and large away from them.
+# does not say. Both are small along the recordings and grow away from them. Here rails turn and half of the movements
+# are free, so next to nothing is left to what was not recorded.
 
 fine = np.linspace(-1.15, 1.15, 60)
 everywhere = np.stack(np.meshgrid(fine, fine), axis=-1)
