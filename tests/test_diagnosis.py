@@ -115,6 +115,11 @@ class TestWhatIsFound:
         free = np.array([one.free for one in found.movements])
         assert free[::2].min() > free[1::2].mean()
 
+    def test_demonstrations_of_one_name_are_told_apart(self, fitted):
+        policy, demos = fitted
+        found = diagnose(policy, [replace(one, name="wipe") for one in demos])
+        assert len({one.name for one in found.movements}) == len(demos)
+
     def test_of_other_demonstrations_nothing_is_said_about_freedom(self, fitted):
         policy, demos = fitted
         found = diagnose(policy, demos[:3])
@@ -218,6 +223,17 @@ class TestPage:
         page = report.diagnosis_page(diagnose(policy, named), named, "A diagnosis", ["x", evil], ["vx", "vy"])
         assert evil not in page
         assert len(opened(browser, page, tmp_path)) == 2
+
+    def test_a_page_fits_on_a_phone(self, fitted, browser, tmp_path):  # noqa: F811
+        policy, demos = fitted
+        page = report.diagnosis_page(diagnose(policy, demos), demos, "A diagnosis", ["x", "y"], ["vx", "vy"])
+        metrics = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        try:
+            assert all(graph["wide"] <= 400 for graph in opened(browser, page, tmp_path))
+            assert browser.execute_script("return document.documentElement.scrollWidth") <= 400
+        finally:
+            browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
     def test_the_page_of_a_robust_fit_says_what_is_not_known(self, fitted, browser, tmp_path):  # noqa: F811
         page = report.policy_page(*fitted, "A policy")

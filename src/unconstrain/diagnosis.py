@@ -13,6 +13,7 @@ from .arrays import Array
 from .demonstration import Demonstration, stack
 from .errors import InvalidDataError, SettingError
 from .policies import Policy
+from .readers.table import unique_names
 from .receptive_fields import choose_variance, cover
 from .robust import RobustSolution, covariances
 from .robust.learner import HIDDEN, WORSE
@@ -213,6 +214,7 @@ def _regions(
     found.sort(key=lambda one: -undetermined[one[1]].max())
     worst = [int(rows[undetermined[rows].argmax()]) for _, rows in found]
     directions, along = _least_known(policy, states[worst])
+    names = _names(demos)
     return tuple(
         Region(
             _numbers(centre),
@@ -220,7 +222,7 @@ def _regions(
             float(known[rows].mean()),
             float(np.sqrt((undetermined[rows] ** 2).mean())),
             _numbers(states[row]),
-            _name(demos, int(groups[row])),
+            names[groups[row]],
             _numbers(direction),
             float(size) / typical,
         )
@@ -244,18 +246,18 @@ def _movements(
     rows = [slice(end - len(demo), end) for end, demo in zip(ends, demos, strict=True)]
     return tuple(
         Movement(
-            _name(demos, index),
+            name,
             len(demos[index]),
             None if free is None else float(free[part].mean()),
             float(known[part].mean()),
             float(np.sqrt((undetermined[part] ** 2).mean())),
         )
-        for index, part in enumerate(rows)
+        for index, (name, part) in enumerate(zip(_names(demos), rows, strict=True))
     )
 
 
-def _name(demos: list[Demonstration], index: int) -> str:
-    return demos[index].name or f"demonstration {index + 1}"
+def _names(demos: list[Demonstration]) -> tuple[str, ...]:
+    return unique_names([demo.name or f"demonstration {index + 1}" for index, demo in enumerate(demos)])
 
 
 def _numbers(values: Array) -> tuple[float, ...]:

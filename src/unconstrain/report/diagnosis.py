@@ -152,10 +152,7 @@ def _freedom(found: Diagnosis) -> str:
     if found.free is None:
         return html.paragraph("The policy was fitted to other demonstrations.")
     shown = found.movements[:MOST_MOVEMENTS]
-    # Names may repeat; numbers do not.
     names = [escape(one.name) for one in shown]
-    if len(set(names)) < len(names):
-        names = [f"{number} {name}" for number, name in enumerate(names, 1)]
     free = [one.free or 0.0 for one in shown]
     picture = figures.bars(
         names,
