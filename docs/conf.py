@@ -44,7 +44,7 @@ html_static_path = ["_static"]
 html_css_files = ["custom.css"]
 html_show_sourcelink = False
 # Pages without pages below them need no list of these.
-_flat = ["architecture", "deploying", "experiments", "extending", "how_it_works", "scaling", "your_own_data"]
+_flat = ["architecture", "deploying", "experiments", "extending", "how_it_works", "robust", "scaling", "your_own_data"]
 html_sidebars: dict[str, list[str]] = {page: [] for page in _flat}
 html_theme_options = {
     "navbar_end": ["theme-switcher"],

@@ -153,7 +153,7 @@ def assert_learnt_the_policy(path, tolerance=1e-6):
 # Help
 
 
-COMMANDS = ["inspect", "fit", "score", "rollout", "export", "reproduce", "demo"]
+COMMANDS = ["inspect", "diagnose", "fit", "score", "rollout", "export", "reproduce", "demo"]
 
 
 @pytest.mark.parametrize("command", COMMANDS)

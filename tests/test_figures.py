@@ -135,6 +135,37 @@ class TestCharts:
         assert made.layout.xaxis3.title.text == "time (s)"
 
 
+class TestMapOfWhatIsKnown:
+    points, values = rng.normal(size=(30, 2)), rng.uniform(0, 0.5, 30)
+
+    def test_what_is_known_least_lies_on_top(self):
+        made = figures.known_map(self.points, self.values, self.points[:3], labels=("x", "y"), scale="spread")
+        drawn = np.array(made.data[0].marker.color)
+        np.testing.assert_allclose(drawn, np.sort(self.values))
+        assert made.data[0].marker.cmax == self.values.max()
+        assert list(made.data[-1].text) == ["1", "2", "3"]
+
+    def test_colours_do_not_end_before_the_top_that_is_asked_for(self):
+        made = figures.known_map(self.points, self.values, self.points[:1], labels=("x", "y"), scale="", top=2.0)
+        assert made.data[0].marker.cmax == 2.0
+
+    def test_directions_go_through_the_marked_points(self):
+        marked, ways = self.points[:4], rng.normal(size=(4, 2))
+        made = figures.known_map(self.points, self.values, marked, labels=("x", "y"), scale="", directions=ways)
+        ends = np.column_stack([made.data[1].x, made.data[1].y]).reshape(4, 3, 2)
+        np.testing.assert_allclose(ends[:, :2].mean(axis=1), marked)
+        drawn = ends[:, 1] - ends[:, 0]
+        np.testing.assert_allclose(drawn[:, 0] * ways[:, 1], drawn[:, 1] * ways[:, 0], atol=1e-12)
+
+
+class TestRatioTable:
+    def test_cells_say_their_number_and_are_coloured_by_its_logarithm(self):
+        values = np.array([[1.0, 0.01, np.nan], [1584.3, 3.98e6, 20.0]])
+        cells = figures.ratio_table(["a", "b"], ["x", "y", "z"], values, top=10.0).data[0]
+        assert [list(row) for row in cells.text] == [["1", "0.01", ""], ["1584", "4e6", "20"]]
+        np.testing.assert_allclose(cells.z, [[0, -1, np.nan], [1, 1, 1]])
+
+
 class TestOverview:
     states = rng.uniform(-1, 1, (30, 2))
 

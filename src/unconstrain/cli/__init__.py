@@ -13,7 +13,8 @@ import click
 
 from .. import experiments
 from ..errors import ModelFileError, ReadError, SettingError, UnconstrainError
-from .fitting import Alpha, check_writable, default_learner, learn, learner_of, policy_of
+from .diagnosing import diagnose
+from .fitting import MODELS, Alpha, check_writable, default_learner, learn, learner_of, policy_of
 from .printing import Group, deliver, number, print_table, progress_bar, say_fit
 from .reading import (
     Numbers,
@@ -35,7 +36,6 @@ if TYPE_CHECKING:  # everything heavy is imported by the command that needs it
 
 __all__ = ["main"]
 
-MODELS = ("local", "rbf", "linear")
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
 
 
@@ -47,6 +47,7 @@ def main() -> None:
     \b
     unconstrain demo                      the car-washing job, with a report
     unconstrain inspect *.csv             what is in your recordings
+    unconstrain diagnose *.csv            noise, and what to record next
     unconstrain fit *.csv -o policy.npz   learn from them
     """  # noqa: D301 - click's mark for lines that stay as they are
 
@@ -340,6 +341,9 @@ def doctor(as_json: bool) -> None:
     print_table(["what", "for", "found", "to mend it"], [list(one) for one in found])
     missing = sum(bool(one.mend) for one in found)
     click.echo("Everything is there." if not missing else f"{missing} of {len(found)} are missing something.")
+
+
+main.add_command(diagnose)
 
 
 def _fitted(path: str) -> Policy:

@@ -14,7 +14,9 @@ if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
     from ..policies import Policy
     from ..streams import Stream
 
-__all__ = ["Alpha", "check_writable", "default_learner", "learn", "learner_of", "policy_of"]
+__all__ = ["MODELS", "Alpha", "check_writable", "default_learner", "learn", "learner_of", "policy_of"]
+
+MODELS = ("local", "rbf", "linear")
 
 MUCH = 200_000_000
 """Bytes of data beyond which the samples are not kept in memory, and so not looked at by the default learner."""

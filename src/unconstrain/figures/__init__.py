@@ -6,9 +6,9 @@ Both come with the extra ``viz`` and are imported when first used.
 """
 
 from .arms import arm_on_plate
-from .curves import RATIO_COLOURS, bands, bars, dots, over_time, ratios, spectra, step_scores
+from .curves import RATIO_COLOURS, bands, bars, dots, over_time, ratio_table, ratios, spectra, step_scores
 from .overview import overview
-from .planes import Quad, broken, paths, vector_field
+from .planes import Quad, broken, known_map, paths, vector_field
 from .spaces import movements
 from .style import COLOURS, LABELS, METHODS, PALETTE
 
@@ -24,10 +24,12 @@ __all__ = [
     "bars",
     "broken",
     "dots",
+    "known_map",
     "movements",
     "over_time",
     "overview",
     "paths",
+    "ratio_table",
     "ratios",
     "spectra",
     "step_scores",

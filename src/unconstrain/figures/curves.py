@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..arrays import Array
 from .style import COLOURS, DASHES, LABELS, MARKERS, METHODS, dress, figure, legend, plotly, translucent
 
-__all__ = ["bands", "bars", "dots", "over_time", "spectra", "step_scores"]
+__all__ = ["bands", "bars", "dots", "over_time", "ratio_table", "spectra", "step_scores"]
 
 
 def bands(
@@ -248,6 +248,47 @@ def ratios(x: Array, curves: Mapping[str, Array], *, labels: tuple[str, str], he
     made.add_hline(y=1.0, line={"color": COLOURS["truth"], "width": 1, "dash": "dash"})
     made.update_yaxes(type="log", tickvals=_ROUND, ticktext=[f"{tick:g}" for tick in _ROUND])
     return made
+
+
+def ratio_table(
+    rows: Sequence[str], columns: Sequence[str], values: Array, *, title: str = "", scale: str = "", top: float = 10.0
+) -> Any:
+    """Ratios as coloured cells with their numbers, on a logarithmic scale from ``1 / top`` to ``top``.
+
+    Parameters
+    ----------
+    rows, columns : sequence of str
+        Labels, the first row on top.
+    values : ndarray, shape (R, C)
+        NaN leaves a cell empty.
+    title, scale : str
+        Of the figure and of the colours.
+    top : float
+        What is beyond has the colour of the end.
+    """
+    made = figure(title, "", "", height=30 * len(rows) + 190)
+    logs = np.log10(np.where(values > 0, values, np.nan))
+    end = float(np.log10(top))
+    texts = [[_short(one) for one in line] for line in values]
+    ticks = [-end, -end / 2, 0.0, end / 2, end]
+    bar = {"title": {"text": scale, "side": "right"}, "thickness": 14, "outlinewidth": 0, "tickvals": ticks}
+    bar |= {"ticktext": [f"{10.0**tick:.2g}" for tick in ticks], "len": 0.92, "y": 0.0, "yanchor": "bottom"}
+    made.add_heatmap(
+        x=list(columns), y=list(rows), z=np.clip(logs, -end, end), zmin=-end, zmax=end, xgap=1, ygap=1,
+        colorscale=[[0.0, COLOURS["direct"]], [0.5, "#ffffff"], [1.0, COLOURS["inconsistency"]]], colorbar=bar,
+        text=texts, texttemplate="%{text}", textfont={"size": 11}, hoverongaps=False,
+        hovertemplate="%{y}, %{x}: %{text}<extra></extra>",
+    )  # fmt: skip
+    made.update_xaxes(showgrid=False, ticks="", type="category", tickangle=-35)
+    made.update_yaxes(showgrid=False, ticks="", type="category", autorange="reversed")
+    return made
+
+
+def _short(value: float) -> str:
+    """A ratio in five characters at most."""
+    if np.isnan(value):
+        return ""
+    return f"{value:.3g}" if value < 999.5 else f"{value:.2g}".replace("e+0", "e") if value >= 9950 else f"{value:.0f}"
 
 
 def _log(made: Any, **axis: Any) -> None:

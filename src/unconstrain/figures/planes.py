@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Array
 from .style import COLOURS, DASHES, figure, legend, plotly
 
-__all__ = ["Quad", "arrow_lines", "broken", "clipped", "paths", "vector_field"]
+__all__ = ["Quad", "arrow_lines", "broken", "clipped", "known_map", "paths", "vector_field"]
 
 # In the order in which they are drawn, with their widths: what lies below shows at the edges.
 _ARROWS = {"inconsistency": 1.4, "direct": 3.2, "hybrid": 1.9, "truth": 0.9, "observed": 0.9}
@@ -153,6 +153,64 @@ def paths(
     if reach is not None:
         made.update_xaxes(range=[-reach, reach])
         made.update_yaxes(range=[-reach, reach])
+    return made
+
+
+def known_map(
+    points: Array,
+    values: Array,
+    marked: Array,
+    *,
+    labels: tuple[str, str],
+    scale: str,
+    texts: Sequence[str] = (),
+    directions: Array | None = None,
+    top: float = 0.0,
+    height: int = 520,
+) -> Any:
+    """Points coloured by how little is known there, with some of them marked and numbered.
+
+    Parameters
+    ----------
+    points : ndarray, shape (N, 2)
+    values : ndarray, shape (N,)
+        From 0, known, on.
+    marked : ndarray, shape (K, 2)
+        Drawn on top, numbered from 1.
+    labels : tuple of str
+        Of the axes, with their unit.
+    scale : str
+        Of the colours, with the unit.
+    texts : sequence of str
+        What each marked point says when it is pointed at.
+    directions : ndarray, shape (K, 2), optional
+        Drawn through the marked points as lines, the longest as long as an eighth of the picture.
+    top : float
+        Colours end there, or at the largest value if that is larger.
+    height : int
+        Pixels.
+    """
+    made = figure("", *labels, height=height)
+    order = np.argsort(values, kind="stable")  # what is known least lies on top
+    bar = {"title": {"text": scale, "side": "right"}, "thickness": 14, "outlinewidth": 0, "tickformat": ".2~g"}
+    bar |= {"len": 0.92, "y": 0.0, "yanchor": "bottom"}
+    look = {"color": values[order], "colorscale": "Cividis", "cmin": 0.0, "size": 5, "colorbar": bar}
+    made.add_scatter(
+        x=points[order, 0], y=points[order, 1], mode="markers", marker=look | {"cmax": max(float(values.max()), top)},
+        name="recorded states", hovertemplate="(%{x:.3g}, %{y:.3g}): %{marker.color:.3g}<extra></extra>",
+    )  # fmt: skip
+    if directions is not None and len(marked):
+        reach = float(np.ptp(points, axis=0).max()) / 16
+        ways = directions * reach / max(float(np.linalg.norm(directions, axis=1).max()), 1e-300)
+        ends = np.stack([marked - ways, marked + ways, np.full_like(marked, np.nan)], axis=1).reshape(-1, 2)
+        line = {"color": COLOURS["inconsistency"], "width": 2.5}
+        made.add_scatter(x=ends[:, 0], y=ends[:, 1], mode="lines", line=line, hoverinfo="skip", name="to leave free")
+    ring = {"color": "white", "size": 17, "line": {"color": COLOURS["inconsistency"], "width": 2}}
+    made.add_scatter(
+        x=marked[:, 0], y=marked[:, 1], mode="markers+text", marker=ring, textfont={"size": 11},
+        text=[str(number) for number in range(1, len(marked) + 1)], hovertext=list(texts), hoverinfo="text",
+        name="to record",
+    )  # fmt: skip
     return made
 
 

@@ -74,14 +74,16 @@ class Looking:
             raise SettingError(
                 f"uncertainty: {type(self._learner()).__name__} does not tell it. Fit with learner=Robust()."
             )
+        return uncertainty(self.solution_, *self._in_models(X))
+
+    def _in_models(self, X: ArrayLike) -> tuple[Array, Array, Array]:
+        """Features (N, p), shares of the models (N, M), and T_m (M, p, p)."""
         states, centring = self._checked_states(X), self._centring()
         features, shares = self._features(states), self._shares(states)
-        unchanged, alone = np.eye(features.shape[1])[None], np.ones((len(states), 1))
-        return uncertainty(
-            self.solution_,
+        return (
             features,
-            alone if shares is None else shares,
-            unchanged if centring is None else centring,
+            np.ones((len(states), 1)) if shares is None else shares,
+            np.eye(features.shape[1])[None] if centring is None else centring,
         )
 
     def _samples_so_far(self) -> tuple[Batch, ...]:

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from ..experiments.trials import Result
-from . import figure4, figure5, plain, table1, table2, washing
+from . import figure4, figure5, plain, regimes, table1, table2, washing
+from .diagnosis import diagnosis_page
 from .fit import policy_page
 
-__all__ = ["page", "policy_page", "write"]
+__all__ = ["diagnosis_page", "page", "policy_page", "write"]
 
 # An experiment without a page of its own gets its rows as a table.
 _PAGES = {
@@ -26,6 +27,7 @@ _PAGES = {
     "figure5": figure5.page,
     "table2": table2.page,
     "washing": washing.page,
+    "regimes": regimes.page,
 }
 
 

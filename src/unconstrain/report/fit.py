@@ -16,7 +16,9 @@ from ..learners import Hybrid
 from ..metrics import ncpe, ninconsistency, nupe
 from ..policies import Policy
 from ..projection import action_projection, project
+from ..robust import RobustSolution
 from . import html
+from .diagnosis import unknown
 
 __all__ = ["policy_page"]
 
@@ -57,6 +59,8 @@ def policy_page(policy: Policy, demonstrations: Sequence[Demonstration], title: 
         html.section("Errors and support", _errors(policy, demos)),
         html.section("What the data determined", _determined(policy)),
     ]
+    if isinstance(policy.solution_, RobustSolution):
+        parts.append(html.section("What is not known", unknown(policy, demos)))
     if is_dataclass(learner):
         parts.append(html.settings_table(learner))
     return html.document(title, _lead(policy, demos, type(learner).__name__), *parts)

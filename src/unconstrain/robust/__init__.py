@@ -3,7 +3,7 @@
 from .learner import Likelihood, NoiseCorrected, Robust, Segments
 from .posterior import RobustSolution
 from .samples import SampleLearner, Samples
-from .uncertainty import Uncertainty, uncertainty
+from .uncertainty import Uncertainty, covariances, uncertainty
 
 __all__ = [
     "Likelihood",
@@ -14,5 +14,6 @@ __all__ = [
     "Samples",
     "Segments",
     "Uncertainty",
+    "covariances",
     "uncertainty",
 ]

@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Array
 from .posterior import RobustSolution
 
-__all__ = ["Uncertainty", "uncertainty"]
+__all__ = ["Uncertainty", "covariances", "uncertainty"]
 
 
 class Uncertainty(NamedTuple):
@@ -40,17 +40,47 @@ def uncertainty(solution: RobustSolution, features: Array, shares: Array, centri
     centring : ndarray, shape (M, p, p)
         T_m of :class:`~unconstrain.robust.Samples`.
     """
-    d = solution.weights.shape[1]
-    parts = []
-    for covariance in (solution.from_noise, solution.undetermined):
-        spread = np.zeros((len(features), d))
-        for share, change, blocks in zip(shares.T, centring, covariance, strict=True):
-            own = features @ change.T
-            p = own.shape[1]
-            of_action = blocks.reshape(p, d, p, d)
-            for action in range(d):
-                variance = ((own @ of_action[:, action, :, action]) * own).sum(axis=1)
-                spread[:, action] += share * np.sqrt(np.maximum(variance, 0.0))
-        parts.append(spread)
-    from_noise = np.hypot(parts[0], solution.misfit)
-    return Uncertainty(from_noise, parts[1], np.hypot(from_noise, parts[1]))
+    from_noise = np.hypot(_spread(solution.from_noise, features, shares, centring), solution.misfit)
+    undetermined = _spread(solution.undetermined, features, shares, centring)
+    return Uncertainty(from_noise, undetermined, np.hypot(from_noise, undetermined))
+
+
+def covariances(covariance: Array, features: Array, shares: Array, centring: Array) -> Array:
+    """Covariance of the prediction at N states, shape (N, d, d).
+
+    On the diagonal are the squares of what :func:`uncertainty` says. Beside
+    it, models are mixed by their correlations, so that the result is positive.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (M, d p, d p)
+        Of the weights, such as ``solution.undetermined``.
+    features, shares, centring
+        As in :func:`uncertainty`.
+    """
+    p = features.shape[1]
+    d = covariance.shape[1] // p
+    spread = _spread(covariance, features, shares, centring)
+    mixed = np.zeros((len(features), d, d))
+    for share, change, blocks in zip(shares.T, centring, covariance, strict=True):
+        own = features @ change.T
+        local = np.einsum("ni,iajb,nj->nab", own, blocks.reshape(p, d, p, d), own, optimize=True)
+        size = np.sqrt(np.maximum(np.einsum("naa->na", local), 0.0))
+        inverse = np.where(size > 0, 1.0 / np.where(size > 0, size, 1.0), 0.0)
+        mixed += share[:, None, None] * inverse[:, :, None] * local * inverse[:, None, :]
+    mixed[:, np.arange(d), np.arange(d)] = 1.0
+    return np.asarray(spread[:, :, None] * mixed * spread[:, None, :])
+
+
+def _spread(covariance: Array, features: Array, shares: Array, centring: Array) -> Array:
+    """Standard deviation of each action coordinate, averaged over the models, shape (N, d)."""
+    p = features.shape[1]
+    d = covariance.shape[1] // p
+    spread = np.zeros((len(features), d))
+    for share, change, blocks in zip(shares.T, centring, covariance, strict=True):
+        own = features @ change.T
+        of_action = blocks.reshape(p, d, p, d)
+        for action in range(d):
+            variance = ((own @ of_action[:, action, :, action]) * own).sum(axis=1)
+            spread[:, action] += share * np.sqrt(np.maximum(variance, 0.0))
+    return spread

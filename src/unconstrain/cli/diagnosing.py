@@ -1,0 +1,90 @@
+"""``unconstrain diagnose``: what the recordings tell, what they do not, and what to record next."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .fitting import MODELS, check_writable, policy_of
+from .printing import print_table
+from .reading import complete, expanded, options_for_reading, recipe_of, recordings_in, said_recipe
+
+if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
+    from ..diagnosis import Diagnosis
+
+__all__ = ["diagnose"]
+
+MOST_ROWS = 8
+
+
+@click.command(epilog="\b\nExample:\n  unconstrain diagnose wipe_*.csv --state x,y,z --by savgol -o a.html")
+@options_for_reading
+@click.option("--model", type=click.Choice(MODELS), default="local", show_default=True, help="What the policy is.")
+@click.option("--variance", type=float, help="Local: σ² of the receptive fields. By default from the data.")
+@click.option("--centres", type=click.IntRange(1), help="RBF: number of kernels, 25 by default.")
+@click.option("-o", "--report", type=click.Path(dir_okay=False), help="Also write an HTML page there.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def diagnose(
+    files: Sequence[str],
+    model: str,
+    variance: float | None,
+    centres: int | None,
+    report: str | None,
+    as_json: bool,
+    **reading: Any,
+) -> None:
+    """Say what FILEs do not tell, and what to record next.
+
+    How much noise there is, where the constraints varied too little, and which demonstrations look free.
+    """
+    from .. import diagnosis
+    from ..preparation import prepare
+    from ..robust import Robust
+
+    paths = expanded(files)
+    check_writable((report,), paths)
+    recordings = recordings_in(paths, **reading)
+    recipe = complete(recipe_of(**reading), recordings[0])
+    demonstrations = prepare(recordings, recipe)
+    policy = policy_of(model, variance, centres, learner=Robust()).fit_demonstrations(demonstrations)
+    found = diagnosis.diagnose(policy, demonstrations)
+    states = recipe.states or ()
+    actions = recipe.actions or tuple(f"v{name}" for name in states)
+    if as_json:
+        click.echo(json.dumps(found.to_json() | {"states": states, "actions": actions}, indent=2))
+    else:
+        click.echo(f"{len(demonstrations)} demonstrations, {len(found.undetermined)} samples; {said_recipe(recipe)}.")
+        _say(found, states, actions)
+    if report is not None:
+        from ..report import diagnosis_page
+
+        page = diagnosis_page(found, demonstrations, Path(report).stem, states, actions)
+        Path(report).write_text(page, encoding="utf-8")
+        click.echo(f"report: {report}", err=as_json)
+
+
+def _say(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> None:
+    from ..diagnosis import named, sentences
+
+    for line in sentences(found, states, actions):
+        click.echo(line)
+    shown = found.regions[:MOST_ROWS]
+    click.echo(f"\nThe {len(shown)} least known of {len(found.regions)} regions, least known first:")
+    head = ["demonstrate around", "in", "samples", "determined", "spread", "leave free"]
+    rows = [
+        [named(one.state, states), one.demonstration, str(one.samples), f"{one.determined:.0%}", f"{one.along:.1%}",
+         named(one.direction, actions)]
+        for one in shown
+    ]  # fmt: skip
+    print_table(head, rows)
+    free = sorted(found.movements, key=lambda one: -(one.free or 0.0))
+    click.echo("\nProbability that a sample was free, mean by demonstration, freest and most constrained:")
+    ends = free if len(free) <= MOST_ROWS else [*free[: MOST_ROWS // 2], *free[-MOST_ROWS // 2 :]]
+    print_table(
+        ["demonstration", "samples", "free", "determined"],
+        [[one.name, str(one.samples), f"{one.free or 0.0:.0%}", f"{one.determined:.0%}"] for one in ends],
+    )

@@ -1,0 +1,246 @@
+"""What ``unconstrain diagnose`` says of recordings: noise, what is not known, what to record next."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+import unconstrain as uc
+from test_cli import call, refused, run, write
+from test_report import References, browser, opened  # noqa: F401 - a fixture
+from unconstrain import report
+from unconstrain.diagnosis import Diagnosis, diagnose, sentences
+from unconstrain.errors import InvalidDataError, SettingError
+from unconstrain.robust import covariances
+
+TURN = np.array([[-0.3, 1.0], [-1.0, -0.3]])
+
+
+def movements(seed=0, noise=0.02, count=12, steps=30, held=None):
+    """Every second one free, the others behind a random line; in the quarter plane ``held`` along x only."""
+    rng = np.random.default_rng(seed)
+    demos = []
+    for index in range(count):
+        states = np.cumsum(rng.normal(0, 0.05, (steps, 2)), axis=0) + rng.uniform(-1, 1, 2)
+        actions = states @ TURN.T + [0.2, -0.1]
+        normal = rng.standard_normal(2)
+        normal /= np.linalg.norm(normal)
+        if index % 2:
+            actions -= np.outer(actions @ normal, normal)
+        if held is not None:
+            inside = (states > held).all(axis=1)
+            actions[inside, 1] = 0.0
+        demos.append(uc.Demonstration(states, actions + noise * rng.standard_normal(actions.shape), name=f"d{index}"))
+    return demos
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    demos = movements()
+    return uc.ParametricPolicy(learner=uc.Robust()).fit_demonstrations(demos), demos
+
+
+def csv_of(path, demos, d=2):
+    head = ",".join(["demo", "t", "x", "y", "vx", "vy"][: 4 + d])
+    rows = [
+        [demo.name, 0.1 * at, *state, *action[:d]]
+        for demo in demos
+        for at, (state, action) in enumerate(zip(demo.states, demo.actions, strict=True))
+    ]
+    return write(path, head, rows)
+
+
+AS_NAMED = ("--group", "demo", "--time", "t", "--state", "x,y")
+MOTION = ("--action", "vx,vy")
+
+
+class TestCovariances:
+    @pytest.mark.parametrize("kind", ["one model", "local models"])
+    def test_their_diagonal_is_the_spread_that_uncertainty_says(self, kind):
+        demos = movements()
+        policy = uc.ParametricPolicy() if kind == "one model" else uc.LocallyLinearPolicy(variance=0.3)
+        policy.set_params(learner=uc.Robust()).fit_demonstrations(demos)
+        states = np.random.default_rng(1).uniform(-2, 2, (20, 2))
+        found = covariances(policy.solution_.undetermined, *policy._in_models(states))
+        assert_allclose(np.sqrt(np.einsum("naa->na", found)), policy.uncertainty(states).undetermined, rtol=1e-9)
+        assert np.linalg.eigvalsh(found).min() >= -1e-12 * found.max()
+        assert_allclose(found, found.swapaxes(1, 2), atol=1e-12 * found.max())
+
+    def test_of_one_model_they_are_features_times_covariance_times_features(self):
+        policy = uc.ParametricPolicy(learner=uc.Robust()).fit_demonstrations(movements())
+        state = np.array([[0.3, -0.2]])
+        features, _, _ = policy._in_models(state)
+        jacobian = np.kron(features, np.eye(2))  # weights are laid out by columns
+        [found] = covariances(policy.solution_.undetermined, *policy._in_models(state))
+        assert_allclose(found, jacobian @ policy.solution_.undetermined[0] @ jacobian.T, rtol=1e-8)
+
+
+class TestWhatIsFound:
+    def test_shares_are_those_of_the_spreads(self, fitted):
+        policy, demos = fitted
+        found = diagnose(policy, demos)
+        states, actions, _ = uc.stack(demos)
+        typical = np.sqrt((actions**2).sum(axis=1).mean())
+        spread = policy.uncertainty(states)
+        open_, noise = (np.linalg.norm(one, axis=1) / typical for one in (spread.undetermined, spread.from_noise))
+        assert_allclose(found.undetermined, open_)
+        assert found.states_determined == np.mean((open_ < noise) | (open_ < 0.1))
+        assert found.noise_share == pytest.approx(np.sqrt(2) * policy.solution_.noise / typical)
+        assert sum(one.samples for one in found.regions) == sum(one.samples for one in found.movements) == len(states)
+
+    def test_the_first_region_holds_the_least_known_state(self, fitted):
+        policy, demos = fitted
+        found = diagnose(policy, demos)
+        states = uc.stack(demos).states
+        assert_allclose(found.regions[0].state, states[found.undetermined.argmax()])
+        assert np.linalg.norm(found.regions[0].direction) == pytest.approx(1.0)
+        assert np.dot(found.regions[0].direction, policy(states[[found.undetermined.argmax()]])[0]) >= 0
+
+    def test_what_is_held_everywhere_in_a_region_is_what_to_leave_free(self):
+        demos = movements(seed=2, count=30, held=0.3)
+        policy = uc.LocallyLinearPolicy(variance=0.1, learner=uc.Robust()).fit_demonstrations(demos)
+        found = diagnose(policy, demos)
+        inside = (uc.stack(demos).states > 0.3).all(axis=1)
+        assert found.undetermined[inside].mean() > 5 * found.undetermined[~inside].mean()
+        worst = found.regions[0]
+        assert min(worst.state) > 0.3
+        assert abs(worst.direction[1]) > 0.9
+
+    def test_free_demonstrations_look_freer(self, fitted):
+        found = diagnose(*fitted)
+        free = np.array([one.free for one in found.movements])
+        assert free[::2].min() > free[1::2].mean()
+
+    def test_demonstrations_of_one_name_are_told_apart(self, fitted):
+        policy, demos = fitted
+        found = diagnose(policy, [replace(one, name="wipe") for one in demos])
+        assert len({one.name for one in found.movements}) == len(demos)
+
+    def test_of_other_demonstrations_nothing_is_said_about_freedom(self, fitted):
+        policy, demos = fitted
+        found = diagnose(policy, demos[:3])
+        assert found.free is None
+        assert all(one.free is None for one in found.movements)
+
+    @pytest.mark.parametrize(
+        ("change", "said"),
+        [
+            ({"method": "likelihood"}, "does not speak against it"),
+            ({"method": "hybrid", "compared": {"likelihood": 3.0, "hybrid": 1.0}}, "3.00 times"),
+            ({"method": "noise-corrected", "noise_share": 0.5}, "cannot be told under so much noise"),
+            ({"noise_share": 0.2, "noise": 1.0, "jitter": 0.1}, "Only 0.1 of it changes from sample to sample"),
+            ({"states_determined": 0.3}, "not rich enough"),
+            ({"states_determined": 0.8}, "rich enough in most places"),
+        ],
+    )
+    def test_each_finding_has_its_words(self, fitted, change, said):
+        found = replace(diagnose(*fitted), **change)
+        assert said in " ".join(sentences(found, ["x", "y"], ["vx", "vy"]))
+
+    def test_a_learner_without_candidates_has_nothing_compared(self):
+        demos = movements()
+        policy = uc.ParametricPolicy(learner=uc.NoiseCorrected()).fit_demonstrations(demos)
+        found = diagnose(policy, demos)
+        assert "nothing was compared" in " ".join(sentences(found, ["x", "y"], ["vx", "vy"]))
+        assert "Nothing was compared" in report.diagnosis_page(found, demos, "A page", ["x", "y"], ["vx", "vy"])
+
+    def test_another_learner_is_told_what_to_do(self, fitted):
+        with pytest.raises(SettingError, match=r"Fit with learner=Robust\(\)"):
+            diagnose(uc.ParametricPolicy().fit_demonstrations(fitted[1]), fitted[1])
+
+    @given(st.integers(1, 4), st.integers(1, 3), st.integers(1, 3), st.sampled_from([0.0, 1e-9, 1.0]))
+    def test_it_finds_something_or_says_why_not(self, samples, n, d, size):
+        rng = np.random.default_rng([samples, n, d])
+        demo = uc.Demonstration(rng.standard_normal((samples, n)), size * rng.standard_normal((samples, d)))
+        policy = uc.LocallyLinearPolicy(learner=uc.Robust()).fit_demonstrations([demo])
+        try:
+            found = diagnose(policy, [demo])
+        except InvalidDataError as error:
+            assert "expected" in str(error)  # noqa: PT017 - either is right
+        else:
+            assert isinstance(found, Diagnosis)
+            assert all(map(len, sentences(found, ["x"] * n, ["v"] * d)))
+            assert json.loads(json.dumps(found.to_json(), allow_nan=False))
+
+
+class TestCommand:
+    def test_it_says_what_it_found_and_writes_a_page(self, tmp_path):
+        data, page = csv_of(tmp_path / "a.csv", movements()), tmp_path / "a.html"
+        said = run("diagnose", data, *AS_NAMED, *MOTION, "--model", "linear", "-o", page)
+        for words in (
+            "12 demonstrations, 360 samples",
+            "Noise: ",
+            "Policy: ",
+            "Variability",
+            "demonstrate around (x = ",
+        ):
+            assert words in said
+        references = References()
+        references.feed(page.read_text("utf-8"))
+        assert references.found == []
+
+    def test_json_holds_what_is_said(self, tmp_path):
+        data = csv_of(tmp_path / "a.csv", movements())
+        found = json.loads(run("diagnose", data, *AS_NAMED, *MOTION, "--json"))
+        assert found["actions"] == ["vx", "vy"]
+        assert {one["name"] for one in found["movements"]} == {f"d{index}" for index in range(12)}
+        assert found["regions"][0].keys() >= {"state", "direction", "along"}
+
+    @pytest.mark.parametrize(
+        ("demos", "d", "words"),
+        [
+            ([uc.Demonstration(np.ones((1, 2)), np.ones((1, 2)), name="one")], 2, "too little could be held out"),
+            (movements(), 1, "got one action column"),
+            ([replace(one, actions=0 * one.actions) for one in movements()], 2, "all actions are zero"),
+        ],
+        ids=["one sample", "one action", "at rest"],
+    )
+    def test_what_cannot_be_diagnosed_is_said_in_one_sentence(self, tmp_path, demos, d, words):
+        data = csv_of(tmp_path / "a.csv", demos, d)
+        motion = "vx,vy" if d == 2 else "vx"
+        assert words in refused("diagnose", data, *AS_NAMED, "--action", motion)
+
+    def test_it_does_not_write_over_what_it_reads(self, tmp_path):
+        data = csv_of(tmp_path / "a.csv", movements())
+        assert "is one of the files" in refused("diagnose", data, *AS_NAMED, *MOTION, "-o", data)
+
+    def test_velocities_are_named_after_their_states(self, tmp_path):
+        data = csv_of(tmp_path / "a.csv", movements(count=4))
+        ran = call("diagnose", data, *AS_NAMED, "--differentiate", "--window", "0.8", "--json")
+        assert ran.code == 0, ran.err
+        assert json.loads(ran.out)["actions"] == ["vx", "vy"]
+
+
+class TestPage:
+    def test_a_page_draws_all_its_pictures(self, fitted, browser, tmp_path):  # noqa: F811
+        policy, demos = fitted
+        evil = "<script>alert(1)</script>"
+        named = [replace(demo, name=evil) for demo in demos]
+        page = report.diagnosis_page(diagnose(policy, named), named, "A diagnosis", ["x", evil], ["vx", "vy"])
+        assert evil not in page
+        assert len(opened(browser, page, tmp_path)) == 2
+
+    def test_a_page_fits_on_a_phone(self, fitted, browser, tmp_path):  # noqa: F811
+        policy, demos = fitted
+        page = report.diagnosis_page(diagnose(policy, demos), demos, "A diagnosis", ["x", "y"], ["vx", "vy"])
+        metrics = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        try:
+            assert all(graph["wide"] <= 400 for graph in opened(browser, page, tmp_path))
+            assert browser.execute_script("return document.documentElement.scrollWidth") <= 400
+        finally:
+            browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+    def test_the_page_of_a_robust_fit_says_what_is_not_known(self, fitted, browser, tmp_path):  # noqa: F811
+        page = report.policy_page(*fitted, "A policy")
+        assert "What is not known" in page
+        assert [one["id"] for one in opened(browser, page, tmp_path)][-1] == "known-1"
+
+    def test_a_fit_of_which_nothing_can_be_said_says_so(self):
+        demos = [replace(one, actions=one.actions[:, :1]) for one in movements()]
+        policy = uc.ParametricPolicy(learner=uc.Robust()).fit_demonstrations(demos)
+        assert "Nothing can be said about that: got one action column" in report.policy_page(policy, demos, "A policy")

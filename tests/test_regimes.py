@@ -1,0 +1,91 @@
+"""The benchmark of regimes: its rows, its summary, its page."""
+
+import numpy as np
+import pytest
+
+from test_report import References, browser, opened  # noqa: F401 - a fixture
+from unconstrain import report
+from unconstrain.experiments import regimes
+
+METHODS = {"direct", "inconsistency", "hybrid", "hybrid, auto", "noise-corrected", "likelihood", "robust", "oracle"}
+
+
+@pytest.fixture(scope="module")
+def result():
+    """Two of the regimes, so that it does not take long."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(regimes, "PLANAR", ("random", "half"))
+        patch.setattr(regimes, "_SYSTEMS", {"limit cycle": regimes.LimitCycle()})
+        yield regimes.run(regimes.Settings(trials=2, seed=7001, arm=False, noise=(0.0, 0.05), thresholds=11))
+
+
+def test_there_is_a_row_for_each_method_regime_and_noise(result):
+    keys = {(row["method"], row["system"], row["constraint"], row["noise"]) for row in result.rows}
+    assert len(keys) == len(result.rows) == len(METHODS) * 2 * 2
+    assert {row["method"] for row in result.rows} == METHODS
+
+
+def test_the_oracle_is_one_times_the_oracle_and_the_hybrid_one_times_the_paper(result):
+    assert all(row["to_oracle"] == pytest.approx(1.0) for row in result.rows if row["method"] == "oracle")
+    assert all(one["to_paper"] == pytest.approx(1.0) for one in result.tables["summary"] if one["method"] == "hybrid")
+
+
+def test_the_summary_is_what_its_rows_say(result):
+    for one in result.tables["summary"]:
+        ratios, to_paper = [], []
+        for row in result.rows:
+            if (row["method"], row["noise"]) == (one["method"], one["noise"]):
+                [paper] = [
+                    other["nupe_geometric"]
+                    for other in result.rows
+                    if other["method"] == "hybrid"
+                    and all(other[key] == row[key] for key in ("system", "constraint", "noise"))
+                ]
+                to_paper.append(row["nupe_geometric"] / paper)
+                ratios.append((row["to_oracle"], f"{row['system']}, {row['constraint']}"))
+        assert one["regimes"] == len(ratios) == 2
+        assert one["to_paper"] == pytest.approx(np.prod(to_paper) ** (1 / 2))
+        assert one["to_oracle"] == pytest.approx((ratios[0][0] * ratios[1][0]) ** (1 / 2))
+        assert (one["worst_to_oracle"], one["worst"]) == max(ratios)
+
+
+def test_only_where_some_samples_are_free_and_some_not_are_they_told_apart(result):
+    for row in result.rows:
+        tells = row["method"] in ("robust", "likelihood", "noise-corrected")
+        assert (row["auc_mean"] is not None) == (tells and row["constraint"] == "half")
+        assert row["auc_mean"] is None or 0.0 <= row["auc_mean"] <= 1.0
+        assert row["coverage_mean"] is None or (tells and 0.0 <= row["coverage_mean"] <= 1.0)
+
+
+def test_noise_is_a_share_of_the_policys_spread():
+    rng = np.random.default_rng(0)
+    training, _ = regimes.demonstrate("limit cycle", "random", rng)
+    policies = np.concatenate([demo.truth.policy for demo in training])
+    noisy = regimes.with_noise(training, 0.1, rng)
+    added = np.concatenate([one.actions - two.actions for one, two in zip(noisy, training, strict=True)])
+    assert added.std() == pytest.approx(0.1 * np.sqrt(policies.var(axis=0).mean()), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("scores", "labels", "area"),
+    [([1, 2, 3, 4], [0, 0, 1, 1], 1.0), ([4, 3, 2, 1], [0, 0, 1, 1], 0.0), ([1, 1, 1], [0, 1, 1], 0.5),
+     ([1, 3, 2, 4], [0, 0, 1, 1], 0.75)],
+)  # fmt: skip
+def test_the_area_is_the_share_of_pairs_in_the_right_order(scores, labels, area):
+    assert regimes.area_under_curve(np.array(scores, float), np.array(labels, bool)) == pytest.approx(area)
+
+
+def test_headlines_say_each_noise_level(result):
+    said = regimes.headlines(result)
+    assert sum(line.startswith("noise ") for line in said) == 2
+    assert "95 % intervals of robust" in said[-1]
+
+
+def test_the_page_has_a_picture_for_each_noise_and_the_numbers_of_the_summary(result, browser, tmp_path):  # noqa: F811
+    page = report.page(result)
+    references = References()
+    references.feed(page)
+    assert references.found == []
+    assert len(opened(browser, page, tmp_path)) == 2
+    for one in result.tables["summary"]:
+        assert f"<td>{report.html.number(one['to_oracle'])}</td>" in page
