@@ -172,3 +172,8 @@ def test_without_dask_the_error_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "dask", None)
     with pytest.raises(MissingExtraError, match=r"unconstrain\[cluster\]"):
         cluster.fit_batches(uc.ParametricPolicy(), [[(DATA.states, DATA.actions)]])
+
+
+def test_a_learner_that_needs_samples_is_refused_before_anything_is_computed():
+    with pytest.raises(uc.UnconstrainError, match="sums alone"):
+        uc.cluster.fit_batches(uc.ParametricPolicy(learner=uc.Robust()), [None])

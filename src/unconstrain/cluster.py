@@ -21,6 +21,7 @@ from .arrays import require_extra
 from .batches import Batch, FirstLook
 from .errors import InvalidDataError, SettingError
 from .policies import Policy
+from .robust import SampleLearner
 from .validation import FoldedMoments
 
 __all__ = ["FAN_IN", "connected", "fit", "fit_batches"]
@@ -68,6 +69,19 @@ def fit(
     return fit_batches(policy, [delayed(_one_batch)(*row) for row in rows], client=client)
 
 
+def check_learner(policy: Policy) -> None:
+    """Refuse a learner that needs the samples.
+
+    Raises
+    ------
+    SettingError
+        If it does.
+    """
+    if isinstance(policy.learner, SampleLearner):
+        name = type(policy.learner).__name__
+        raise SettingError(f"learner: {name} needs the samples, and a cluster sends their sums alone. Take Hybrid().")
+
+
 def fit_batches(policy: P, parts: Sequence[Any], *, client: Any | None = None) -> P:
     """Fit a policy to parts that workers read for themselves.
 
@@ -91,9 +105,12 @@ def fit_batches(policy: P, parts: Sequence[Any], *, client: Any | None = None) -
     ------
     InvalidDataError
         As ``fit`` does, and if there is no part.
+    SettingError
+        If the learner needs the samples.
     MissingExtraError
         If dask is not installed.
     """
+    check_learner(policy)
     delayed = require_extra("dask", "cluster").delayed
     if not parts:
         raise InvalidDataError("got no part to learn from, expected at least one.")

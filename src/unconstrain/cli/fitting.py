@@ -95,9 +95,8 @@ def learn(policy: Policy, stream: Stream, scheduler: str | None) -> None:
     if scheduler is None:
         policy.fit_batches(stream)
         return
-    if type(policy.learner).__name__ == "Robust":
-        raise SettingError("--scheduler: a cluster computes sums, and --learner robust needs the samples; take hybrid.")
     from .. import cluster
 
+    cluster.check_learner(policy)
     with cluster.connected(scheduler) as client:
         cluster.fit_batches(policy, stream.parts(), client=client)

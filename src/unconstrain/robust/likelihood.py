@@ -91,7 +91,8 @@ def settle(samples: Samples, policy: Array, steps: int = 20) -> tuple[float, Arr
 def free_probability(samples: Samples, policy: Array, variance: float, mixture: Array) -> Array:
     """Probability that each sample was free, knowing that a demonstration's samples go together, shape (N,).
 
-    Each demonstration has a share of free samples of its own, drawn towards that of all.
+    Each demonstration has a share of free samples of its own, drawn towards that of all. What turned a sample by less
+    than the noise does is as good as nothing, and counts as free.
     """
     place = distances(samples.actions, policy)
     count = int(samples.groups.max()) + 1
@@ -101,7 +102,8 @@ def free_probability(samples: Samples, policy: Array, variance: float, mixture: 
         shares = beliefs(samples.actions, policy, place, variance, own[samples.groups]).shares
         seen = np.stack([np.bincount(samples.groups, samples.counts * one, count) for one in shares.T], axis=1)
         own = (seen + _POOLED * mixture) / (size + _POOLED)
-    return shares[:, 0]
+    hidden = np.array(SPREADS) * place.lengths[:, None] < np.sqrt(variance)
+    return np.asarray((shares[:, :-1] * hidden).sum(axis=1))
 
 
 def _begin(samples: Samples, policy: Array) -> tuple[float, Array]:
