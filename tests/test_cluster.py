@@ -136,6 +136,7 @@ def test_the_command_line_fits_on_a_cluster(workers, tmp_path):
     said = []
     for name, more in (("here", []), ("there", ["--scheduler", workers.scheduler.address])):
         options = ["fit", pattern, "--state", "x,y", "--action", "vx,vy", "-o", str(tmp_path / f"{name}.npz")]
+        options += ["--learner", "hybrid"]
         ran = CliRunner().invoke(cli.main, [*options, *more], prog_name="unconstrain")
         assert ran.exit_code == 0, ran.stderr
         said.append(ran.stdout)

@@ -24,7 +24,7 @@ from .policies import Policy
 from .robust import SampleLearner
 from .validation import FoldedMoments
 
-__all__ = ["FAN_IN", "connected", "fit", "fit_batches"]
+__all__ = ["FAN_IN", "check_learner", "connected", "fit", "fit_batches"]
 
 FAN_IN = 8
 """So many results are added in one task."""
