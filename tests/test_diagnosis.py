@@ -113,7 +113,8 @@ class TestWhatIsFound:
     def test_free_demonstrations_look_freer(self, fitted):
         found = diagnose(*fitted)
         free = np.array([one.free for one in found.movements])
-        assert free[::2].min() > free[1::2].mean()
+        assert free[::2].min() > 0.5  # a constraint that takes less than the noise looks free, too
+        assert free[::2].mean() > free[1::2].mean() + 0.2
 
     def test_demonstrations_of_one_name_are_told_apart(self, fitted):
         policy, demos = fitted
