@@ -287,7 +287,7 @@ def test_fit_says_what_it_did(files, tmp_path):
 def test_fit_says_how_the_default_learner_went(files, tmp_path):
     said = run("fit", *files, "--model", "linear", "-o", tmp_path / "p.npz").splitlines()[2]
     assert re.fullmatch(
-        r"Learnt by .*: .*\. Noise and misfit are below 1 % of the actions, \d+% of the samples look free, "
+        r"Learnt by .*: .*\. Noise and misfit are about \S+ on each action, \d+% of the samples look free, "
         r"and the data determined 100% of the weight directions\.",
         said,
     )

@@ -29,6 +29,9 @@ __all__ = ["Direct", "Hybrid", "Inconsistency", "Learner", "Solution"]
 
 Averaging = Literal["geometric", "arithmetic"]
 
+AT_REST = 1e-3
+"""A demonstration whose mean square action is below this share of the largest has nothing to say of softness."""
+
 SOFTNESSES = (1e-11, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.2, 0.3, 0.5, 1.0, 3.0)
 """What ``Hybrid(alpha="auto")`` tries."""
 
@@ -161,10 +164,13 @@ class Hybrid:
     def chosen_softness(folds: FoldedMoments) -> float:
         """The softness that ``alpha="auto"`` chooses, the same for all models."""
         rounds = folds.rounds()
-        if len(rounds) < 2:
+        if not rounds:
             return SOFTNESSES[0]
+        speeds = [held_out.energy.sum() / max(held_out.weight.sum(), 1e-300) for _, held_out in rounds]
         missed = []
-        for training, held_out in rounds:
+        for (training, held_out), speed in zip(rounds, speeds, strict=True):
+            if speed < AT_REST * max(speeds):
+                continue  # all noise: as a share of its motion it would outvote the others
             candidates = softened_minima(inconsistency(training), standard_risk(training), SOFTNESSES)
             # Each round as a share of its own motion: a fast demonstration says no more than a slow one.
             missed.append(inconsistency(held_out)(candidates).sum(axis=0) / max(held_out.energy.sum(), 1e-300))
@@ -189,6 +195,8 @@ def softest(missed: Array) -> int:
         by round.
     """
     best = int(missed.mean(axis=0).argmin())
+    if len(missed) < 2:  # and so no standard error
+        return best
     gap = missed - missed[:, [best]]
     near = gap.mean(axis=0) <= gap.std(axis=0, ddof=1) / np.sqrt(len(missed))
     return int(np.flatnonzero(near).max())

@@ -14,7 +14,7 @@ import click
 from .. import experiments
 from ..errors import ModelFileError, ReadError, SettingError, UnconstrainError
 from .diagnosing import diagnose
-from .fitting import MODELS, Alpha, check_writable, default_learner, learn, learner_of, policy_of
+from .fitting import MODELS, Alpha, check_speed_power, check_writable, default_learner, learn, learner_of, policy_of
 from .printing import Group, deliver, number, print_table, progress_bar, say_fit
 from .reading import (
     Numbers,
@@ -147,7 +147,8 @@ def fit(
 
     paths = expanded(files)
     check_writable((output, report), paths)
-    learner = learner or default_learner(paths, scheduler, alpha, softness)
+    learner = learner or default_learner(paths, scheduler, alpha, softness, speed_power)
+    check_speed_power(learner, speed_power)
     chosen = {"learner": learner_of(learner, alpha, softness), "validation": validation.Folds(folds, hold_out)}
     fitted = policy_of(model, variance, centres, **chosen)
     stream = stream_of(paths, speed_power, **reading)

@@ -14,7 +14,16 @@ if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
     from ..policies import Policy
     from ..streams import Stream
 
-__all__ = ["MODELS", "Alpha", "check_writable", "default_learner", "learn", "learner_of", "policy_of"]
+__all__ = [
+    "MODELS",
+    "Alpha",
+    "check_speed_power",
+    "check_writable",
+    "default_learner",
+    "learn",
+    "learner_of",
+    "policy_of",
+]
 
 MODELS = ("local", "rbf", "linear")
 
@@ -36,10 +45,14 @@ class Alpha(click.ParamType):  # type: ignore[type-arg]
 
 
 def default_learner(
-    paths: Sequence[str], scheduler: str | None, alpha: float | Literal["auto"] | None, softness: float | None
+    paths: Sequence[str],
+    scheduler: str | None,
+    alpha: float | Literal["auto"] | None,
+    softness: float | None,
+    speed_power: float,
 ) -> str:
     """Which learner is meant where none is named."""
-    if scheduler is not None or alpha is not None or softness is not None:
+    if scheduler is not None or alpha is not None or softness is not None or speed_power:
         return "hybrid"
     size = sum(Path(path).stat().st_size for path in paths if Path(path).is_file())
     if size <= MUCH:
@@ -88,6 +101,12 @@ def policy_of(model: str, variance: float | None, centres: int | None, **chosen:
         return policies.LocallyLinearPolicy(variance, **chosen)
     shape = features.KMeansRBF(centres or 25) if model == "rbf" else features.Affine()
     return policies.ParametricPolicy(shape, **chosen)
+
+
+def check_speed_power(learner: str, speed_power: float) -> None:
+    """Refuse to weigh samples by their speed twice."""
+    if learner == "robust" and speed_power:
+        raise SettingError("--speed-power: the robust learner weighs speed itself; give another --learner with it.")
 
 
 def learn(policy: Policy, stream: Stream, scheduler: str | None) -> None:

@@ -123,8 +123,9 @@ def say_fit(policy: Policy, stream: Stream | None, learner: str) -> None:
         + (f"{held_out:.4g} where held out." if isfinite(held_out) else "nothing could be held out.")
     )
     if stream is not None and held_out > 0.05 + 2.0 * training:
+        faster = "" if learner == "robust" else "--speed-power 2 or "
         click.echo(
-            "Note: much is missed where held out. Against noise at low speed a wider --window, --speed-power 2 or "
+            f"Note: much is missed where held out. Against noise at low speed a wider --window, {faster}"
             "--still help; otherwise the demonstrations may have too little in common.",
             err=True,
         )
@@ -137,13 +138,9 @@ def _said_of_samples(solution: RobustSolution) -> str:
         "noise-corrected": "by consistency, with the noise taken out: constraints go with the state",
         "hybrid": "by consistency, softened: there is little noise to take out",
     }
-    least = solution.misfit * solution.weights.shape[1] ** 0.5
-    size = (
-        "below 1 % of the actions" if solution.noise <= 1.001 * least else f"about {solution.noise:.3g} on each action"
-    )
     return (
-        f"Learnt {ways.get(solution.method, solution.method)}. Noise and misfit are {size}, "
-        f"{solution.free_share:.0%} of the samples look free, and the data determined "
+        f"Learnt {ways.get(solution.method, solution.method)}. Noise and misfit are about {solution.noise:.3g} on "
+        f"each action, {solution.free_share:.0%} of the samples look free, and the data determined "
         f"{solution.determined_share:.0%} of the weight directions."
     )
 

@@ -31,7 +31,7 @@ from ..arrays import (
 )
 from ..batches import Batch, FirstLook, Groups
 from ..demonstration import Demonstration, stack
-from ..errors import InvalidDataError
+from ..errors import InvalidDataError, SettingError
 from ..learners import Hybrid, Learner, Solution
 from ..moments import Moments, Sums
 from ..objectives import inconsistency, vec
@@ -188,6 +188,8 @@ class Policy(Deployable, Looking, RegressorMixin, BaseEstimator):
         self
         """
         check_at_least("speed_power", speed_power, 0.0)
+        if speed_power and isinstance(self._learner(), SampleLearner):
+            raise SettingError("speed_power: learners that look at the samples weigh speed themselves, expected 0.")
         states, actions, groups = stack(demonstrations)
         speed = np.linalg.norm(actions, axis=1)
         if speed_power == 0.0 or not speed.any():
@@ -204,7 +206,8 @@ class Policy(Deployable, Looking, RegressorMixin, BaseEstimator):
         parts, filled, learner = self._folds.parts, self._folds.filled, self._learner()
         if isinstance(self.solution_, RobustSolution):
             return self.solution_.held_out_score
-        assert not isinstance(learner, SampleLearner)
+        if isinstance(learner, SampleLearner):
+            return float("nan")
         missed = moved = 0.0
         for i in filled if len(filled) > 1 else ():
             others = tuple(parts[j] for j in filled if j != i)
@@ -340,11 +343,13 @@ class Policy(Deployable, Looking, RegressorMixin, BaseEstimator):
         return self
 
     def _learn(self, batches: Iterable[Batch]) -> Self:
+        kept: tuple[Batch, ...] = ()
         if isinstance(self._learner(), SampleLearner):
-            batches = tuple(batches)
-            self._kept = (*self._samples_so_far(), *batches)
+            batches = tuple(map(deepcopy, batches))  # the caller may use a buffer again
+            kept = (*self._samples_so_far(), *batches)
         summed = self._summed(batches)
         self._folds = self._folds + summed if self._folds.filled else summed
+        self._kept = kept
         self._conclude()
         return self
 
@@ -398,8 +403,16 @@ class Policy(Deployable, Looking, RegressorMixin, BaseEstimator):
             self.solution_ = self._solve(learner, self._folds)
             return
         folds = self._folds if centring is None else self._folds.in_features(centring)
-        filled = tuple(folds.parts[i] for i in folds.filled)
-        self.solution_ = learner.learn(self._samples(), FoldedMoments(filled, range(len(filled))))
+        samples = self._samples()
+        # In the order of time, wherever demonstrations come interleaved; and weights such as 1/N are no weak data.
+        order = np.argsort(samples.groups, kind="stable")
+        factor = max(1.0, len(samples) / samples.counts.sum())
+        samples = replace(samples[order], counts=factor * samples.counts[order])
+        filled = tuple(factor * folds.parts[i] for i in folds.filled)
+        solution = learner.learn(samples, FoldedMoments(filled, range(len(filled))))
+        if isinstance(solution, RobustSolution):
+            solution = replace(solution, free=solution.free[np.argsort(order)])
+        self.solution_ = solution
 
     def _solve(self, learner: Learner, folds: FoldedMoments) -> Solution:
         """Find the weights of the features φ(x)."""

@@ -78,7 +78,7 @@ class Looking:
 
     def _in_models(self, X: ArrayLike) -> tuple[Array, Array, Array]:
         """Features (N, p), shares of the models (N, M), and T_m (M, p, p)."""
-        states, centring = self._checked_states(X), self._centring()
+        states, centring = on_host(self._checked_states(X)), self._centring()
         features, shares = self._features(states), self._shares(states)
         return (
             features,

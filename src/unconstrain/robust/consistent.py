@@ -121,8 +121,9 @@ class _Corrected:
         moments = corrected(weighted, plain, variance)
         self.sizes, self.d = sizes, plain.cross.shape[1]
         self.expected = variance * weighted.weight
+        self.variance, self.plain, self.count = variance, standard_risk(plain), plain.weight
         self.risk = standard_risk(moments)
-        self.consistent = _certain(inconsistency(moments), standard_risk(plain).hessian, variance, sizes)
+        self.consistent = _certain(inconsistency(moments), self.plain.hessian, variance, sizes)
 
     def posterior(self, softness: Array) -> Posterior:
         return Posterior(self.consistent, scaled(self.risk, softness))
@@ -141,10 +142,10 @@ class _Corrected:
 
     def residual(self, weights: Array) -> Array:
         """Mean square of ρ, shape (M,)."""
-        energy = np.abs(self.consistent.constant)
-        return np.maximum(self.consistent(vec(weights)) + self.expected, 1e-12 * energy) / np.maximum(
-            self.sizes, 1e-300
-        )
+        flat, energy = vec(weights), np.abs(self.consistent.constant)
+        squares = np.einsum("mi,mij,mj->m", flat, self.plain.hessian, flat)  # Σ ‖π‖²
+        noise = self.variance * squares + 2 * self.d * self.variance**2 * self.count
+        return np.maximum(self.consistent(flat) + noise, 1e-12 * energy) / np.maximum(self.sizes, 1e-300)
 
 
 def _certain(objective: Quadratic, gram: Array, variance: float, sizes: Array) -> Quadratic:

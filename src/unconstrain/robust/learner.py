@@ -10,6 +10,7 @@ import numpy as np
 from ..arrays import Array, check_at_least
 from ..errors import SettingError
 from ..learners import Direct, Hybrid
+from ..objectives import inconsistency, vec
 from ..projection import unit_actions
 from ..validation import FoldedMoments
 from .consistent import by_segments, noise_corrected, softened
@@ -127,6 +128,8 @@ class Segments:
         most = noise_by_differences(samples.actions, samples.groups)
         noise = self.noise if self.noise is not None else float(np.sqrt(min(most, samples.energy)))
         by_group = self.labels == "groups"
+        if by_group and samples.groups.max() == 0:
+            raise SettingError("labels: 'groups' needs groups=, one name for each demonstration, at least two.")
         labels = samples.groups if by_group else found_segments(samples.actions, samples.groups, noise)
         return _solution(samples, by_segments(samples, labels, noise), {})
 
@@ -207,7 +210,7 @@ def _solution(samples: Samples, chosen: Candidate, gaps: dict[str, float]) -> Ro
         np.zeros(models),
         method=chosen.name,
         noise=float(np.sqrt(variance)),
-        misfit=MISFIT * float(np.sqrt(samples.energy / d)),
+        misfit=float(np.sqrt(_misfit(samples, variance))),
         free_share=float(samples.counts @ free / samples.counts.sum()),
         free=free,
         from_noise=from_noise,
@@ -215,6 +218,13 @@ def _solution(samples: Samples, chosen: Candidate, gaps: dict[str, float]) -> Ro
         held_out_score=_explained(samples, chosen.held_out),
         compared=gaps,
     )
+
+
+def _misfit(samples: Samples, variance: float) -> float:
+    """Variance, per coordinate, of what the model misses: what the residuals have and differences in time have not."""
+    least = MISFIT**2 * samples.energy
+    smooth = variance - max(noise_by_differences(samples.actions, samples.groups), least)
+    return least / samples.actions.shape[1] + max(smooth, 0.0)
 
 
 def _explained(samples: Samples, policy: Array) -> float:
@@ -231,8 +241,13 @@ def _trivial(samples: Samples) -> bool:
 def _plain(samples: Samples, folds: FoldedMoments) -> RobustSolution:
     """What the hybrid makes of it."""
     found = Hybrid().solve(folds)
-    size = found.directions
-    nothing = np.zeros((len(found.weights), size, size))
+    size, d = found.directions, samples.actions.shape[1]
+    sizes = samples.sizes
+    missed = inconsistency(folds.whole)(vec(found.weights)) / np.maximum(sizes - size, 1.0)
+    evidence = scaled(inconsistency(folds.whole), 1.0 / np.maximum(missed, MISFIT**2 * samples.energy + 1e-300))
+    vague = samples.risk(samples.actions, np.full(len(samples), d / max(samples.energy, 1e-300)))
+    belief = Posterior(evidence, scaled(vague, unit_information(samples.features.shape[1], sizes)))
+    from_noise, undetermined = belief.spreads()
     return RobustSolution(
         found.weights @ samples.centring,
         found.determined,
@@ -243,8 +258,10 @@ def _plain(samples: Samples, folds: FoldedMoments) -> RobustSolution:
         method="hybrid",
         free=np.ones(len(samples)),
         free_share=1.0,
-        from_noise=nothing,
-        undetermined=nothing,
+        noise=float(np.sqrt(missed.mean())),
+        misfit=MISFIT * float(np.sqrt(samples.energy / d)),
+        from_noise=from_noise,
+        undetermined=undetermined,
     )
 
 

@@ -54,13 +54,16 @@ class Posterior:
     def spreads(self) -> tuple[Array, Array]:
         """Covariance of the weights, due to the noise in the data and due to what it does not say, each (M, P, P).
 
-        With ``C = (A + B)⁻¹`` for evidence A and prior B, they are C A C and C B C, and add up to C.
+        With ``C = (A + B)⁻¹`` for evidence A and prior B, they are C A C and C B C, and add up to C. In what no
+        sample has excited, B is at least a hundredth of its mean over all directions: it must not count as known.
         """
-        eigenvalues, vectors = eigensystem(self.evidence.hessian + self.prior.hessian)
-        kept = eigenvalues > SECONDARY_NOISE * eigenvalues[:, -1:]
-        inverse = np.where(kept, 1.0 / np.where(kept, eigenvalues, 1.0), 0.0)
-        both = (vectors * inverse[:, None, :]) @ vectors.swapaxes(1, 2)
-        return both @ self.evidence.hessian @ both, both @ self.prior.hessian @ both
+        values, axes = eigensystem(self.prior.hessian)
+        floored = np.maximum(values, 1e-2 * values.mean(axis=1, keepdims=True))
+        prior = (axes * floored[:, None, :]) @ axes.swapaxes(1, 2)
+        eigenvalues, vectors = eigensystem(self.evidence.hessian + prior)
+        lowest = np.maximum(1e-15 * eigenvalues[:, -1:], 1e-300)
+        both = (vectors / np.maximum(eigenvalues, lowest)[:, None, :]) @ vectors.swapaxes(1, 2)
+        return both @ self.evidence.hessian @ both, both @ prior @ both
 
     def determined(self) -> NDArray[np.intp]:
         """In how many directions the data says more than the prior, shape (M,)."""
@@ -106,7 +109,8 @@ class RobustSolution(Solution):
     noise : float
         Standard deviation of the noise on each action coordinate, misfit of the model included.
     misfit : float
-        Standard deviation, per action coordinate, that no model of the policy is trusted to be below.
+        Standard deviation, per action coordinate, of what the model of the policy misses: the part of the residuals
+        that goes on smoothly in time, and a hundredth of the actions' size, which no model is trusted to be below.
     free_share : float
         Estimated share of samples that nothing constrained.
     free : ndarray, shape (N,)

@@ -72,7 +72,9 @@ class Samples:
         plain = weights @ self.centring
         if plain.shape[0] == 1:
             return self.features @ plain[0].T
-        return np.einsum("nm,nmd->nd", self.shares, np.tensordot(self.features, plain, axes=(1, 2)))
+        return np.asarray(
+            sum(share[:, None] * (self.features @ one.T) for share, one in zip(self.shares.T, plain, strict=True))
+        )
 
     def moments(self, actions: Array, weights: Array) -> Moments:
         """Moments of any actions (N, d) at these features, each sample weighted (N,)."""
