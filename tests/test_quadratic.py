@@ -202,3 +202,14 @@ def test_the_basis_is_orthonormal_in_the_metric_of_the_second_objective():
     second = least_squares(*draw(44, 8, 5))
     path = lexicographic_path(least_squares(*draw(45, 8, 5)), second)
     assert_allclose(path.basis[0].T @ second.hessian[0] @ path.basis[0], np.eye(5), atol=1e-12)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 3), st.integers(1, 4))
+def test_a_product_by_blocks_is_that_with_the_hessian(seed, d, p):
+    rng = np.random.default_rng(seed)
+    half = rng.standard_normal((2, p, p))
+    gram = half @ half.swapaxes(1, 2)
+    hessian = np.stack([np.kron(one, np.eye(d)) for one in gram])
+    columns = rng.standard_normal((2, p * d, 5))
+    objective = Quadratic(hessian, np.zeros((2, p * d)), np.zeros(2), gram)
+    assert_allclose(objective.times(columns), hessian @ columns, atol=1e-12)

@@ -30,7 +30,7 @@ def standard_risk(moments: Moments) -> Quadratic:
     models, d, p = moments.cross.shape
     each = beside(np.eye(d), moments.gram)[:, None, :]  # eye[k, l] at (k, j, l)
     hessian = namespace(moments.gram).reshape(moments.gram[:, :, None, :, None] * each, (models, p * d, p * d))
-    return Quadratic(hessian, vec(moments.cross), moments.energy)
+    return Quadratic(hessian, vec(moments.cross), moments.energy, moments.gram)
 
 
 def vec(weights: Array) -> Array:

@@ -69,11 +69,14 @@ class Quadratic:
         Symmetric, positive semidefinite; half the matrix of second derivatives.
     linear : ndarray, shape (M, P)
     constant : ndarray, shape (M,)
+    gram : ndarray, shape (M, p, p), optional
+        Where the Hessian is ``gram ⊗ I``, and products with it need not multiply its zeros.
     """
 
     hessian: Array
     linear: Array
     constant: Array
+    gram: Array | None = None
 
     def __call__(self, weights: Array) -> Array:
         """Evaluate at ``weights``, shape (M, P) or, for K candidates each, (M, P, K).
@@ -102,6 +105,15 @@ class Quadratic:
         return Quadratic(factor * self.hessian, factor * self.linear, factor * self.constant)
 
     __rmul__ = __mul__
+
+    def times(self, vectors: Array) -> Array:
+        """``hessian @ vectors`` for columns of shape (M, P, K)."""
+        if self.gram is None:
+            return self.hessian @ vectors
+        xp = namespace(vectors)
+        models, size = self.gram.shape[:2]
+        product: Array = xp.reshape(self.gram @ xp.reshape(vectors, (models, size, -1)), vectors.shape)
+        return product
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +208,7 @@ def lexicographic_path(first: Quadratic, second: Quadratic | None = None) -> Pat
     determined = xp.where(noise, 0.0, _across(vectors, first.linear) / xp.where(noise, 1.0, eigenvalues))
     if second is None:
         return Path(eigenvalues, lowest, vectors, xp.zeros_like(determined), determined)
-    lower = _factor(second.hessian, vectors)
+    lower = _factor(second, vectors)
     basis = _solve_lower(lower, vectors.mT).mT
     return Path(eigenvalues, lowest, basis, _across(basis, second.linear), _across(lower, determined))
 
@@ -206,7 +218,7 @@ def minimum(objective: Quadratic) -> Array:
     xp = namespace(objective.linear)
     axes = xp.eye(objective.linear.shape[1], dtype=xp.float64, device=objective.linear.device)
     axes = xp.broadcast_to(axes, objective.hessian.shape)
-    basis = _solve_lower(_factor(objective.hessian, axes), axes).mT
+    basis = _solve_lower(_factor(objective, axes), axes).mT
     weights: Array = (basis @ _across(basis, objective.linear)[..., None])[..., 0]
     return weights
 
@@ -218,7 +230,7 @@ def softened_minima(first: Quadratic, second: Quadratic, softnesses: Sequence[fl
     basis ``A = L⁻ᵀ Q`` every minimum is ``A (Λ + s)⁻¹ Aᵀ (linear₁ + s linear₂)``.
     """
     axes = np.broadcast_to(np.eye(first.linear.shape[1]), first.hessian.shape)
-    whitening = _solve_lower(_factor(second.hessian, axes), axes).mT
+    whitening = _solve_lower(_factor(second, axes), axes).mT
     eigenvalues, vectors = eigensystem(whitening.mT @ first.hessian @ whitening)
     basis, shares = whitening @ vectors, np.asarray(softnesses)
     linear = _across(basis, first.linear)[..., None] + shares * _across(basis, second.linear)[..., None]
@@ -240,23 +252,23 @@ def eigensystem(hessian: Array) -> tuple[Array, Array]:
     return eigenvalues * unit[..., 0], vectors
 
 
-def _factor(hessian: Array, vectors: Array) -> Array:
-    """Cholesky factor of ``Vᵀ M V``, shape (M, P, P).
+def _factor(objective: Quadratic, vectors: Array) -> Array:
+    """Cholesky factor of ``Vᵀ M V`` with M the Hessian, shape (M, P, P).
 
     Where M is singular, its null directions are given the weight of its
     largest eigenvalue first. The linear term has no part in them, so they
     stay zero, which is the solution of least norm. An M that is nothing but
     underflow, as of a field that no sample is near, counts as zero.
     """
-    xp = namespace(hessian)
+    xp = namespace(objective.hessian)
     try:
-        lower: Array = xp.linalg.cholesky(vectors.mT @ hessian @ vectors)
+        lower: Array = xp.linalg.cholesky(vectors.mT @ objective.times(vectors))
         pivots = xp.linalg.diagonal(lower) ** 2
         if xp.all(xp.min(pivots, axis=-1) > SECONDARY_NOISE * xp.max(pivots, axis=-1)):
             return lower
     except (np.linalg.LinAlgError, RuntimeError):  # PyTorch's is a RuntimeError
         pass
-    eigenvalues, axes = eigensystem(hessian)
+    eigenvalues, axes = eigensystem(objective.hessian)
     largest = eigenvalues[:, -1:]
     floored = xp.where(eigenvalues > SECONDARY_NOISE * largest, eigenvalues, largest)
     floored = xp.where(largest > UNDERFLOW, floored, 1.0)

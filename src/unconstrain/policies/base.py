@@ -59,29 +59,11 @@ class Policy(Deployable, Looking, RegressorMixin, BaseEstimator):
 
     learner: Learner | SampleLearner | None
     validation: Validation | None
-    _folds: FoldedMoments
-    _splitter: Splitter
     _flat: bool
 
     @abstractmethod
     def _place(self, look: FirstLook) -> None:
         """Fix features and fields on what was seen at first look."""
-
-    @abstractmethod
-    def _features(self, states: Array) -> Array:
-        """Features φ(x) as they are summed, shape (N, p)."""
-
-    @abstractmethod
-    def _weights(self, states: Array) -> Array | None:
-        """How much each sample counts in each model, shape (N, M), or None for a single model."""
-
-    @abstractmethod
-    def _shares(self, states: Array) -> Array | None:
-        """Share of each model in the prediction, shape (N, M), or None for a single model."""
-
-    @abstractmethod
-    def _centring(self) -> Array | None:
-        """T_m, shape (M, p, p), with which model m is solved in features ``T_m φ``; None for φ itself."""
 
     def fit(
         self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, groups: Groups | None = None

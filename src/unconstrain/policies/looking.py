@@ -32,7 +32,7 @@ class Looking:
 
     @abstractmethod
     def _features(self, states: Array) -> Array:
-        """Features φ(x), shape (N, p)."""
+        """Features φ(x) as they are summed, shape (N, p)."""
 
     @abstractmethod
     def _weights(self, states: Array) -> Array | None:
@@ -44,7 +44,7 @@ class Looking:
 
     @abstractmethod
     def _centring(self) -> Array | None:
-        """T_m, shape (M, p, p), with which model m is solved; None for φ itself."""
+        """T_m, shape (M, p, p), with which model m is solved in features ``T_m φ``; None for φ itself."""
 
     @abstractmethod
     def _learner(self) -> Learner | SampleLearner:
