@@ -76,8 +76,8 @@ def softened(samples: Samples, folds: FoldedMoments) -> Candidate:
     radial = distances(samples.actions, samples.predict(weights)).radial
     sizes = np.maximum(whole.weight, np.finfo(float).tiny)
     residual = np.maximum(inconsistency(whole)(vec(weights)), 1e-12 * whole.energy) / sizes
-    scaled = _per(posterior(whole), correlation_time(radial[:, None], samples.groups) * residual)
-    return Candidate("hybrid", weights, scaled, held_out, _mean(samples, radial**2))
+    time = correlation_time(radial[:, None], samples.groups)
+    return Candidate("hybrid", weights, _per(posterior(whole), time * residual), held_out, _mean(samples, radial**2))
 
 
 def by_segments(samples: Samples, labels: NDArray[np.intp], noise: float) -> Candidate:
@@ -165,7 +165,6 @@ def _certain(objective: Quadratic, gram: Array, variance: float, sizes: Array) -
 def _per(posterior: Posterior, variance: Array) -> Posterior:
     """The same in units of a variance, shape (M,)."""
     by = 1.0 / np.maximum(variance, 1e-300)
-
     return Posterior(scaled(posterior.evidence, by), scaled(posterior.prior, by))
 
 

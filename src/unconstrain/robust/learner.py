@@ -12,6 +12,7 @@ from ..errors import SettingError
 from ..learners import Direct, Hybrid
 from ..objectives import inconsistency, vec
 from ..projection import unit_actions
+from ..quadratic import Quadratic
 from ..validation import FoldedMoments
 from .consistent import by_segments, noise_corrected, softened
 from .likelihood import MISFIT, free_probability, maximise, settle
@@ -39,7 +40,19 @@ HIDDEN = 0.35
 
 
 @dataclass(frozen=True)
-class Likelihood:
+class _Climbing:
+    """What learners have that climb to the most probable policy."""
+
+    steps: int = 60
+    most: int = 2000
+
+    def __post_init__(self) -> None:
+        check_at_least("steps", self.steps, 1, whole=True)
+        check_at_least("most", self.most, 1, whole=True)
+
+
+@dataclass(frozen=True)
+class Likelihood(_Climbing):
     """The most probable policy, where each sample was free, turned a little, or anywhere on its sphere.
 
     See :mod:`unconstrain.robust.sphere`. It holds where constraints vary at
@@ -54,20 +67,13 @@ class Likelihood:
         Steps but the last look at no more samples than these, evenly thinned in time.
     """
 
-    steps: int = 60
-    most: int = 2000
-
-    def __post_init__(self) -> None:
-        check_at_least("steps", self.steps, 1, whole=True)
-        check_at_least("most", self.most, 1, whole=True)
-
     def learn(self, samples: Samples, folds: FoldedMoments) -> RobustSolution:
         """Learn from samples; ``folds`` are their moments."""
         if _trivial(samples):
             return _plain(samples, folds)
         starts = [softened(samples, folds).weights, Direct().solve(folds).weights]
-        found = maximise(samples, starts, self.steps, self.most)
-        return _solution(samples, found.candidate, {})
+        likely, _ = maximise(samples, starts, self.steps, self.most)
+        return _solution(samples, likely, {})
 
 
 @dataclass(frozen=True)
@@ -135,7 +141,7 @@ class Segments:
 
 
 @dataclass(frozen=True)
-class Robust:
+class Robust(_Climbing):
     """Learn under noise and in every constraint setting, with nothing to tune.
 
     Learns a consistent policy, on noise-corrected moments where noise shows
@@ -154,13 +160,6 @@ class Robust:
         See :class:`Likelihood`.
     """
 
-    steps: int = 60
-    most: int = 2000
-
-    def __post_init__(self) -> None:
-        check_at_least("steps", self.steps, 1, whole=True)
-        check_at_least("most", self.most, 1, whole=True)
-
     def learn(self, samples: Samples, folds: FoldedMoments) -> RobustSolution:
         """Learn from samples; ``folds`` are their moments."""
         if _trivial(samples):
@@ -168,8 +167,9 @@ class Robust:
         consistent = noise_corrected(samples)
         if not _more_than(NOISY, consistent.variance, samples):
             consistent = softened(samples, folds)
-        found = maximise(samples, [consistent.weights, Direct().solve(folds).weights], self.steps, self.most)
-        likely, informed = found.candidate, 1.0 - float(found.mixture[-1])
+        starts = [consistent.weights, Direct().solve(folds).weights]
+        likely, mixture = maximise(samples, starts, self.steps, self.most)
+        informed = 1.0 - float(mixture[-1])
         apart, error = compared(samples, likely.held_out, consistent.held_out, consistent.variance)
         refuted = apart > max(np.log(WORSE), error)
         usable = informed > INFORMED and not refuted and not _more_than(HIDDEN, likely.variance, samples)
@@ -199,9 +199,7 @@ def _solution(samples: Samples, chosen: Candidate, gaps: dict[str, float]) -> Ro
     variance, mixture = settle(samples, policy)
     free = free_probability(samples, policy, variance, mixture)
     models, d, p = chosen.weights.shape
-    # What is known beforehand: the policy's size, as if each model had seen one such sample for each feature.
-    vague = samples.risk(samples.actions, np.full(len(samples), d / samples.energy))
-    belief = Posterior(chosen.posterior.evidence, scaled(vague, unit_information(p, samples.sizes)))
+    belief = _belief(samples, chosen.posterior.evidence)
     from_noise, undetermined = belief.spreads()
     return RobustSolution(
         chosen.weights @ samples.centring,
@@ -218,6 +216,13 @@ def _solution(samples: Samples, chosen: Candidate, gaps: dict[str, float]) -> Ro
         held_out_score=_explained(samples, chosen.held_out),
         compared=gaps,
     )
+
+
+def _belief(samples: Samples, evidence: Quadratic) -> Posterior:
+    """Evidence beside a prior that knows the policy's size, as if each model had seen one such sample a feature."""
+    d, p = samples.actions.shape[1], samples.features.shape[1]
+    vague = samples.risk(samples.actions, np.full(len(samples), d / max(samples.energy, 1e-300)))
+    return Posterior(evidence, scaled(vague, unit_information(p, samples.sizes)))
 
 
 def _misfit(samples: Samples, variance: float) -> float:
@@ -242,11 +247,9 @@ def _plain(samples: Samples, folds: FoldedMoments) -> RobustSolution:
     """What the hybrid makes of it."""
     found = Hybrid().solve(folds)
     size, d = found.directions, samples.actions.shape[1]
-    sizes = samples.sizes
-    missed = inconsistency(folds.whole)(vec(found.weights)) / np.maximum(sizes - size, 1.0)
+    missed = inconsistency(folds.whole)(vec(found.weights)) / np.maximum(samples.sizes - size, 1.0)
     evidence = scaled(inconsistency(folds.whole), 1.0 / np.maximum(missed, MISFIT**2 * samples.energy + 1e-300))
-    vague = samples.risk(samples.actions, np.full(len(samples), d / max(samples.energy, 1e-300)))
-    belief = Posterior(evidence, scaled(vague, unit_information(samples.features.shape[1], sizes)))
+    belief = _belief(samples, evidence)
     from_noise, undetermined = belief.spreads()
     return RobustSolution(
         found.weights @ samples.centring,

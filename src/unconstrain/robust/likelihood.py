@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,7 @@ from .posterior import Candidate, Posterior, scaled, unit_information
 from .samples import Samples
 from .sphere import SPREADS, Beliefs, Distances, beliefs, distances
 
-__all__ = ["Fit", "free_probability", "maximise", "settle"]
+__all__ = ["free_probability", "maximise", "settle"]
 
 MISFIT = 0.01
 """No model is right to better than this share of the actions' size."""
@@ -28,30 +27,7 @@ _POOLED = 10.0
 """Samples that the data as a whole counts for, beside a demonstration's own, in how free it was."""
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """Where expectation maximisation ended.
-
-    Parameters
-    ----------
-    weights : ndarray, shape (M, d, p)
-    variance : float
-        σ², misfit included.
-    mixture : ndarray, shape (K + 1,)
-        Share of each spread on the sphere, and of the uniform density.
-    likelihood : float
-        Mean logarithm of the samples' density.
-    candidate : Candidate
-    """
-
-    weights: Array
-    variance: float
-    mixture: Array
-    likelihood: float
-    candidate: Candidate
-
-
-def maximise(samples: Samples, starts: Sequence[Array], steps: int, most: int) -> Fit:
+def maximise(samples: Samples, starts: Sequence[Array], steps: int, most: int) -> tuple[Candidate, Array]:
     """Expectation maximisation from several starts; the most probable end is kept.
 
     Parameters
@@ -62,20 +38,25 @@ def maximise(samples: Samples, starts: Sequence[Array], steps: int, most: int) -
         At most so many from each.
     most : int
         Of more samples than these, every second, third, ... is climbed on; the last step is on all.
+
+    Returns
+    -------
+    candidate : Candidate
+    mixture : ndarray, shape (K + 1,)
+        Share of each spread on the sphere, and of the uniform density.
     """
     thinned = samples[:: -(-len(samples) // most)]
     ends = [_climb(thinned, start, steps) for start in starts]
-    weights, variance, mixture, likelihood = max(ends, key=lambda end: end[3])
+    weights, variance, mixture, _ = max(ends, key=lambda end: end[3])
     model = _Model(samples, samples.predict(weights), variance, mixture)
     parts = [model.posterior(samples.folds == fold) for fold in range(int(samples.folds.max()) + 1)]
     d = samples.actions.shape[1]
-    weights = _sum(parts).weights(d)
+    whole = _sum(parts)
     held_out = np.empty_like(samples.actions)
     for fold in range(len(parts)):
         rest = _sum([part for i, part in enumerate(parts) if i != fold] or parts)
         held_out[samples.folds == fold] = samples[samples.folds == fold].predict(rest.weights(d))
-    candidate = Candidate("likelihood", weights, _sum(parts), held_out, variance)
-    return Fit(weights, variance, mixture, likelihood, candidate)
+    return Candidate("likelihood", whole.weights(d), whole, held_out, variance), mixture
 
 
 def settle(samples: Samples, policy: Array, steps: int = 20) -> tuple[float, Array]:

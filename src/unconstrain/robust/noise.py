@@ -28,6 +28,7 @@ from scipy.stats import chi2
 
 from ..arrays import Array
 from ..moments import Moments
+from ..objectives import standard_risk
 
 __all__ = ["corrected", "correlation_time", "noise_by_differences"]
 
@@ -107,11 +108,10 @@ def corrected(weighted: Moments, plain: Moments, variance: float) -> Moments:
         The matrix ``consistent`` need not be positive: subtracting leaves what the noise was by chance.
     """
     d = plain.cross.shape[1]
-    blocks = np.einsum("mij,kl->mikjl", plain.gram, np.eye(d)).reshape(plain.consistent.shape)
     return Moments(
         weighted.weight - d * variance * plain.weight,
         weighted.energy - 2 * (d + 2) * variance * plain.energy + d * (d + 2) * variance**2 * plain.weight,
         weighted.cross - (d + 2) * variance * plain.cross,
         weighted.gram - d * variance * plain.gram,
-        weighted.consistent - variance * blocks,
+        weighted.consistent - variance * standard_risk(plain).hessian,
     )
