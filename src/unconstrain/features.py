@@ -123,6 +123,33 @@ class NormalisedRBF:
         reach = np.abs(self.centres - origin).max(axis=0) + np.sqrt(self.variance)
         return ClosedForm(origin, weights.T[:, :, None], exponents(self.centres, self.variance, origin), reach)
 
+    def roughness(self) -> Array:
+        """Measure how rough a policy of some weights is, shape (p, p).
+
+        ``wᵀ R w`` is the mean square, over the kernels, of what a weight differs from what its neighbours' weights,
+        continued linearly, would make it. Of a function that is affine in the state it is zero. On a line of kernels
+        these are the second differences of penalised splines [1]_.
+
+        References
+        ----------
+        .. [1] P. H. C. Eilers and B. D. Marx. Flexible smoothing with B-splines and penalties. *Statistical Science*
+           11(2), 1996.
+        """
+        count, n = self.centres.shape
+        squared = squared_distances(self.centres, self.centres)
+        np.fill_diagonal(squared, np.inf)
+        near = np.sort(squared, axis=1)[:, : 2 * n].mean() if count > n + 1 else 0.0
+        if not near > 0.0:
+            return np.zeros((count, count))
+        weights = np.exp(-0.5 * squared / near)  # of kernel j in what is said of kernel i, none of itself
+        apart = (self.centres - self.centres[:, None]) / np.sqrt(near)
+        affine = np.concatenate([np.ones((count, count, 1)), apart], axis=2)
+        weighted = weights[:, None, :] * affine.mT
+        normal = weighted @ affine
+        normal += 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(n + 1)
+        missed = np.eye(count) - np.linalg.solve(normal, weighted)[:, 0]
+        return missed.T @ missed / count
+
     @classmethod
     def grid(
         cls,

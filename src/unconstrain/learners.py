@@ -174,7 +174,7 @@ class Hybrid:
             candidates = softened_minima(inconsistency(training), standard_risk(training), SOFTNESSES)
             # Each round as a share of its own motion: a fast demonstration says no more than a slow one.
             missed.append(inconsistency(held_out)(candidates).sum(axis=0) / max(held_out.energy.sum(), 1e-300))
-        return SOFTNESSES[softest(np.stack(missed))]
+        return SOFTNESSES[within_one_error(np.stack(missed)).max()]
 
     def _path(self, moments: Moments) -> Path:
         consistent, risk = inconsistency(moments), standard_risk(moments)
@@ -185,21 +185,19 @@ class Hybrid:
         return inconsistency(moments) + self.alpha * standard_risk(moments)
 
 
-def softest(missed: Array) -> int:
-    """The softest candidate whose loss is within one standard error of the best.
+def within_one_error(missed: Array) -> NDArray[np.intp]:
+    """Candidates whose loss is within one standard error of the best.
 
     Parameters
     ----------
     missed : ndarray, shape (R, K)
-        Held-out loss in each round, candidates from hard to soft. Errors are of the difference to the best, round
-        by round.
+        Held-out loss of each candidate in each round. Errors are of the difference to the best, round by round.
     """
     best = int(missed.mean(axis=0).argmin())
     if len(missed) < 2:  # and so no standard error
-        return best
+        return np.array([best], dtype=np.intp)
     gap = missed - missed[:, [best]]
-    near = gap.mean(axis=0) <= gap.std(axis=0, ddof=1) / np.sqrt(len(missed))
-    return int(np.flatnonzero(near).max())
+    return np.flatnonzero(gap.mean(axis=0) <= gap.std(axis=0, ddof=1) / np.sqrt(len(missed)))
 
 
 def _inconsistency_path(moments: Moments) -> Path:

@@ -14,10 +14,11 @@ from ..demonstration import Demonstration, stack
 from ..features import NormalisedRBF
 from ..learners import Direct, Hybrid, Inconsistency
 from ..metrics import ncpe, ninconsistency, nupe
-from ..objectives import inconsistency, standard_risk, unvec
+from ..moments import Moments, gather
+from ..objectives import inconsistency, standard_risk, unvec, vec
 from ..policies import LocallyLinearPolicy, ParametricPolicy, Policy
-from ..quadratic import lexicographic_path
-from ..robust import Likelihood, NoiseCorrected, Robust, RobustSolution
+from ..quadratic import Quadratic, lexicographic_path, softened_minima
+from ..robust import Robust, RobustSolution
 from ..rollouts import rollout
 from ..systems.arm import LWR3, JointLimitAvoidance
 from ..systems.limit_cycle import LimitCycle
@@ -41,6 +42,10 @@ DEFAULT = "robust"
 
 PAPER = "hybrid"
 ORACLE = "oracle"
+KNOWN = "constraints known"
+"""What could be learnt if every sample's constraint were known, and a ridge chosen by the truth: a bound for all."""
+
+_SOFTNESSES = tuple(np.logspace(-9, 0, 10).tolist())
 _HELD = {"1": 1, "1-2-3": 3, "half": 3, "1-...-5": 5, "1-...-6": 6}
 _SYSTEMS: dict[str, Callable[[Array], Array]] = {"limit cycle": LimitCycle(), "pendulum": Pendulum()}
 
@@ -106,20 +111,23 @@ def trial(
     for noise in settings.noise:
         noisy = with_noise(training, noise, rng)
         policy = _policy(system).set_params(learner=Robust()).fit_demonstrations(noisy)
-        learners = {
-            "direct": Direct(),
-            "inconsistency": Inconsistency(),
-            PAPER: Hybrid(settings.alpha),
-            "hybrid, auto": Hybrid(alpha="auto"),
-            "noise-corrected": NoiseCorrected(),
-            "likelihood": Likelihood(),
-            DEFAULT: None,
+        learnt = {
+            "direct": policy.with_learner(Direct()),
+            "inconsistency": policy.with_learner(Inconsistency()),
+            PAPER: policy.with_learner(Hybrid(settings.alpha)),
+            "hybrid, auto": policy.with_learner(Hybrid(alpha="auto")),
         }
-        of_noise: dict[str, tuple[float, ...]] = {}
-        for method, learner in learners.items():
-            learnt = policy if learner is None else policy.with_learner(learner)
-            of_noise[method] = (*_errors(learnt, test), *_knowledge(learnt, noisy, test))
+        of_noise: dict[str, tuple[float, ...]] = {
+            method: (*_errors(one, test), np.nan, np.nan) for method, one in learnt.items()
+        }
+        chosen, judged = policy.solution_, learnt["direct"]
+        assert isinstance(chosen, RobustSolution)
+        for method in ("noise-corrected", "likelihood"):  # what the default learner chose from
+            judged.solution_ = replace(chosen, weights=chosen.candidates[method])
+            of_noise[method] = (*_errors(judged, test), np.nan, np.nan)
+        of_noise[DEFAULT] = (*_errors(policy, test), *_knowledge(policy, noisy, test))
         of_noise[ORACLE] = (*_oracle(policy, test, settings.thresholds), np.nan, np.nan)
+        of_noise[KNOWN] = (*_knowing(policy, noisy, test), np.nan, np.nan)
         found.append(of_noise)
     return found
 
@@ -229,8 +237,7 @@ def _errors(policy: Policy, test: Sequence[Demonstration]) -> tuple[float, float
 def _knowledge(policy: Policy, training: Sequence[Demonstration], test: Sequence[Demonstration]) -> tuple[float, float]:
     """How well free samples are told from constrained ones, and how often intervals hold the truth; NaN if unknown."""
     solution = policy.solution_
-    if not isinstance(solution, RobustSolution):
-        return np.nan, np.nan
+    assert isinstance(solution, RobustSolution)
     free = np.concatenate([_is_free(demo) for demo in training])
     states = np.concatenate([demo.states for demo in test])
     truth = np.concatenate([demo.truth.policy for demo in test if demo.truth is not None])
@@ -259,20 +266,63 @@ def _is_free(demo: Demonstration) -> Array:
 
 def _oracle(policy: Policy, test: Sequence[Demonstration], count: int) -> tuple[float, float, float]:
     """The best point of the paper's path, one threshold for all models, chosen by the truth."""
-    folds, centring = policy._folds, policy._centring()
-    whole = folds.whole if centring is None else folds.whole.in_features(centring)
+    whole = _whole(policy)
     path = lexicographic_path(inconsistency(whole), standard_risk(whole))
-    states, truth = stack(test).states, np.concatenate([d.truth.policy for d in test if d.truth is not None])
-    other = policy.with_learner(Direct())
-    best, least, plain = other.solution_, np.inf, other.solution_
-    for threshold in (0.0, *np.logspace(-10, 0, count)):
-        weights = unvec(path.at(path.split(threshold)), whole.cross.shape[1])
-        other.solution_ = replace(plain, weights=weights if centring is None else weights @ centring)
-        missed = float(((other(states) - truth) ** 2).sum())
+    return _best(policy, test, [path.at(path.split(threshold)) for threshold in (0.0, *np.logspace(-10, 0, count))])
+
+
+def _knowing(
+    policy: Policy, training: Sequence[Demonstration], test: Sequence[Demonstration]
+) -> tuple[float, float, float]:
+    """The constrained error minimised with the true projections, beside as much of the risk as the truth says."""
+    N = np.concatenate([demo.truth.projections for demo in training if demo.truth is not None])
+    states, actions, _ = stack(training)
+    features, centring, d = policy._features(states), policy._centring(), actions.shape[1]
+    in_models = policy._weights(states)
+    members = np.ones((len(states), 1)) if in_models is None else in_models
+
+    def along(direction: Array) -> Moments:
+        """Moments with what is observed along one direction, each sample as far as its constraint leaves it."""
+        weights = np.einsum("a,nab,b->n", direction, N, direction)
+        moments = gather(features, np.ones((len(states), 1)), np.maximum(weights, 0.0)[:, None] * members)
+        return moments if centring is None else moments.in_features(centring)
+
+    axes = np.eye(d)
+    alone = [along(axis).gram for axis in axes]
+    p = features.shape[1]
+    hessian = np.zeros((members.shape[1], p, d, p, d))
+    for a in range(d):
+        hessian[:, :, a, :, a] = alone[a]
+        for b in range(a):  # weights must not be negative, and eᵀ N e is not
+            mixed = 0.5 * (along(axes[a] + axes[b]).gram - alone[a] - alone[b])
+            hessian[:, :, a, :, b] = hessian[:, :, b, :, a] = mixed
+    whole, seen = _whole(policy), gather(features, np.einsum("nab,nb->na", N, actions), members)
+    linear = vec((seen if centring is None else seen.in_features(centring)).cross)
+    error = Quadratic(hessian.reshape(-1, p * d, p * d), linear, whole.energy)
+    minima = softened_minima(error, standard_risk(whole), _SOFTNESSES)
+    return _best(policy, test, [minima[..., k] for k in range(len(_SOFTNESSES))])
+
+
+def _whole(policy: Policy) -> Moments:
+    folds, centring = policy._folds, policy._centring()
+    return folds.whole if centring is None else folds.whole.in_features(centring)
+
+
+def _best(policy: Policy, test: Sequence[Demonstration], found: Sequence[Array]) -> tuple[float, float, float]:
+    """Errors of the weights (M, P), over ``T_m φ``, that are nearest to the truth."""
+    centring, d = policy._centring(), policy.n_outputs_
+    states, truth = stack(test).states, np.concatenate([demo.truth.policy for demo in test if demo.truth is not None])
+    judged = policy.with_learner(Direct())
+    plain = best = judged.solution_
+    least = np.inf
+    for each in found:
+        weights = unvec(each, d)
+        judged.solution_ = replace(plain, weights=weights if centring is None else weights @ centring)
+        missed = float(((judged(states) - truth) ** 2).sum())
         if missed < least:
-            best, least = other.solution_, missed
-    other.solution_ = best
-    return _errors(other, test)
+            best, least = judged.solution_, missed
+    judged.solution_ = best
+    return _errors(judged, test)
 
 
 def _policy(system: str) -> Policy:

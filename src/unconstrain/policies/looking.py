@@ -46,6 +46,10 @@ class Looking:
     def _centring(self) -> Array | None:
         """T_m, shape (M, p, p), with which model m is solved in features ``T_m φ``; None for φ itself."""
 
+    def _roughness(self) -> Array | None:
+        """Measure of how rough each model is, shape (M, p, p); None where nothing is said of it."""
+        return None
+
     @abstractmethod
     def _learner(self) -> Learner | SampleLearner:
         """The learner in use."""
@@ -105,7 +109,7 @@ class Looking:
         dealt = np.concatenate([self._splitter.assign(on_host(block.states), block.groups) for block in blocks])
         named = [None if b.groups is None else np.asarray(b.groups) for b in blocks]
         groups = np.zeros(len(states)) if any(n is None for n in named) else np.concatenate(named)  # type: ignore[arg-type]
-        centring, p = self._centring(), self._folds.parts[0].gram.shape[-1]
+        centring, rough, p = self._centring(), self._roughness(), self._folds.parts[0].gram.shape[-1]
         alone = np.ones((len(states), 1))
         weights, shares = self._weights(states), self._shares(states)
         return Samples(
@@ -117,4 +121,5 @@ class Looking:
             np.unique(groups, return_inverse=True)[1],
             np.unique(dealt, return_inverse=True)[1],
             np.eye(p)[None] if centring is None else centring,
+            np.zeros((weights.shape[1] if weights is not None else 1, p, p)) if rough is None else rough,
         )

@@ -74,6 +74,10 @@ class ParametricPolicy(Policy):
     def _centring(self) -> None:
         return None
 
+    def _roughness(self) -> Array | None:
+        measure = getattr(self.features_, "roughness", None)
+        return None if measure is None else measure()[None]
+
     def _closed_form(self) -> ClosedForm | None:
         closed = getattr(self.features_, "closed_form", None)
         return None if closed is None else closed(self.solution_.weights[0])

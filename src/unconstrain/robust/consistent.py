@@ -9,15 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
-from ..learners import Hybrid
+from ..learners import SOFTNESSES, Hybrid, within_one_error
 from ..moments import Moments, total
-from ..objectives import inconsistency, standard_risk, vec
-from ..quadratic import NOISE, Quadratic, eigensystem
+from ..objectives import inconsistency, standard_risk, unvec, vec
+from ..quadratic import NOISE, Quadratic, eigensystem, softened_minima
 from ..validation import FoldedMoments
+from .candidate import Candidate
 from .noise import corrected, correlation_time, noise_by_differences
-from .posterior import Candidate, Posterior, scaled, unit_information
+from .posterior import Posterior, scaled, unit_information
 from .samples import Samples
 from .segments import constrained_error
+from .smoothness import Smoothness
 from .sphere import distances
 
 __all__ = ["by_segments", "noise_corrected", "softened"]
@@ -38,25 +40,47 @@ def noise_corrected(samples: Samples, noise: float | None = None) -> Candidate:
     parts = samples.by_fold()
     weighted = [part.moments(part.actions, (part.actions**2).sum(axis=1)) for part in parts]
     plain = [part.moments(part.actions, np.ones(len(part))) for part in parts]
-    d = samples.actions.shape[1]
+    d, smoothness, time = samples.actions.shape[1], Smoothness.of(samples), 1.0
     most, variance = noise_by_differences(samples.actions, samples.groups), 0.0 if noise is None else noise**2
     for _ in range(_ROUNDS):
         used = variance
         whole = _Corrected(total(weighted), total(plain), used, samples.sizes)
-        softness = whole.softness()
-        weights = whole.posterior(softness).weights(d)
-        policy = samples.predict(weights)
+        softness, smoothness, unit = whole.balanced(smoothness, time)
+        policy = samples.predict(whole.posterior(softness, smoothness.prior(unit)).weights(d))
+        time = correlation_time(_residuals(samples, policy, used)[:, None], samples.groups)
         if noise is None:
             variance = min(most, _mean(samples, distances(samples.actions, policy).radial ** 2))
-    held_out = np.empty_like(policy)
+    smooth, held_out, missed = smoothness.prior(unit), [], []
     for fold, part in enumerate(parts):
         others = [i for i in range(len(parts)) if i != fold] or [fold]
         rest = _Corrected(total(weighted[i] for i in others), total(plain[i] for i in others), used, samples.sizes)
-        held_out[samples.folds == fold] = part.predict(rest.posterior(softness).weights(d))
-    residuals = (samples.actions * (samples.actions - policy)).sum(axis=1) - d * used
-    time = correlation_time(residuals[:, None], samples.groups)
-    posterior = whole.posterior(softness)
-    return Candidate("noise-corrected", weights, _per(posterior, time * whole.residual(weights)), held_out, variance)
+        found = softened_minima(rest.consistent + smooth, rest.risk, SOFTNESSES)
+        held_out.append(np.stack([part.predict(unvec(found[..., k], d)) for k in range(len(SOFTNESSES))]))
+        missed.append([part.counts @ _residuals(part, one, used) ** 2 / part.counts.sum() for one in held_out[-1]])
+    chosen = _within_one_error(np.array(missed), float(np.median(softness)))
+    posterior = Posterior(whole.consistent, SOFTNESSES[chosen] * whole.risk + smooth)
+    weights = posterior.weights(d)
+    predicted = np.empty_like(policy)
+    for fold, one in enumerate(held_out):
+        predicted[samples.folds == fold] = one[chosen]
+    of_noise, residual = whole.noise(weights), whole.residual(weights)
+    unit = time * of_noise + _repeats(time, samples) * (residual - of_noise)
+    return Candidate("noise-corrected", weights, _per(posterior, unit), predicted, variance, smoothness)
+
+
+def _residuals(samples: Samples, policy: Array, variance: float) -> Array:
+    """ρ of each sample."""
+    missed = (samples.actions * (samples.actions - policy)).sum(axis=1)
+    return np.asarray(missed - samples.actions.shape[1] * variance)
+
+
+def _within_one_error(missed: Array, softness: float) -> int:
+    """The candidate nearest to a softness of those whose held-out loss (R, K) is within one standard error of the best.
+
+    Errors are of the difference to the best, round by round: what held-out data cannot tell apart, the prior decides.
+    """
+    near = within_one_error(missed)
+    return int(near[np.abs(np.log(SOFTNESSES) - np.log(softness))[near].argmin()])
 
 
 def softened(samples: Samples, folds: FoldedMoments) -> Candidate:
@@ -76,8 +100,8 @@ def softened(samples: Samples, folds: FoldedMoments) -> Candidate:
     radial = distances(samples.actions, samples.predict(weights)).radial
     sizes = np.maximum(whole.weight, np.finfo(float).tiny)
     residual = np.maximum(inconsistency(whole)(vec(weights)), 1e-12 * whole.energy) / sizes
-    time = correlation_time(radial[:, None], samples.groups)
-    return Candidate("hybrid", weights, _per(posterior(whole), time * residual), held_out, _mean(samples, radial**2))
+    repeats = _repeats(correlation_time(radial[:, None], samples.groups), samples)
+    return Candidate("hybrid", weights, _per(posterior(whole), repeats * residual), held_out, _mean(samples, radial**2))
 
 
 def by_segments(samples: Samples, labels: NDArray[np.intp], noise: float) -> Candidate:
@@ -125,27 +149,40 @@ class _Corrected:
         self.risk = standard_risk(moments)
         self.consistent = _certain(inconsistency(moments), self.plain.hessian, variance, sizes)
 
-    def posterior(self, softness: Array) -> Posterior:
-        return Posterior(self.consistent, scaled(self.risk, softness))
+    def posterior(self, softness: Array, smooth: Quadratic) -> Posterior:
+        return Posterior(self.consistent, scaled(self.risk, softness) + smooth)
 
-    def softness(self) -> Array:
-        """Variance along each action over that across it, by as much as a prior counts, found in a few steps."""
+    def balanced(self, smoothness: Smoothness, time: float) -> tuple[Array, Smoothness, Array]:
+        """Softness, smoothness, and the variance of an independent residual, (M,), found in a few steps.
+
+        The softness is the variance along each action over that across it, by as much as a prior counts.
+        """
         worth = unit_information(self.risk.linear.shape[1], self.sizes)
-        softness = np.full(len(worth), 1e-2)
+        softness, unit = np.full(len(worth), 1e-2), np.zeros(len(worth))
         for _ in range(_STEPS):
-            weights = vec(self.posterior(softness).weights(self.d))
-            along = self.consistent(weights) + self.expected
-            both = self.risk(weights) + self.expected
+            posterior = self.posterior(softness, smoothness.prior(unit))
+            weights = posterior.weights(self.d)
+            along = self.consistent(vec(weights)) + self.expected
+            both = self.risk(vec(weights)) + self.expected
             across = np.maximum((both - along) / max(self.d - 1, 1), 1e-3 * both)
             softness = np.clip(worth * along / np.where(across > 0, across, 1.0), 1e-8, 1.0)
-        return softness
+            noise, residual = self.noise(weights), self.residual(weights)
+            unit = time * residual
+            smoothness = smoothness.updated(weights, posterior, noise / residual, unit)
+        return softness, smoothness, unit
+
+    def noise(self, weights: Array) -> Array:
+        """Mean square of ρ that noise alone would leave, shape (M,)."""
+        flat = vec(weights)
+        squares = np.einsum("mi,mij,mj->m", flat, self.plain.hessian, flat)  # Σ ‖π‖²
+        noise = self.variance * squares + 2 * self.d * self.variance**2 * self.count
+        return noise / np.maximum(self.sizes, 1e-300)
 
     def residual(self, weights: Array) -> Array:
         """Mean square of ρ, shape (M,)."""
-        flat, energy = vec(weights), np.abs(self.consistent.constant)
-        squares = np.einsum("mi,mij,mj->m", flat, self.plain.hessian, flat)  # Σ ‖π‖²
-        noise = self.variance * squares + 2 * self.d * self.variance**2 * self.count
-        return np.maximum(self.consistent(flat) + noise, 1e-12 * energy) / np.maximum(self.sizes, 1e-300)
+        missed = self.consistent(vec(weights)) / np.maximum(self.sizes, 1e-300)
+        least = 1e-12 * np.abs(self.consistent.constant) / np.maximum(self.sizes, 1e-300)
+        return np.maximum(missed + self.noise(weights), np.maximum(least, 1e-300))
 
 
 def _certain(objective: Quadratic, gram: Array, variance: float, sizes: Array) -> Quadratic:
@@ -160,6 +197,15 @@ def _certain(objective: Quadratic, gram: Array, variance: float, sizes: Array) -
         np.einsum("mij,mj->mi", vectors, linear),
         objective.constant,
     )
+
+
+def _repeats(time: float, samples: Samples) -> Array:
+    """How many samples say as much as an independent one of what the model misses, shape (M,).
+
+    That is a function of the state of about as many degrees of freedom as the model has: so many are independent,
+    however many samples there are.
+    """
+    return np.maximum(time, samples.sizes / (samples.actions.shape[1] * samples.features.shape[1]))
 
 
 def _per(posterior: Posterior, variance: Array) -> Posterior:

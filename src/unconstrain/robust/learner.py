@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,10 +14,11 @@ from ..objectives import inconsistency, vec
 from ..projection import unit_actions
 from ..quadratic import Quadratic
 from ..validation import FoldedMoments
+from .candidate import Candidate
 from .consistent import by_segments, noise_corrected, softened
 from .likelihood import MISFIT, free_probability, maximise, settle
 from .noise import noise_by_differences
-from .posterior import Candidate, Posterior, RobustSolution, scaled, unit_information
+from .posterior import Posterior, RobustSolution, scaled, unit_information
 from .samples import Samples
 from .segments import found_segments
 
@@ -29,8 +30,14 @@ NOISY = 0.015
 INFORMED = 0.05
 """Where of fewer samples than this share more is known than that they are on their spheres, nothing is added by it."""
 
-WORSE = 1.35
-"""By which factor the inconsistency has to be larger to count."""
+WORSE = 2.1
+"""By which factor the inconsistency of the likelihood has to be larger to refute it, if it knows half of the samples.
+
+It fits more than the inconsistency, and may be the worse in that for it; the less else it knows, the less.
+"""
+
+TOO_SOFT = 1.5
+"""The same for the hybrid's, against that of samples weighted by their speed."""
 
 NEGLIGIBLE = 0.05
 """Share of the actions' size that may be missed without counting, when policies are compared."""
@@ -49,6 +56,13 @@ class _Climbing:
     def __post_init__(self) -> None:
         check_at_least("steps", self.steps, 1, whole=True)
         check_at_least("most", self.most, 1, whole=True)
+
+    def _climbed(
+        self, samples: Samples, folds: FoldedMoments, corrected: Candidate, consistent: Candidate
+    ) -> tuple[Candidate, Array]:
+        """The most probable policy, from the consistent one and from what was observed."""
+        starts = [consistent.weights, Direct().solve(folds).weights]
+        return maximise(samples, starts, corrected.smoothness, self.steps, self.most)
 
 
 @dataclass(frozen=True)
@@ -71,9 +85,8 @@ class Likelihood(_Climbing):
         """Learn from samples; ``folds`` are their moments."""
         if _trivial(samples):
             return _plain(samples, folds)
-        starts = [softened(samples, folds).weights, Direct().solve(folds).weights]
-        likely, _ = maximise(samples, starts, self.steps, self.most)
-        return _solution(samples, likely, {})
+        corrected, consistent = _consistent(samples, folds)
+        return _solution(samples, self._climbed(samples, folds, corrected, consistent)[0])
 
 
 @dataclass(frozen=True)
@@ -100,7 +113,7 @@ class NoiseCorrected:
         """Learn from samples; ``folds`` are their moments."""
         if _trivial(samples):
             return _plain(samples, folds)
-        return _solution(samples, noise_corrected(samples, self.noise), {})
+        return _solution(samples, noise_corrected(samples, self.noise))
 
 
 @dataclass(frozen=True)
@@ -137,7 +150,7 @@ class Segments:
         if by_group and samples.groups.max() == 0:
             raise SettingError("labels: 'groups' needs groups=, one name for each demonstration, at least two.")
         labels = samples.groups if by_group else found_segments(samples.actions, samples.groups, noise)
-        return _solution(samples, by_segments(samples, labels, noise), {})
+        return _solution(samples, by_segments(samples, labels, noise))
 
 
 @dataclass(frozen=True)
@@ -149,8 +162,8 @@ class Robust(_Climbing):
     not, and the most probable one (:class:`Likelihood`). The likelihood's is
     taken unless noise hides the sphere, or it knows no more of next to any
     sample than that it is on its sphere, or its inconsistency on samples held
-    out is above the other's, by a third and by more than one
-    standard error: then constraints do not vary as it supposes.
+    out is too far above that on noise-corrected moments: then constraints do
+    not vary as it supposes.
 
     Needs the samples, not only their moments, and keeps those it has seen.
 
@@ -164,16 +177,36 @@ class Robust(_Climbing):
         """Learn from samples; ``folds`` are their moments."""
         if _trivial(samples):
             return _plain(samples, folds)
-        consistent = noise_corrected(samples)
-        if not _more_than(NOISY, consistent.variance, samples):
-            consistent = softened(samples, folds)
-        starts = [consistent.weights, Direct().solve(folds).weights]
-        likely, mixture = maximise(samples, starts, self.steps, self.most)
+        corrected, consistent = _consistent(samples, folds)
+        likely, mixture = self._climbed(samples, folds, corrected, consistent)
+        learnt = {one.name: one for one in (corrected, consistent, likely)}
+        gaps = {
+            name: compared(samples, one.held_out, corrected.held_out, corrected.variance)
+            for name, one in learnt.items()
+        }
+        if _refuted(*gaps[consistent.name], TOO_SOFT):
+            consistent = corrected
         informed = 1.0 - float(mixture[-1])
-        apart, error = compared(samples, likely.held_out, consistent.held_out, consistent.variance)
-        refuted = apart > max(np.log(WORSE), error)
+        refuted = _refuted(*gaps[likely.name], WORSE ** min(1.0, 2.0 * informed))
         usable = informed > INFORMED and not refuted and not _more_than(HIDDEN, likely.variance, samples)
-        return _solution(samples, likely if usable else consistent, {likely.name: apart, consistent.name: 0.0})
+        return _solution(
+            samples,
+            likely if usable else consistent,
+            compared={name: gap for name, (gap, _) in gaps.items()},
+            candidates={name: one.weights @ samples.centring for name, one in learnt.items()},
+        )
+
+
+def _consistent(samples: Samples, folds: FoldedMoments) -> tuple[Candidate, Candidate]:
+    """On noise-corrected moments, and what is better for a start: that if there is noise, else the softened hybrid."""
+    corrected = noise_corrected(samples)
+    noisy = _more_than(NOISY, corrected.variance, samples)
+    return corrected, corrected if noisy else softened(samples, folds)
+
+
+def _refuted(gap: float, error: float, factor: float) -> bool:
+    """Whether an inconsistency is larger by a factor, and by more than a standard error."""
+    return gap > max(np.log(factor), error)
 
 
 def compared(samples: Samples, one: Array, other: Array, variance: float) -> tuple[float, float]:
@@ -194,13 +227,14 @@ def compared(samples: Samples, one: Array, other: Array, variance: float) -> tup
     return float(np.median(gap)), float(gap.std(ddof=1) / np.sqrt(len(gap)))
 
 
-def _solution(samples: Samples, chosen: Candidate, gaps: dict[str, float]) -> RobustSolution:
+def _solution(samples: Samples, chosen: Candidate, **more: Any) -> RobustSolution:
     policy = samples.predict(chosen.weights)
     variance, mixture = settle(samples, policy)
     free = free_probability(samples, policy, variance, mixture)
     models, d, p = chosen.weights.shape
     belief = _belief(samples, chosen.posterior.evidence)
     from_noise, undetermined = belief.spreads()
+    undetermined = undetermined + _moved(chosen, belief)
     return RobustSolution(
         chosen.weights @ samples.centring,
         belief.determined(),
@@ -214,7 +248,7 @@ def _solution(samples: Samples, chosen: Candidate, gaps: dict[str, float]) -> Ro
         from_noise=from_noise,
         undetermined=undetermined,
         held_out_score=_explained(samples, chosen.held_out),
-        compared=gaps,
+        **more,
     )
 
 
@@ -223,6 +257,13 @@ def _belief(samples: Samples, evidence: Quadratic) -> Posterior:
     d, p = samples.actions.shape[1], samples.features.shape[1]
     vague = samples.risk(samples.actions, np.full(len(samples), d / max(samples.energy, 1e-300)))
     return Posterior(evidence, scaled(vague, unit_information(p, samples.sizes)))
+
+
+def _moved(chosen: Candidate, belief: Posterior) -> Array:
+    """How far the weights would move under the weaker prior of the belief, as a covariance, shape (M, P, P)."""
+    prior = belief.prior if chosen.smoothness is None else belief.prior + chosen.smoothness.prior()
+    apart = vec(chosen.weights) - vec(Posterior(belief.evidence, prior).weights(chosen.weights.shape[1]))
+    return np.asarray(apart[:, :, None] * apart[:, None, :])
 
 
 def _misfit(samples: Samples, variance: float) -> float:

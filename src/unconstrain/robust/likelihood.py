@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
 from ..objectives import inconsistency
-from .noise import correlation_time
-from .posterior import Candidate, Posterior, scaled, unit_information
+from .candidate import Candidate
+from .noise import correlation_time, noise_by_differences
+from .posterior import Posterior, scaled, unit_information
 from .samples import Samples
+from .smoothness import Smoothness
 from .sphere import SPREADS, Beliefs, Distances, beliefs, distances
 
 __all__ = ["free_probability", "maximise", "settle"]
@@ -27,13 +30,18 @@ _POOLED = 10.0
 """Samples that the data as a whole counts for, beside a demonstration's own, in how free it was."""
 
 
-def maximise(samples: Samples, starts: Sequence[Array], steps: int, most: int) -> tuple[Candidate, Array]:
+def maximise(
+    samples: Samples, starts: Sequence[Array], smoothness: Smoothness | None, steps: int, most: int
+) -> tuple[Candidate, Array]:
     """Expectation maximisation from several starts; the most probable end is kept.
 
     Parameters
     ----------
     samples : Samples
     starts : sequence of ndarray, shape (M, d, p)
+        Another end than the first one's is kept only if it is clearly more probable.
+    smoothness : Smoothness, optional
+        To begin with.
     steps : int
         At most so many from each.
     most : int
@@ -45,10 +53,13 @@ def maximise(samples: Samples, starts: Sequence[Array], steps: int, most: int) -
     mixture : ndarray, shape (K + 1,)
         Share of each spread on the sphere, and of the uniform density.
     """
-    thinned = samples[:: -(-len(samples) // most)]
-    ends = [_climb(thinned, start, steps) for start in starts]
-    weights, variance, mixture, _ = max(ends, key=lambda end: end[3])
-    model = _Model(samples, samples.predict(weights), variance, mixture)
+    thinned, noise = samples[:: -(-len(samples) // most)], noise_by_differences(samples.actions, samples.groups)
+    ends = [_climb(thinned, start, smoothness or Smoothness.of(samples), steps, noise) for start in starts]
+    best = ends[0]
+    for end in ends[1:]:
+        if _clearly_more(thinned, end.likelihood - best.likelihood):
+            best = end
+    model = _Model(samples, samples.predict(best.weights), best.variance, best.mixture, best.smoothness)
     parts = [model.posterior(samples.folds == fold) for fold in range(int(samples.folds.max()) + 1)]
     d = samples.actions.shape[1]
     whole = _sum(parts)
@@ -56,7 +67,7 @@ def maximise(samples: Samples, starts: Sequence[Array], steps: int, most: int) -
     for fold in range(len(parts)):
         rest = _sum([part for i, part in enumerate(parts) if i != fold] or parts)
         held_out[samples.folds == fold] = samples[samples.folds == fold].predict(rest.weights(d))
-    return Candidate("likelihood", whole.weights(d), whole, held_out, variance), mixture
+    return Candidate("likelihood", whole.weights(d), whole, held_out, best.variance, best.smoothness), best.mixture
 
 
 def settle(samples: Samples, policy: Array, steps: int = 20) -> tuple[float, Array]:
@@ -65,7 +76,8 @@ def settle(samples: Samples, policy: Array, steps: int = 20) -> tuple[float, Arr
     place = distances(samples.actions, policy)
     for _ in range(steps):
         found = beliefs(samples.actions, policy, place, variance, mixture)
-        variance, mixture = _updated(samples, policy, place, found)
+        missed, mixture = _updated(samples, policy, place, found)
+        variance = _trusted(samples, missed)
     return variance, mixture
 
 
@@ -90,38 +102,70 @@ def free_probability(samples: Samples, policy: Array, variance: float, mixture: 
 def _begin(samples: Samples, policy: Array) -> tuple[float, Array]:
     radial = distances(samples.actions, policy).radial
     count = len(SPREADS) + 1
-    return max(float(np.median(radial**2)) / 0.455, MISFIT**2 * samples.energy), np.full(count, 1.0 / count)
+    return _trusted(samples, float(np.median(radial**2)) / 0.455), np.full(count, 1.0 / count)
+
+
+def _trusted(samples: Samples, variance: float) -> float:
+    """Not below what no model is right to."""
+    return max(variance, MISFIT**2 * samples.energy)
 
 
 def _updated(samples: Samples, policy: Array, place: Distances, found: Beliefs) -> tuple[float, Array]:
-    """Noise variance and mixture, given what is thought of each sample."""
+    """Variance of what is missed, and mixture, given what is thought of each sample."""
     counts, free, d = samples.counts, found.free, samples.actions.shape[1]
     missed = (1.0 - free) * place.radial**2 + free * ((samples.actions - policy) ** 2).sum(axis=1)
-    variance = float(counts @ missed / (counts @ (1.0 - free + d * free)))
-    return max(variance, MISFIT**2 * samples.energy), counts @ found.shares / counts.sum()
+    return float(counts @ missed / (counts @ (1.0 - free + d * free))), counts @ found.shares / counts.sum()
 
 
-def _climb(samples: Samples, weights: Array, steps: int) -> tuple[Array, float, Array, float]:
-    """One run of expectation maximisation: weights, σ², mixture and mean log-likelihood."""
+class _End(NamedTuple):
+    """Where a climb ended: weights, σ² and mixture, how much smoothness counts, and each sample's log-likelihood."""
+
+    weights: Array
+    variance: float
+    mixture: Array
+    smoothness: Smoothness
+    likelihood: Array
+
+
+def _climb(samples: Samples, weights: Array, smoothness: Smoothness, steps: int, noise: float) -> _End:
+    """One run of expectation maximisation; ``noise`` is the variance of what does not go on from sample to sample."""
     policy, last = samples.predict(weights), -np.inf
     variance, mixture = _begin(samples, policy)
     for step in range(steps):
-        model = _Model(samples, policy, variance, mixture)
-        variance, mixture = _updated(samples, policy, model.place, model.found)
+        model = _Model(samples, policy, variance, mixture, smoothness)
+        missed, mixture = _updated(samples, policy, model.place, model.found)
+        variance = _trusted(samples, missed)
         likelihood = float(samples.counts @ model.found.likelihood / samples.counts.sum())
-        weights = model.posterior(variance=variance).weights(samples.actions.shape[1])
+        posterior = model.posterior(variance=variance)
+        weights = posterior.weights(samples.actions.shape[1])
+        smoothness = smoothness.updated(weights, posterior, min(1.0, noise / variance, missed / variance))
         policy = samples.predict(weights)
         if step >= _AT_LEAST and abs(likelihood - last) < _GAIN * samples.actions.shape[1]:
             break
         last = likelihood
-    return weights, variance, mixture, last
+    return _End(weights, variance, mixture, smoothness, model.found.likelihood)
+
+
+def _clearly_more(samples: Samples, gain: Array) -> bool:
+    """Whether the gain of each sample is above zero by a standard error: one demonstration must not decide."""
+    size = np.bincount(samples.folds, samples.counts)
+    by_fold = np.bincount(samples.folds, samples.counts * gain)[size > 0] / size.mean()
+    return bool(by_fold.mean() > by_fold.std(ddof=1) / np.sqrt(len(by_fold)))
 
 
 class _Model:
     """The quadratic that stands for the likelihood near a policy (Gauss–Newton), as evidence and prior."""
 
-    def __init__(self, samples: Samples, policy: Array, variance: float, mixture: Array) -> None:
+    def __init__(
+        self,
+        samples: Samples,
+        policy: Array,
+        variance: float,
+        mixture: Array,
+        smoothness: Smoothness,
+    ) -> None:
         self.samples, self.policy, self.variance = samples, policy, variance
+        self.smoothness = smoothness
         self.place = distances(samples.actions, policy)
         self.found = beliefs(samples.actions, policy, self.place, variance, mixture)
 
@@ -145,8 +189,10 @@ class _Model:
         some = samples if rows is None else samples[rows]
         evidence = inconsistency(some.moments(target[part, None] * normal[part], radial[part]))
         evidence = evidence + some.risk(points[part], (turned + held)[part])
-        prior = some.risk(samples.actions[part], np.full(len(some), 1.0 / (spread * along)))
-        return Posterior(evidence, scaled(prior, worth))
+        risk = some.risk(samples.actions[part], np.full(len(some), 1.0 / (spread * along)))
+        counted = float(some.counts.sum() / samples.counts.sum())
+        smooth = self.smoothness.prior(counted)
+        return Posterior(evidence, scaled(risk, worth) + smooth)
 
     def _prior(self) -> tuple[float, Array]:
         """Mean square of what constraints took in each coordinate, and what the risk is worth beside it."""

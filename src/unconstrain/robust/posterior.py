@@ -12,7 +12,7 @@ from ..learners import Solution
 from ..objectives import unvec
 from ..quadratic import SECONDARY_NOISE, Quadratic, eigensystem, minimum
 
-__all__ = ["Candidate", "Posterior", "RobustSolution", "scaled", "unit_information"]
+__all__ = ["Posterior", "RobustSolution", "scaled", "unit_information"]
 
 
 def unit_information(weights: int, sizes: Array) -> Array:
@@ -76,29 +76,6 @@ class Posterior:
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
-    """A policy to choose from.
-
-    Parameters
-    ----------
-    name : str
-        How it was learnt.
-    weights : ndarray, shape (M, d, p)
-    posterior : Posterior
-    held_out : ndarray, shape (N, d)
-        Prediction of each sample by what is learnt from the other folds.
-    variance : float
-        Of the noise, per coordinate, misfit included.
-    """
-
-    name: str
-    weights: Array
-    posterior: Posterior
-    held_out: Array
-    variance: float
-
-
-@dataclass(frozen=True, eq=False)
 class RobustSolution(Solution):
     """What a learner found that looks at the samples.
 
@@ -120,7 +97,9 @@ class RobustSolution(Solution):
     held_out_score : float
         Share of the observed motion that is explained where it is held out, as by ``Policy.score``.
     compared : dict
-        Logarithm of each candidate's held-out inconsistency over that of the consistent one.
+        Logarithm of each candidate's held-out inconsistency over that on noise-corrected moments.
+    candidates : dict
+        Weights (M, d, p) of everything that was learnt to choose from, by name.
     """
 
     method: str = ""
@@ -132,3 +111,4 @@ class RobustSolution(Solution):
     undetermined: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     held_out_score: float = float("nan")
     compared: dict[str, float] = field(default_factory=dict)
+    candidates: dict[str, Array] = field(default_factory=dict)

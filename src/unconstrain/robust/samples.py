@@ -37,6 +37,8 @@ class Samples:
         What is held out together, from 0; every number up to the largest occurs.
     centring : ndarray, shape (M, p, p)
         T_m, with which model m is solved in features ``T_m φ``, for the sake of rounding.
+    roughness : ndarray, shape (M, p, p)
+        Measures how rough each model's policy is, over ``T_m φ``; zero where nothing is said of it.
     """
 
     features: Array
@@ -47,6 +49,7 @@ class Samples:
     groups: NDArray[np.intp]
     folds: NDArray[np.intp]
     centring: Array
+    roughness: Array
 
     def __len__(self) -> int:
         """Number of samples N."""
