@@ -88,3 +88,18 @@ def locally_linear(states, centres, variance, matrices):
         local = [B @ np.append((x - c) / np.sqrt(variance), 1.0) for B, c in zip(matrices, centres, strict=True)]
         predicted.append(sum(s * u for s, u in zip(shares, local, strict=True)) / sum(shares))
     return np.array(predicted)
+
+
+def roughness(centres, values):
+    """Mean square, over kernels, of a weight less what a line through its neighbours' weights says there."""
+    count, n = centres.shape
+    squared = ((centres[:, None] - centres[None]) ** 2).sum(axis=2)
+    near = np.mean([distance for i in range(count) for distance in sorted(np.delete(squared[i], i))[: 2 * n]])
+    missed = 0.0
+    for i in range(count):
+        others = [j for j in range(count) if j != i]
+        root = np.exp(-0.25 * squared[i, others] / near)
+        line = np.column_stack([np.ones(count - 1), centres[others] - centres[i]])
+        fitted = np.linalg.lstsq(root[:, None] * line, root * values[others], rcond=None)[0]
+        missed += (values[i] - fitted[0]) ** 2
+    return missed / count

@@ -237,3 +237,30 @@ def test_there_is_at_most_one_centre_for_each_four_states(samples, centres):
 def test_settings_of_k_means_are_checked(arguments, sentence):
     with pytest.raises(SettingError, match=sentence):
         NormalisedRBF.kmeans(states(), **({"count": 3} | arguments))
+
+
+# Roughness
+
+
+@pytest.mark.parametrize("centres", [states(3, 12), NormalisedRBF.grid(-1, 2, 5).centres, states(4, 9, n=3)])
+def test_roughness_is_what_neighbours_do_not_say(centres):
+    values = np.random.default_rng(0).standard_normal(len(centres))
+    measure = NormalisedRBF(centres, 0.3).roughness()
+    assert_allclose(values @ measure @ values, naive.roughness(centres, values), rtol=1e-3)
+    assert_allclose(measure, measure.T, atol=1e-12)
+
+
+@given(seeds, st.sampled_from([1e-6, 1.0, 1e6]))
+def test_of_affine_functions_there_is_none_whatever_the_unit(seed, unit):
+    centres = unit * states(seed, 15)
+    measure = NormalisedRBF(centres, unit**2).roughness()
+    affine = centres @ [0.7, -1.3] / unit + 0.4
+    bent = (centres[:, 0] / unit) ** 2
+    assert affine @ measure @ affine < 1e-8
+    assert bent @ measure @ bent > 1e-5
+    assert_allclose(measure, NormalisedRBF(centres / unit, 1.0).roughness(), rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("centres", [states(0, 1), states(0, 3), np.zeros((6, 2))])
+def test_so_few_kernels_are_never_rough(centres):
+    assert_array_equal(NormalisedRBF(centres, 1.0).roughness(), np.zeros((len(centres), len(centres))))

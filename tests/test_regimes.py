@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import unconstrain as uc
 from test_report import References, browser, opened  # noqa: F401 - a fixture
 from unconstrain import report
 from unconstrain.experiments import regimes
@@ -56,6 +57,18 @@ def test_only_where_some_samples_are_free_and_some_not_are_they_told_apart(resul
         assert (row["auc_mean"] is not None) == (tells and row["constraint"] == "half")
         assert row["auc_mean"] is None or 0.0 <= row["auc_mean"] <= 1.0
         assert row["coverage_mean"] is None or (tells and 0.0 <= row["coverage_mean"] <= 1.0)
+
+
+def test_with_known_constraints_linear_policies_are_recovered():
+    rng, turn = np.random.default_rng(5), np.array([[-0.3, 1.0], [-1.0, -0.3]])
+    demos = []
+    for _ in range(6):
+        lines = uc.constraints.SwitchingLine.random(rng, 1.0, 2)
+        demos += uc.rollout(lambda states: states @ turn.T, rng.uniform(-1, 1, (1, 2)), 30, 0.03, [lines])
+    for policy in (uc.ParametricPolicy(uc.Affine()), uc.LocallyLinearPolicy(1.0)):
+        policy.fit_demonstrations(demos)
+        assert regimes._knowing(policy, demos, demos)[0] < 1e-10
+        assert uc.nupe(policy.with_learner(uc.Direct()), demos) > 0.01
 
 
 def test_noise_is_a_share_of_the_policys_spread():

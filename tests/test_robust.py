@@ -17,10 +17,12 @@ from unconstrain.learners import SOFTNESSES, within_one_error
 from unconstrain.moments import gather
 from unconstrain.objectives import inconsistency, standard_risk, vec
 from unconstrain.quadratic import Quadratic, minimum, softened_minima
-from unconstrain.robust import RobustSolution, Samples
+from unconstrain.robust import RobustSolution, Samples, consistent
+from unconstrain.robust.likelihood import clearly_more
 from unconstrain.robust.noise import corrected, correlation_time, noise_by_differences
 from unconstrain.robust.posterior import Posterior
 from unconstrain.robust.segments import change_points, constrained_error, found_segments, projection_of
+from unconstrain.robust.smoothness import Smoothness
 from unconstrain.robust.sphere import SPREADS, beliefs, distances
 
 seeds = st.integers(0, 2**32 - 1)
@@ -241,6 +243,76 @@ def test_risk_is_the_naive_sum(models):
         assert_allclose(risk.constant[m], E0)
 
 
+# Smoothness
+
+
+def rough_samples(models=1):
+    """Samples on a grid of kernels, which knows how rough weights are."""
+    data, grid = draw(samples=60), uc.NormalisedRBF.grid(-1, 1, 4)
+    samples = samples_of(data, features=grid(data.states), models=models)
+    return replace(samples, roughness=np.tile(grid.roughness(), (models, 1, 1)))
+
+
+def test_smoothness_is_the_naive_formula():
+    samples, rng = rough_samples(models=2), np.random.default_rng(3)
+    weights = rng.standard_normal((2, 2, 16))
+    evidence, prior = random_quadratic(rng, 32), random_quadratic(rng, 32)
+    found = Smoothness.of(samples).updated(weights, Posterior(evidence, prior), noise=0.5, unit=np.array([1.0, 0.1]))
+    for m, unit in enumerate((1.0, 0.1)):
+        R = samples.roughness[m]
+        C = unit * np.linalg.inv(evidence.hessian[m] + prior.hessian[m])
+        rough = sum(w @ R @ w for w in weights[m]) + np.trace(C @ np.kron(R, np.eye(2)))
+        assert_allclose(found.precision[m], 0.5 * np.linalg.matrix_rank(R, tol=1e-8) * 2 / rough, rtol=1e-6)
+    expected = [found.precision[m] * sum(w @ samples.roughness[m] @ w for w in weights[m]) for m in range(2)]
+    assert_allclose(found.prior()(vec(weights)), expected)
+
+
+def test_weights_that_are_drawn_tell_how_smooth_they_are():
+    samples, rng = rough_samples(), np.random.default_rng(0)
+    values, axes = np.linalg.eigh(samples.roughness[0])
+    scale = np.where(values > 1e-8, 1.0 / np.sqrt(np.maximum(values, 1e-8)), 0.0)
+    certain = Quadratic(1e9 * np.eye(32)[None], np.zeros((1, 32)), np.zeros(1))
+    found = [
+        Smoothness.of(samples)
+        .updated(((rng.standard_normal((2, 16)) * scale) @ axes.T)[None] / 4.0, Posterior(certain, certain), noise=1.0)
+        .precision[0]
+        for _ in range(200)
+    ]
+    assert_allclose(1.0 / np.mean(1.0 / np.array(found)), 4.0**2, rtol=0.1)
+
+
+def test_what_is_no_noise_is_not_smoothed():
+    samples, rng = rough_samples(), np.random.default_rng(1)
+    posterior = Posterior(random_quadratic(rng, 32, models=1), random_quadratic(rng, 32, models=1))
+    assert Smoothness.of(samples).updated(rng.standard_normal((1, 2, 16)), posterior, noise=0.0).precision == 0.0
+
+
+def test_smooth_policies_are_nearer_to_the_truth_under_noise(monkeypatch):
+    found = {}
+    for smooth in (True, False):
+        if not smooth:
+            monkeypatch.setattr(uc.ParametricPolicy, "_roughness", lambda policy: None)
+        for seed in (4201, 4202, 4203):
+            training, test = recorded("pendulum", "half", 0.05, seed)
+            policy = on_grid(uc.Robust()).fit_demonstrations(training)
+            found.setdefault(smooth, []).append(np.log(uc.nupe(policy, test)))
+    assert np.mean(found[True]) < np.mean(found[False]) - 0.2
+
+
+def test_features_need_not_know_how_rough_they_are():
+    training, test = recorded()
+    grid = uc.NormalisedRBF.grid(-1, 1, 6)
+    policy = uc.ParametricPolicy(lambda states: grid(states), uc.Robust()).fit_demonstrations(training)
+    assert uc.nupe(policy, test) < 0.02
+
+
+def test_one_fold_alone_does_not_make_an_end_more_probable():
+    samples = samples_of(draw(samples=200), groups=np.arange(200) % 10)
+    assert clearly_more(samples, np.full(200, 0.1))
+    assert not clearly_more(samples, np.full(200, -0.1))
+    assert not clearly_more(samples, np.where(samples.folds == 3, 5.0, -0.1))
+
+
 # Segments
 
 
@@ -307,6 +379,14 @@ def test_half_free_half_constrained_is_told_apart():
     assert uc.nupe(policy, test) < 0.005
     assert policy.solution_.method == "likelihood"
     assert 0.4 < policy.solution_.free_share < 0.6
+
+
+def test_what_it_chose_from_is_kept():
+    training, _ = recorded(noise=0.0)
+    solution = on_grid(uc.Robust()).fit_demonstrations(training).solution_
+    assert solution.candidates.keys() == solution.compared.keys() == {"noise-corrected", "hybrid", "likelihood"}
+    assert_array_equal(solution.weights, solution.candidates[solution.method])
+    assert solution.compared["noise-corrected"] == 0.0
 
 
 def test_where_constraints_are_a_function_of_the_state_consistency_is_taken():
@@ -453,6 +533,18 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
         assert_allclose(spread.total, np.hypot(spread.from_noise, spread.undetermined))
         held.append(np.abs(policy.predict(data.states) - data.policy) <= 1.96 * spread.total)
     assert np.mean(held) > 0.85
+
+
+def test_where_constraints_are_a_function_of_the_state_intervals_hold_the_truth(monkeypatch):
+    rng = np.random.default_rng(20)
+    training, test = regimes.demonstrate("arm", "1-2-3", rng)
+    noisy = regimes.with_noise(training[:60], 0.05, rng)
+    policy = uc.LocallyLinearPolicy(3.0, 0.7, learner=uc.NoiseCorrected()).fit_demonstrations(noisy)
+    _, held = regimes._knowledge(policy, training[:60], test)
+    assert held > 0.8
+    monkeypatch.setattr(consistent, "_repeats", lambda time, samples: time)
+    naively = policy.with_learner(uc.NoiseCorrected())  # what the model misses is taken to average out
+    assert regimes._knowledge(naively, training[:60], test)[1] < held - 0.1
 
 
 def test_what_no_action_shows_is_undetermined():

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Protocol
 
 __all__ = ["DataClass", "Journal"]
 
-VERSION = 1
+VERSION = 2
 """To be raised when trials change."""
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import figures
-from ..experiments.regimes import DEFAULT, ORACLE, PAPER
+from ..experiments.regimes import DEFAULT, KNOWN, ORACLE, PAPER
 from ..experiments.trials import Result
 from . import html
 
@@ -25,7 +25,8 @@ def page(result: Result) -> str:
         "Learners in every regime of constraints and noise",
         f"{_systems(result)} under constraints of many kinds, from none to some that are drawn at random, with and "
         "without noise on the recorded actions. Every learner sees the same recordings. The <b>oracle</b> sees the "
-        "truth as well, and takes with it the best point on the paper’s path between consistency and risk. What counts "
+        "truth as well, and takes with it the best point on the paper’s path between consistency and risk. With "
+        f"<b>{KNOWN}</b>, every sample’s projection is given, and a ridge chosen by the truth. What counts "
         f"is <b>nUPE</b>, how far the learnt policy is from the true one where nothing holds it back. {_said(result)}",
         html.section("Summary", _summary(result)),
         html.section("Regime by regime", *(_cells(result, noise, index) for index, noise in enumerate(noises))),

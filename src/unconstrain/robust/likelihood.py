@@ -17,7 +17,7 @@ from .samples import Samples
 from .smoothness import Smoothness
 from .sphere import SPREADS, Beliefs, Distances, beliefs, distances
 
-__all__ = ["free_probability", "maximise", "settle"]
+__all__ = ["clearly_more", "free_probability", "maximise", "settle"]
 
 MISFIT = 0.01
 """No model is right to better than this share of the actions' size."""
@@ -57,7 +57,7 @@ def maximise(
     ends = [_climb(thinned, start, smoothness or Smoothness.of(samples), steps, noise) for start in starts]
     best = ends[0]
     for end in ends[1:]:
-        if _clearly_more(thinned, end.likelihood - best.likelihood):
+        if clearly_more(thinned, end.likelihood - best.likelihood):
             best = end
     model = _Model(samples, samples.predict(best.weights), best.variance, best.mixture, best.smoothness)
     parts = [model.posterior(samples.folds == fold) for fold in range(int(samples.folds.max()) + 1)]
@@ -146,7 +146,7 @@ def _climb(samples: Samples, weights: Array, smoothness: Smoothness, steps: int,
     return _End(weights, variance, mixture, smoothness, model.found.likelihood)
 
 
-def _clearly_more(samples: Samples, gain: Array) -> bool:
+def clearly_more(samples: Samples, gain: Array) -> bool:
     """Whether the gain of each sample is above zero by a standard error: one demonstration must not decide."""
     size = np.bincount(samples.folds, samples.counts)
     by_fold = np.bincount(samples.folds, samples.counts * gain)[size > 0] / size.mean()
