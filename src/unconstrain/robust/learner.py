@@ -36,7 +36,7 @@ WORSE = 2.1
 It fits more than the inconsistency, and may be the worse in that for it; the less else it knows, the less.
 """
 
-TOO_SOFT = 1.5
+TOO_SOFT = 1.2
 """The same for the hybrid's, against that of samples weighted by their speed."""
 
 NEGLIGIBLE = 0.05
