@@ -16,7 +16,7 @@ from .policies import Policy
 from .readers.table import unique_names
 from .receptive_fields import choose_variance, cover
 from .robust import RobustSolution, covariances
-from .robust.learner import HIDDEN, WORSE
+from .robust.learner import HIDDEN
 from .robust.noise import noise_by_differences
 
 __all__ = ["Diagnosis", "Movement", "Region", "diagnose", "named", "sentences"]
@@ -85,7 +85,9 @@ class Diagnosis:
     method : str
         Which candidate :class:`~unconstrain.Robust` took.
     compared : dict
-        Each candidate's held-out inconsistency over that of the consistent one.
+        Each candidate's held-out inconsistency over that on noise-corrected moments.
+    refuted : bool
+        Whether that of the most probable policy was too far above.
     noise : float
         Standard deviation of the noise on each action coordinate, misfit of the model included; units of the action.
     noise_share : float
@@ -116,6 +118,7 @@ class Diagnosis:
 
     method: str
     compared: dict[str, float]
+    refuted: bool
     noise: float
     noise_share: float
     jitter: float
@@ -169,6 +172,7 @@ def diagnose(policy: Policy, demonstrations: Sequence[Demonstration]) -> Diagnos
     return Diagnosis(
         method=solution.method,
         compared={name: exp(gap) for name, gap in solution.compared.items()},
+        refuted=solution.refuted,
         noise=solution.noise,
         noise_share=float(np.sqrt(d)) * solution.noise / typical,
         jitter=float(np.sqrt(noise_by_differences(actions, groups))),
@@ -302,14 +306,14 @@ def _about_method(found: Diagnosis) -> str:
     if "likelihood" not in found.compared or len(found.compared) < 2:
         return f"Policy: learnt as {found.method}; nothing was compared with it."
     other = found.compared["likelihood"]
-    times = f"its inconsistency where held out is {other:.2f} times that of the consistent policy"
+    times = f"its inconsistency where held out is {other:.2f} times that on noise-corrected moments"
     if found.method == "likelihood":
         return f"Policy: the most probable one if constraints vary at random: {times}, which does not speak against it."
     kind = "on moments without the noise" if found.method == "noise-corrected" else "as hardly any noise shows in time"
     why = "or it tells no more than consistency does"
     if found.noise_share > HIDDEN:
         why = "and so much noise hides how samples lie about their spheres"
-    elif other > WORSE:
+    elif found.refuted:
         why = "so constraints do not seem to vary at random"
     return f"Policy: the consistent one, {kind}. The most probable one was not taken: {times}, {why}."
 

@@ -127,8 +127,8 @@ class NormalisedRBF:
         """Measure how rough a policy of some weights is, shape (p, p).
 
         ``wᵀ R w`` is the mean square, over the kernels, of what a weight differs from what its neighbours' weights,
-        continued linearly, would make it. Of a function that is affine in the state it is zero. On a line of kernels
-        these are the second differences of penalised splines [1]_.
+        continued linearly, would make it. Of a function that is affine in the state it is zero. Penalised splines do
+        so with second differences [1]_.
 
         References
         ----------
@@ -138,7 +138,7 @@ class NormalisedRBF:
         count, n = self.centres.shape
         squared = squared_distances(self.centres, self.centres)
         np.fill_diagonal(squared, np.inf)
-        near = np.sort(squared, axis=1)[:, : 2 * n].mean() if count > n + 1 else 0.0
+        near = np.sort(squared, axis=1)[:, : min(2 * n, count - 1)].mean() if count > n + 1 else 0.0
         if not near > 0.0:
             return np.zeros((count, count))
         weights = np.exp(-0.5 * squared / near)  # of kernel j in what is said of kernel i, none of itself

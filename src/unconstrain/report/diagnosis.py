@@ -179,6 +179,6 @@ def _chosen(found: Diagnosis) -> str:
         [escape(name), html.number(times), "yes" if name == found.method else "no"]
         for name, times in found.compared.items()
     ]
-    note = "Inconsistency on held-out demonstrations over that of the consistent policy; the most probable policy is "
-    note += "refuted where it is clearly above 1."
+    note = "Inconsistency on held-out demonstrations over that on noise-corrected moments; the most probable policy is "
+    note += "refuted where it is too far above 1; the less it knows of its samples, the sooner."
     return html.table(["candidate", "held-out inconsistency, ratio", "taken"], rows, note=note)

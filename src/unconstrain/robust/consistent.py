@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import reduce
 from operator import add
 
@@ -40,12 +41,12 @@ def noise_corrected(samples: Samples, noise: float | None = None) -> Candidate:
     parts = samples.by_fold()
     weighted = [part.moments(part.actions, (part.actions**2).sum(axis=1)) for part in parts]
     plain = [part.moments(part.actions, np.ones(len(part))) for part in parts]
-    d, smoothness, time = samples.actions.shape[1], Smoothness.of(samples), 1.0
+    d, rough, time = samples.actions.shape[1], Smoothness.of(samples), 1.0
     most, variance = noise_by_differences(samples.actions, samples.groups), 0.0 if noise is None else noise**2
     for _ in range(_ROUNDS):
         used = variance
         whole = _Corrected(total(weighted), total(plain), used, samples.sizes)
-        softness, smoothness, unit = whole.balanced(smoothness, time)
+        softness, smoothness, unit = whole.balanced(rough, time)
         policy = samples.predict(whole.posterior(softness, smoothness.prior(unit)).weights(d))
         time = correlation_time(_residuals(samples, policy, used)[:, None], samples.groups)
         if noise is None:
@@ -64,8 +65,9 @@ def noise_corrected(samples: Samples, noise: float | None = None) -> Candidate:
     for fold, one in enumerate(held_out):
         predicted[samples.folds == fold] = one[chosen]
     of_noise, residual = whole.noise(weights), whole.residual(weights)
-    unit = time * of_noise + _repeats(time, samples) * (residual - of_noise)
-    return Candidate("noise-corrected", weights, _per(posterior, unit), predicted, variance, smoothness)
+    together = time * of_noise + _repeats(time, samples) * (residual - of_noise)
+    smoothness = replace(smoothness, precision=smoothness.precision * unit / np.maximum(together, 1e-300))
+    return Candidate("noise-corrected", weights, _per(posterior, together), predicted, variance, smoothness)
 
 
 def _residuals(samples: Samples, policy: Array, variance: float) -> Array:
@@ -142,7 +144,7 @@ class _Corrected:
     """The two objectives of corrected moments, without what is not above the noise."""
 
     def __init__(self, weighted: Moments, plain: Moments, variance: float, sizes: Array) -> None:
-        moments = corrected(weighted, plain, variance)
+        moments = _positive(corrected(weighted, plain, variance))
         self.sizes, self.d = sizes, plain.cross.shape[1]
         self.expected = variance * weighted.weight
         self.variance, self.plain, self.count = variance, standard_risk(plain), plain.weight
@@ -183,6 +185,17 @@ class _Corrected:
         missed = self.consistent(vec(weights)) / np.maximum(self.sizes, 1e-300)
         least = 1e-12 * np.abs(self.consistent.constant) / np.maximum(self.sizes, 1e-300)
         return np.maximum(missed + self.noise(weights), np.maximum(least, 1e-300))
+
+
+def _positive(moments: Moments) -> Moments:
+    """Without those features of which noise makes up all there is: subtracting it has left less than nothing."""
+    values, axes = eigensystem(moments.gram)
+    if (values >= 0.0).all():
+        return moments
+    kept = np.where(values > NOISE * values[:, -1:], values, 0.0)
+    gram = (axes * kept[:, None, :]) @ axes.swapaxes(1, 2)
+    shares = (axes * (kept > 0.0)[:, None, :]) @ axes.swapaxes(1, 2)
+    return replace(moments, gram=gram, cross=moments.cross @ shares)
 
 
 def _certain(objective: Quadratic, gram: Array, variance: float, sizes: Array) -> Quadratic:

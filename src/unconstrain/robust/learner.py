@@ -27,7 +27,10 @@ __all__ = ["Likelihood", "NoiseCorrected", "Robust", "Segments"]
 NOISY = 0.015
 """Noise of more than this share of the actions' size is taken out of the sums."""
 
-INFORMED = 0.05
+CLEAR = 0.05
+"""Where less than this share of the motion is missed, held out and along the actions, a policy is next to exact."""
+
+INFORMED = 0.1
 """Where of fewer samples than this share more is known than that they are on their spheres, nothing is added by it."""
 
 WORSE = 2.1
@@ -35,9 +38,6 @@ WORSE = 2.1
 
 It fits more than the inconsistency, and may be the worse in that for it; the less else it knows, the less.
 """
-
-TOO_SOFT = 1.2
-"""The same for the hybrid's, against that of samples weighted by their speed."""
 
 NEGLIGIBLE = 0.05
 """Share of the actions' size that may be missed without counting, when policies are compared."""
@@ -61,6 +61,7 @@ class _Climbing:
         self, samples: Samples, folds: FoldedMoments, corrected: Candidate, consistent: Candidate
     ) -> tuple[Candidate, Array]:
         """The most probable policy, from the consistent one and from what was observed."""
+        assert corrected.smoothness is not None
         starts = [consistent.weights, Direct().solve(folds).weights]
         return maximise(samples, starts, corrected.smoothness, self.steps, self.most)
 
@@ -184,8 +185,6 @@ class Robust(_Climbing):
             name: compared(samples, one.held_out, corrected.held_out, corrected.variance)
             for name, one in learnt.items()
         }
-        if _refuted(*gaps[consistent.name], TOO_SOFT):
-            consistent = corrected
         informed = 1.0 - float(mixture[-1])
         refuted = _refuted(*gaps[likely.name], WORSE ** min(1.0, 2.0 * informed))
         usable = informed > INFORMED and not refuted and not _more_than(HIDDEN, likely.variance, samples)
@@ -193,15 +192,20 @@ class Robust(_Climbing):
             samples,
             likely if usable else consistent,
             compared={name: gap for name, (gap, _) in gaps.items()},
+            refuted=refuted,
             candidates={name: one.weights @ samples.centring for name, one in learnt.items()},
         )
 
 
 def _consistent(samples: Samples, folds: FoldedMoments) -> tuple[Candidate, Candidate]:
-    """On noise-corrected moments, and what is better for a start: that if there is noise, else the softened hybrid."""
+    """On noise-corrected moments; and what is to be had of consistency alone: the same where noise is what is missed.
+
+    Where it is not, as if people do not always do the same, consistency is given up as far as held-out data lets it.
+    """
     corrected = noise_corrected(samples)
+    exact = 1.0 - _explained(samples, corrected.held_out) < CLEAR
     noisy = _more_than(NOISY, corrected.variance, samples)
-    return corrected, corrected if noisy else softened(samples, folds)
+    return corrected, corrected if noisy or exact else softened(samples, folds)
 
 
 def _refuted(gap: float, error: float, factor: float) -> bool:

@@ -19,7 +19,7 @@ from .sphere import SPREADS, Beliefs, Distances, beliefs, distances
 
 __all__ = ["clearly_more", "free_probability", "maximise", "settle"]
 
-MISFIT = 0.01
+MISFIT = 0.015
 """No model is right to better than this share of the actions' size."""
 
 _GAIN = 1e-4
@@ -31,7 +31,7 @@ _POOLED = 10.0
 
 
 def maximise(
-    samples: Samples, starts: Sequence[Array], smoothness: Smoothness | None, steps: int, most: int
+    samples: Samples, starts: Sequence[Array], smoothness: Smoothness, steps: int, most: int
 ) -> tuple[Candidate, Array]:
     """Expectation maximisation from several starts; the most probable end is kept.
 
@@ -40,7 +40,7 @@ def maximise(
     samples : Samples
     starts : sequence of ndarray, shape (M, d, p)
         Another end than the first one's is kept only if it is clearly more probable.
-    smoothness : Smoothness, optional
+    smoothness : Smoothness
         To begin with.
     steps : int
         At most so many from each.
@@ -54,7 +54,7 @@ def maximise(
         Share of each spread on the sphere, and of the uniform density.
     """
     thinned, noise = samples[:: -(-len(samples) // most)], noise_by_differences(samples.actions, samples.groups)
-    ends = [_climb(thinned, start, smoothness or Smoothness.of(samples), steps, noise) for start in starts]
+    ends = [_climb(thinned, start, smoothness, steps, noise) for start in starts]
     best = ends[0]
     for end in ends[1:]:
         if clearly_more(thinned, end.likelihood - best.likelihood):
@@ -150,7 +150,7 @@ def clearly_more(samples: Samples, gain: Array) -> bool:
     """Whether the gain of each sample is above zero by a standard error: one demonstration must not decide."""
     size = np.bincount(samples.folds, samples.counts)
     by_fold = np.bincount(samples.folds, samples.counts * gain)[size > 0] / size.mean()
-    return bool(by_fold.mean() > by_fold.std(ddof=1) / np.sqrt(len(by_fold)))
+    return len(by_fold) > 1 and bool(by_fold.mean() > by_fold.std(ddof=1) / np.sqrt(len(by_fold)))
 
 
 class _Model:

@@ -98,6 +98,8 @@ class RobustSolution(Solution):
         Share of the observed motion that is explained where it is held out, as by ``Policy.score``.
     compared : dict
         Logarithm of each candidate's held-out inconsistency over that on noise-corrected moments.
+    refuted : bool
+        Whether that of the most probable policy was too far above.
     candidates : dict
         Weights (M, d, p) of everything that was learnt to choose from, by name.
     """
@@ -111,4 +113,5 @@ class RobustSolution(Solution):
     undetermined: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     held_out_score: float = float("nan")
     compared: dict[str, float] = field(default_factory=dict)
+    refuted: bool = False
     candidates: dict[str, Array] = field(default_factory=dict)
