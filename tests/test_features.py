@@ -243,7 +243,8 @@ def test_settings_of_k_means_are_checked(arguments, sentence):
 
 
 @pytest.mark.parametrize(
-    "centres", [states(3, 12), NormalisedRBF.grid(-1, 2, 5).centres, states(4, 9, n=3), states(5, 5), states(6, 9, n=7)]
+    "centres",
+    [states(3, 12), NormalisedRBF.grid(-1, 2, 5).centres, states(4, 9, n=3), states(5, 5), states(6, 14, n=7)],
 )
 def test_roughness_is_what_neighbours_do_not_say(centres):
     values = np.random.default_rng(0).standard_normal(len(centres))

@@ -309,7 +309,11 @@ def _about_method(found: Diagnosis) -> str:
     times = f"its inconsistency where held out is {other:.2f} times that on noise-corrected moments"
     if found.method == "likelihood":
         return f"Policy: the most probable one if constraints vary at random: {times}, which does not speak against it."
-    kind = "on moments without the noise" if found.method == "noise-corrected" else "as hardly any noise shows in time"
+    kind = (
+        "on moments without the noise"
+        if found.method == "noise-corrected"
+        else "as what is missed is no noise: it goes on in time"
+    )
     why = "or it tells no more than consistency does"
     if found.noise_share > HIDDEN:
         why = "and so much noise hides how samples lie about their spheres"

@@ -43,7 +43,7 @@ DEFAULT = "robust"
 PAPER = "hybrid"
 ORACLE = "oracle"
 KNOWN = "constraints known"
-"""What could be learnt if every sample's constraint were known, and a ridge chosen by the truth: a bound for all."""
+"""What could be learnt if every sample's constraint were known, and a ridge chosen by the truth."""
 
 _SOFTNESSES = tuple(np.logspace(-9, 0, 10).tolist())
 _HELD = {"1": 1, "1-2-3": 3, "half": 3, "1-...-5": 5, "1-...-6": 6}

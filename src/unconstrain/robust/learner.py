@@ -158,9 +158,9 @@ class Segments:
 class Robust(_Climbing):
     """Learn under noise and in every constraint setting, with nothing to tune.
 
-    Learns a consistent policy, on noise-corrected moments where noise shows
-    and as :class:`~unconstrain.Hybrid` with ``alpha="auto"`` where it does
-    not, and the most probable one (:class:`Likelihood`). The likelihood's is
+    Learns a consistent policy, on noise-corrected moments where what is
+    missed is noise or next to nothing, and as :class:`~unconstrain.Hybrid`
+    with ``alpha="auto"`` otherwise, and the most probable one (:class:`Likelihood`). The likelihood's is
     taken unless noise hides the sphere, or it knows no more of next to any
     sample than that it is on its sphere, or its inconsistency on samples held
     out is too far above that on noise-corrected moments: then constraints do

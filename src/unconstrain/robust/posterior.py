@@ -41,7 +41,7 @@ class Posterior:
     evidence : Quadratic
         From the data's consistency, per variance of its residuals.
     prior : Quadratic
-        The standard risk, by as much as it counts.
+        The standard risk and smoothness, by as much as they count.
     """
 
     evidence: Quadratic
@@ -87,7 +87,7 @@ class RobustSolution(Solution):
         Standard deviation of the noise on each action coordinate, misfit of the model included.
     misfit : float
         Standard deviation, per action coordinate, of what the model of the policy misses: the part of the residuals
-        that goes on smoothly in time, and a hundredth of the actions' size, which no model is trusted to be below.
+        that goes on smoothly in time, and 1.5 % of the actions' size, which no model is trusted to be below.
     free_share : float
         Estimated share of samples that nothing constrained.
     free : ndarray, shape (N,)
