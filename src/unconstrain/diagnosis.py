@@ -309,11 +309,8 @@ def _about_method(found: Diagnosis) -> str:
     times = f"its inconsistency where held out is {other:.2f} times that on noise-corrected moments"
     if found.method == "likelihood":
         return f"Policy: the most probable one if constraints vary at random: {times}, which does not speak against it."
-    kind = (
-        "on moments without the noise"
-        if found.method == "noise-corrected"
-        else "as what is missed is no noise: it goes on in time"
-    )
+    corrected = found.method == "noise-corrected"
+    kind = "on moments without the noise" if corrected else "as what it misses goes on in time and is no noise"
     why = "or it tells no more than consistency does"
     if found.noise_share > HIDDEN:
         why = "and so much noise hides how samples lie about their spheres"
