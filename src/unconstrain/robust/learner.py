@@ -210,7 +210,7 @@ def _consistent(samples: Samples, folds: FoldedMoments) -> tuple[Candidate, Cand
 
 def _refuted(gap: float, error: float, factor: float) -> bool:
     """Whether an inconsistency is larger by a factor, and by more than a standard error."""
-    return gap > max(np.log(factor), error)
+    return bool(gap > max(np.log(factor), error))
 
 
 def compared(samples: Samples, one: Array, other: Array, variance: float) -> tuple[float, float]:
