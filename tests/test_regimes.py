@@ -6,6 +6,7 @@ import pytest
 import unconstrain as uc
 from test_report import References, browser, opened  # noqa: F401 - a fixture
 from unconstrain import report
+from unconstrain.cli import printing
 from unconstrain.experiments import regimes
 
 PLAIN = {"direct", "inconsistency", "hybrid", "hybrid, auto"}
@@ -87,6 +88,11 @@ def test_noise_is_a_share_of_the_policys_spread():
 )  # fmt: skip
 def test_the_area_is_the_share_of_pairs_in_the_right_order(scores, labels, area):
     assert regimes.area_under_curve(np.array(scores, float), np.array(labels, bool)) == pytest.approx(area)
+
+
+def test_the_table_prints_what_is_not_known_as_a_dash(result, capsys):
+    printing._print_result(result)
+    assert capsys.readouterr().out.count("oracle") >= 4
 
 
 def test_headlines_say_each_noise_level(result):

@@ -74,7 +74,8 @@ def _print_result(result: Result) -> None:
         name: LABELS[name] for name in ("nupe", "ncpe")
     }
     first = result.rows[0]
-    names = [name.removesuffix("_mean") for name in first if not name.startswith("paper_") and not name.endswith("_sd")]
+    kept = [name for name in first if not name.startswith("paper_") and not name.endswith("_sd")]
+    names = [short if f"{short}_sd" in first else name for name in kept for short in [name.removesuffix("_mean")]]
     rows = [
         [_cell(row[name]) if name in row else f"{row[f'{name}_mean']:.2g} ± {row[f'{name}_sd']:.2g}" for name in names]
         for row in result.rows
