@@ -1,4 +1,4 @@
-"""Two processes of dask against this one, on the same chunks.
+"""Two processes of dask against this one, on the same chunks, each with one thread.
 
 What two processes that know nothing of each other gain is what the machine
 has to give: on a busy one, less than two.
@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from table import Row, row, script, seconds
+from threadpoolctl import threadpool_limits
 
 import unconstrain as uc
 from unconstrain import cluster
@@ -53,7 +54,13 @@ class Together:
 
 
 def alone(parts: int) -> None:
-    """Fit to some parts, in this process."""
+    """Fit to some parts, in this process, with one thread."""
+    with threadpool_limits(1):
+        here(parts)
+
+
+def here(parts: int) -> None:
+    """Fit to some parts, in this process, with as many threads as there are."""
     uc.ParametricPolicy(FEATURES).fit_batches(Together(parts))
 
 
@@ -69,7 +76,7 @@ def main() -> list[Row]:
         Client(running, set_as_default=False) as client,
         ProcessPoolExecutor(PROCESSES, get_context("spawn")) as apart,
     ):
-        serial, parallel, bound = [], [], []
+        serial, parallel, bound, threads = [], [], [], []
         policy = uc.ParametricPolicy(FEATURES)
         cluster.fit_batches(policy, parts[:PROCESSES], client=client)  # workers import
         list(apart.map(alone, [1] * PROCESSES))
@@ -77,18 +84,22 @@ def main() -> list[Row]:
             serial.append(seconds(lambda: alone(PARTS)))
             parallel.append(seconds(lambda: cluster.fit_batches(policy, parts, client=client)))
             bound.append(seconds(lambda: list(apart.map(alone, [PARTS // PROCESSES] * PROCESSES))))
+            threads.append(seconds(lambda: here(PARTS)))
     one = uc.ParametricPolicy(FEATURES).fit_batches(Together())
     difference = max(
         float(np.abs(a - b).max() / np.abs(b).max())
         for a, b in zip(policy.moments_.sums, one.moments_.sums, strict=True)
     )
-    ratio, most = (float(np.median(np.array(serial) / np.array(times))) for times in (parallel, bound))
+    ratio, most, threaded = (
+        float(np.median(np.array(serial) / np.array(times))) for times in (parallel, bound, threads)
+    )
     what = f"{PROCESSES} processes of dask, {PARTS * ROWS:.1e} samples, d = 2, M = 100"
     return [
         row(f"{what}: serial", float(np.median(serial)), "s"),
         row(f"{what}: dask", float(np.median(parallel)), "s"),
         row(f"{what}: serial / dask", ratio, "×", 1.5, 1.8, more_is_better=True),
         row(f"{what}: serial / halves apart", most, "×"),
+        row(f"{what}: serial / all threads of one process", threaded, "×"),
         row(f"{what}: difference of the sums", difference, "1"),
     ]
 

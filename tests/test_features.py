@@ -135,6 +135,18 @@ def test_a_grid_has_a_centre_at_each_crossing():
     assert rbf.variance == 1.0
 
 
+@pytest.mark.parametrize("scale", [1.0, 10.0, 1e3, 1e150])
+@pytest.mark.parametrize(
+    "grid", [NormalisedRBF.grid(-1, 1, 5), NormalisedRBF.grid([0, 1, -3], [1, 9, 3], [2, 3, 4], width=2.0)]
+)
+def test_kernels_on_a_grid_are_those_anywhere_in_another_order(grid, scale):
+    """A grid is computed axis by axis; its centres in another order are no grid, and one by one."""
+    rng = np.random.default_rng(0)
+    order = rng.permutation(len(grid.centres))
+    at = scale * rng.standard_normal((50, grid.centres.shape[1]))
+    assert_allclose(grid(at)[:, order], NormalisedRBF(grid.centres[order], grid.variance)(at), rtol=1e-10, atol=1e-13)
+
+
 def test_the_paper_s_grid_has_36_centres():
     assert NormalisedRBF.grid(-1, 1, 6).centres.shape == (36, 2)
 

@@ -294,6 +294,17 @@ def test_nothing_is_ever_unpickled(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 # ---------------------------------------------------------------------------------------------------- which reader
 
 
+def test_a_pattern_stands_for_what_it_matches_unless_a_file_is_called_so(write: Write, tmp_path: Path) -> None:
+    for name in ("wipe_2.csv", "wipe_1.csv", "stir_1.csv"):
+        write("x,y\n1,2\n", name)
+    assert [found.name for found in read(tmp_path / "wipe_?.csv")] == ["wipe_1", "wipe_2"]
+    assert [found.name for found in read([f"{tmp_path}/stir_*", tmp_path / "wipe_[2].csv"])] == ["stir_1", "wipe_2"]
+    write("x,y\n3,4\n", "wipe_[2].csv")
+    assert only(read(tmp_path / "wipe_[2].csv")).values.tolist() == [[3.0, 4.0]]
+    with pytest.raises(ReadError, match=r"none_\*\.csv: no such file"):
+        read(tmp_path / "none_*.csv")
+
+
 def test_content_decides_where_the_suffix_does_not(tmp_path: Path, write: Write) -> None:
     assert only(read(write("x,y\n1,2\n", "wipe.log"))).columns == ("x", "y")
     npz = archive(tmp_path / "a.npz", states=np.eye(2), actions=np.eye(2))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -110,7 +111,24 @@ class NormalisedRBF:
 
     def __call__(self, states: Array) -> Array:
         """Compute features (N, p) of states (N, n); each row sums to one."""
-        return shares(states, self.centres, self.variance)
+        if len(self._ticks) < 2:
+            return shares(states, self.centres, self.variance)
+        # On a grid both kernels and what they sum to are products over the axes: few exponentials instead of many.
+        _check_columns(states, self.centres)
+        xp = namespace(states)
+        product: Array = xp.ones_like(states[:, :1]).T
+        for axis, ticks in enumerate(self._ticks):
+            along = shares(states[:, axis : axis + 1], ticks[:, None], self.variance).T
+            product = xp.reshape(product[:, None, :] * along[None, :, :], (-1, states.shape[0]))
+        return product.T
+
+    @cached_property
+    def _ticks(self) -> list[Array]:
+        """Where the centres are along each axis, if they are all points of a grid; else nothing."""
+        ticks = [np.unique(column) for column in self.centres.T]
+        if np.prod([len(each) for each in ticks], dtype=float) != len(self.centres):
+            return []
+        return ticks if np.array_equal(_grid(ticks), self.centres) else []
 
     def support(self, states: Array) -> Array:
         """Weight of the nearest kernel, from 1 at its centre to 0 far from all, shape (N,)."""
@@ -194,9 +212,8 @@ class NormalisedRBF:
             )
         check_at_least("width", width, 0.0, strict=True)
         ticks = [np.linspace(lo, hi, int(count)) for lo, hi, count in zip(lows, highs, counts, strict=True)]
-        centres = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, axes)
         spacing = np.mean([tick[1] - tick[0] for tick in ticks])
-        return cls(centres, float((width * spacing) ** 2))
+        return cls(_grid(ticks), float((width * spacing) ** 2))
 
     @classmethod
     def kmeans(cls, states: Array, count: int = 25, *, width: float = 1.0, seed: int = 0) -> NormalisedRBF:
@@ -294,11 +311,20 @@ def shares(states: Array, centres: Array, variance: float) -> Array:
     return weights.T
 
 
+def _grid(ticks: Sequence[Array]) -> Array:
+    """All points of a grid, the last axis first to move."""
+    return np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, len(ticks))
+
+
 def _apart(states: Array, centres: Array) -> tuple[Array, Array]:
     """States and centres from the centres' mean."""
+    _check_columns(states, centres)
+    origin = centres.mean(axis=0)
+    return states - beside(origin, states), beside(centres - origin, states)
+
+
+def _check_columns(states: Array, centres: Array) -> None:
     if states.shape[1] != centres.shape[1]:
         raise InvalidDataError(
             f"states: got {states.shape[1]} columns, expected {centres.shape[1]} as the centres have."
         )
-    origin = centres.mean(axis=0)
-    return states - beside(origin, states), beside(centres - origin, states)

@@ -20,7 +20,6 @@ from .reading import (
     Numbers,
     beginning,
     complete,
-    expanded,
     options_for_reading,
     recipe_of,
     recordings_in,
@@ -62,7 +61,7 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
 
     recipe = recipe_of(**reading)
     surveys, first = [], None
-    for recording in recordings_one_by_one(expanded(files), **reading):
+    for recording in recordings_one_by_one(files, **reading):
         surveys.append(survey(recording, recipe))
         first = replace(recording, values=recording.values[:1], times=None) if first is None else first
     names = unique_names(found.name for found in surveys)
@@ -144,8 +143,9 @@ def fit(
     What does not fit into memory is read twice, one file or block at a time.
     """
     from .. import storage, validation
+    from ..readers import expand
 
-    paths = expanded(files)
+    paths = expand(files)
     check_writable((output, report), paths)
     learner = learner or default_learner(paths, scheduler, alpha, softness, speed_power)
     check_speed_power(learner, speed_power)
@@ -179,7 +179,7 @@ def score(policy: str, files: Sequence[str], plane: tuple[float, ...] | None, as
 
     learnt, notes = _fitted(policy), storage.load_notes(policy)
     recipe = preparation.Recipe.from_dict(notes.get("recipe", {}))
-    recordings = recordings_in(expanded(files), group=notes.get("group"), time=notes.get("time"))
+    recordings = recordings_in(files, group=notes.get("group"), time=notes.get("time"))
     demonstrations = preparation.prepare(recordings, recipe)
     constraint = _plane(plane, learnt.n_outputs_, "one for each action")
 

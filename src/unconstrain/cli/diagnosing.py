@@ -11,7 +11,7 @@ import click
 
 from .fitting import MODELS, check_writable, policy_of
 from .printing import print_table
-from .reading import complete, expanded, options_for_reading, recipe_of, recordings_in, said_recipe
+from .reading import complete, options_for_reading, recipe_of, recordings_in, said_recipe
 
 if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
     from ..diagnosis import Diagnosis
@@ -43,9 +43,10 @@ def diagnose(
     """
     from .. import diagnosis
     from ..preparation import prepare
+    from ..readers import expand
     from ..robust import Robust
 
-    paths = expanded(files)
+    paths = expand(files)
     check_writable((report,), paths)
     recordings = recordings_in(paths, **reading)
     recipe = complete(recipe_of(**reading), recordings[0])

@@ -45,7 +45,7 @@ class Alpha(click.ParamType):  # type: ignore[type-arg]
 
 
 def default_learner(
-    paths: Sequence[str],
+    paths: Sequence[str | Path],
     scheduler: str | None,
     alpha: float | Literal["auto"] | None,
     softness: float | None,
@@ -81,7 +81,7 @@ def learner_of(name: str, alpha: float | Literal["auto"] | None, softness: float
     return Hybrid(**given, threshold=0.0 if softness else None)  # type: ignore[arg-type]
 
 
-def check_writable(outputs: Sequence[str | None], paths: Sequence[str]) -> None:
+def check_writable(outputs: Sequence[str | None], paths: Sequence[str | Path]) -> None:
     """Refuse to write over what is read, or where there is no folder."""
     for written in filter(None, outputs):
         if Path(written).resolve() in {Path(path).resolve() for path in paths}:

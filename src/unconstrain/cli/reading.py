@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -21,7 +22,6 @@ __all__ = [
     "Numbers",
     "beginning",
     "complete",
-    "expanded",
     "options_for_reading",
     "recipe_of",
     "recordings_in",
@@ -120,19 +120,9 @@ def said_recipe(recipe: Recipe) -> str:
     return f"{states} as states and {actions}" + ("" if recipe.actions else " as actions")
 
 
-def expanded(files: Sequence[str]) -> list[str]:
-    """Expand patterns where the shell did not."""
-    from glob import glob
-
-    # A pattern may be absolute, which Path.glob refuses.
-    return [
-        path
-        for name in files
-        for path in (sorted(glob(name)) if any(c in name for c in "*?[") else []) or [name]  # noqa: PTH207
-    ]
-
-
-def recordings_in(paths: Sequence[str], group: str | None = None, time: str | None = None, **_: Any) -> list[Recording]:
+def recordings_in(
+    paths: Sequence[str | Path], group: str | None = None, time: str | None = None, **_: Any
+) -> list[Recording]:
     """Read files as the options say."""
     from ..readers import read
 
@@ -140,7 +130,7 @@ def recordings_in(paths: Sequence[str], group: str | None = None, time: str | No
 
 
 def recordings_one_by_one(
-    paths: Sequence[str], group: str | None = None, time: str | None = None, **_: Any
+    paths: Sequence[str | Path], group: str | None = None, time: str | None = None, **_: Any
 ) -> Iterator[Recording]:
     """Read files as the options say, holding one at a time."""
     from ..readers import expand, read_blocks
@@ -149,7 +139,7 @@ def recordings_one_by_one(
         yield from read_blocks(path, group=group, time=time, whole=True)
 
 
-def stream_of(paths: Sequence[str], speed_power: float, **reading: Any) -> Stream:
+def stream_of(paths: Sequence[str | Path], speed_power: float, **reading: Any) -> Stream:
     """Files as batches to learn from, as the options say."""
     from ..streams import Stream
 

@@ -32,11 +32,10 @@ def onnx_model(form: ClosedForm) -> bytes:
     graph = _Graph()
     relative = graph.add("Sub", "states", graph.constant("origin", form.origin))
     if form.exponents is None:
-        actions = graph.affine(relative, form.maps[0, :, :n].T, form.maps[0, :, n], "map")
+        graph.affine(relative, form.maps[0, :, :n].T, form.maps[0, :, n], "map", to="actions")
     else:
         exponents = graph.affine(relative, form.exponents[:, :n].T, form.exponents[:, n], "exponents")
-        actions = _blended(graph, form, relative, graph.add("Softmax", exponents, axis=-1))
-    graph.add("Identity", actions, to="actions")
+        _blended(graph, form, relative, graph.add("Softmax", exponents, axis=-1))
     double = TensorProto.DOUBLE
     made = helper.make_graph(
         graph.nodes,
@@ -52,16 +51,22 @@ def onnx_model(form: ClosedForm) -> bytes:
     return bytes(model.SerializeToString())
 
 
-def _blended(graph: _Graph, form: ClosedForm, relative: str, shares: str) -> str:
+def _blended(graph: _Graph, form: ClosedForm, relative: str, shares: str) -> None:
     n, d, models = form.sizes
-    constants = graph.add("MatMul", shares, graph.constant("constants", form.maps[:, :, -1]))
+    maps = graph.constant("maps", form.maps.reshape(models, -1))
     if not form.is_affine:
-        return constants
-    slopes = graph.add("MatMul", shares, graph.constant("maps", form.maps[:, :, :n].reshape(models, d * n)))
-    blend = graph.add("Reshape", slopes, graph.constant("shape", np.array([-1, d, n])))
-    column = graph.add("Unsqueeze", relative, graph.constant("last", np.array([2])))
-    moving = graph.add("Squeeze", graph.add("MatMul", blend, column), "last")
-    return graph.add("Add", moving, constants)
+        graph.add("MatMul", shares, maps, to="actions")
+        return
+    # Each row of the blended map times (z, 1), without a change of shape: a runtime takes longer to begin with
+    # a node than to do what little is in it.
+    blend = graph.add("MatMul", shares, maps)
+    tiled = graph.affine(relative, np.tile(np.eye(n, n + 1), (1, d)), np.tile(np.eye(n + 1)[n], d), "tiled")
+    graph.add(
+        "MatMul",
+        graph.add("Mul", blend, tiled),
+        graph.constant("sum", np.repeat(np.eye(d), n + 1, axis=0)),
+        to="actions",
+    )
 
 
 class _Graph:
@@ -84,6 +89,6 @@ class _Graph:
         self.nodes.append(helper.make_node(operator, inputs, [result], **settings))
         return result
 
-    def affine(self, of: str, slopes: Array, offsets: Array, name: str) -> str:
-        product = self.add("MatMul", of, self.constant(f"{name}_slopes", slopes))
-        return self.add("Add", product, self.constant(f"{name}_offsets", offsets))
+    def affine(self, of: str, slopes: Array, offsets: Array, name: str, to: str = "") -> str:
+        parts = self.constant(f"{name}_slopes", slopes), self.constant(f"{name}_offsets", offsets)
+        return self.add("Gemm", of, *parts, to=to)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from glob import glob
 from pathlib import Path
 
 from unconstrain.demonstration import Recording
@@ -31,7 +32,7 @@ def read(paths: PathLike | Iterable[PathLike], *, group: str | None = None, time
     paths : path or iterable of paths
         CSV, TSV or semicolon-separated text, NumPy archives, Parquet or HDF5
         (extra ``data``); told apart by suffix, else by content. A folder
-        stands for the Parquet files in it.
+        stands for the Parquet files in it, and a pattern such as ``wipe_*.csv`` for what it matches.
     group : str, optional
         Column that tells the demonstrations apart. Without it, and without a column that
         is called like one (``demo``, ``trial``, ``bout``, ...), each file is one demonstration.
@@ -76,7 +77,7 @@ def read_blocks(
 
 
 def expand(paths: PathLike | Iterable[PathLike]) -> list[Path]:
-    """Files to read, where a folder stands for the Parquet files in it and below, in the order of their names.
+    """Files to read, in the order of their names where a folder or a pattern stands for several.
 
     Raises
     ------
@@ -84,10 +85,16 @@ def expand(paths: PathLike | Iterable[PathLike]) -> list[Path]:
         If there is none.
     """
     listed = [Path(path) for path in ([paths] if isinstance(paths, (str, os.PathLike)) else paths)]
-    files = [file for path in listed for file in (sorted(path.rglob("*.parquet")) if path.is_dir() else []) or [path]]
+    matched = [match for path in listed for match in (_matches(path) if not path.exists() else []) or [path]]
+    files = [file for path in matched for file in (sorted(path.rglob("*.parquet")) if path.is_dir() else []) or [path]]
     if not files:
         raise SettingError("got no file to read, expected at least one path.")
     return files
+
+
+def _matches(pattern: Path) -> list[Path]:
+    # A pattern may be absolute, which Path.glob refuses.
+    return [Path(match) for match in sorted(glob(str(pattern)))]  # noqa: PTH207
 
 
 def _format(path: Path) -> Format:
