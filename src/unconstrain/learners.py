@@ -174,7 +174,7 @@ class Hybrid:
             candidates = softened_minima(inconsistency(training), standard_risk(training), SOFTNESSES)
             # Each round as a share of its own motion: a fast demonstration says no more than a slow one.
             missed.append(inconsistency(held_out)(candidates).sum(axis=0) / max(held_out.energy.sum(), 1e-300))
-        return SOFTNESSES[within_one_error(np.stack(missed)).max()]
+        return SOFTNESSES[within_errors(np.stack(missed)).max()]
 
     def _path(self, moments: Moments) -> Path:
         consistent, risk = inconsistency(moments), standard_risk(moments)
@@ -185,8 +185,8 @@ class Hybrid:
         return inconsistency(moments) + self.alpha * standard_risk(moments)
 
 
-def within_one_error(missed: Array) -> NDArray[np.intp]:
-    """Candidates whose loss is within one standard error of the best.
+def within_errors(missed: Array, times: float = 1.0) -> NDArray[np.intp]:
+    """Candidates whose loss is within a standard error, or so many times one, of the best.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def within_one_error(missed: Array) -> NDArray[np.intp]:
     if len(missed) < 2:  # and so no standard error
         return np.array([best], dtype=np.intp)
     gap = missed - missed[:, [best]]
-    return np.flatnonzero(gap.mean(axis=0) <= gap.std(axis=0, ddof=1) / np.sqrt(len(missed)))
+    return np.flatnonzero(gap.mean(axis=0) <= times * gap.std(axis=0, ddof=1) / np.sqrt(len(missed)))
 
 
 def _inconsistency_path(moments: Moments) -> Path:

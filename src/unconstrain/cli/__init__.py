@@ -262,6 +262,7 @@ def export(policy: str, output: str, name: str | None) -> None:
 @click.argument("experiment", type=click.Choice(experiments.NAMES))
 @click.option("--trials", type=click.IntRange(1), help="Data sets; the paper's number by default.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of everything random.")
+@click.option("--only", multiple=True, help="Of regimes: a system, a constraint, or both, such as 'limit cycle, half'.")
 @click.option(
     "--workers", type=int, default=-1, help="Processes; one for each core by default. The numbers do not depend on it."
 )
@@ -272,7 +273,7 @@ def export(policy: str, output: str, name: str | None) -> None:
     show_default=True,
     help="Folder for NAME.json and NAME.html.",
 )
-def reproduce(experiment: str, trials: int | None, seed: int, workers: int, out: str) -> None:
+def reproduce(experiment: str, trials: int | None, seed: int, only: tuple[str, ...], workers: int, out: str) -> None:
     """Run one of the paper's experiments, beside its printed values.
 
     An interrupted run goes on where it stopped.
@@ -287,6 +288,10 @@ def reproduce(experiment: str, trials: int | None, seed: int, workers: int, out:
         if not hasattr(settings, "trials"):
             raise SettingError(f"--trials: {experiment} is a single data set.")
         settings = replace(settings, trials=trials)
+    if only:
+        if not hasattr(settings, "only"):
+            raise SettingError(f"--only: {experiment} has no parts to choose from.")
+        settings = replace(settings, only=only)
     if experiment not in experiments.JOURNALED:
         with progress_bar(experiment) as progress:
             result = module.run(settings, workers, progress)

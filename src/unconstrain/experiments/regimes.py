@@ -11,6 +11,7 @@ import numpy as np
 from ..arrays import Array
 from ..constraints import Constraint, JacobianRows, PolicyAligned, SwitchingLine
 from ..demonstration import Demonstration, stack
+from ..errors import SettingError
 from ..features import NormalisedRBF
 from ..learners import Direct, Hybrid, Inconsistency
 from ..metrics import ncpe, ninconsistency, nupe
@@ -65,8 +66,9 @@ class Settings:
         Of the paper's hybrid.
     thresholds : int
         That the oracle chooses from, evenly over ten decades.
-    arm : bool
-        Whether the arm takes part; it takes most of the time.
+    only : tuple of str
+        Systems, constraints, or both as in "limit cycle, half", to which to keep; all if empty.
+        Data sets do not depend on it. The arm takes most of the time.
     """
 
     trials: int = 20
@@ -74,7 +76,7 @@ class Settings:
     noise: tuple[float, ...] = (0.0, 0.02, 0.05, 0.1)
     alpha: float = 1e-2
     thresholds: int = 61
-    arm: bool = True
+    only: tuple[str, ...] = ()
 
 
 def run(
@@ -87,8 +89,7 @@ def run(
     ``tables["summary"]`` has one row for each method and noise.
     """
     chosen = settings or Settings()
-    regimes = [(system, constraint) for system in _SYSTEMS for constraint in PLANAR]
-    regimes += [("arm", constraint) for constraint in ARM] if chosen.arm else []
+    regimes = _regimes(chosen.only)
     seeds = np.random.SeedSequence(chosen.seed).spawn(chosen.trials)
     calls = [(chosen, *regime, seed) for seed in seeds for regime in regimes]
     found = run_trials(trial, calls, workers, progress, journal)
@@ -98,6 +99,20 @@ def run(
         for place, noise in enumerate(chosen.noise):
             rows += _rows([one[place] for one in of_regime], system=system, constraint=constraint, noise=noise)
     return Result("regimes", chosen, rows, tables={"summary": _summary(rows, chosen)})
+
+
+def _regimes(only: Sequence[str]) -> list[tuple[str, str]]:
+    every = [(system, constraint) for system in _SYSTEMS for constraint in PLANAR]
+    every += [("arm", constraint) for constraint in ARM]
+    names = {regime: {*regime, ", ".join(regime)} for regime in every}
+    for name in only:
+        if not any(name in called for called in names.values()):
+            systems, constraints = (list(dict.fromkeys(column)) for column in zip(*every, strict=True))
+            raise SettingError(
+                f"only: got {name!r}, expected a system ({', '.join(systems)}), a constraint "
+                f"({', '.join(constraints)}), or both, such as {', '.join(every[0])!r}."
+            )
+    return [regime for regime, called in names.items() if not only or called.intersection(only)]
 
 
 def trial(
@@ -176,9 +191,13 @@ def headlines(result: Result) -> list[str]:
             and one["constraint"] in ("half", "1-2-3", "1-...-5")
         ):
             told = "" if one["auc_mean"] is None else f", free told apart with an area of {one['auc_mean']:.4f}"
+            error = one["nupe_sd"] / np.sqrt(result.settings.trials)  # type: ignore[attr-defined]
+            mean, error, geometric = (
+                f"{100 * value:.4f}e-2" for value in (one["nupe_mean"], error, one["nupe_geometric"])
+            )
             said.append(
-                f"{one['system']}, {one['constraint']}, noise {one['noise']:.0%}: nUPE {100 * one['nupe_mean']:.4f}e-2 "
-                f"(mean; geometric mean {100 * one['nupe_geometric']:.4f}e-2){told}"
+                f"{one['system']}, {one['constraint']}, noise {one['noise']:.0%}: nUPE {mean} (mean, standard error "
+                f"{error}; geometric mean {geometric}){told}"
             )
     covered = [
         one["coverage_mean"] for one in result.rows if one["method"] == DEFAULT and one["coverage_mean"] is not None

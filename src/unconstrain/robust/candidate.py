@@ -27,6 +27,8 @@ class Candidate:
         Of the noise, per coordinate, misfit included.
     smoothness : Smoothness, optional
         Of the policy, where it is part of the prior.
+    most_consistent : ndarray, shape (N, d), optional
+        As ``held_out``, but as held-out consistency alone would choose, and no prior.
     """
 
     name: str
@@ -35,3 +37,4 @@ class Candidate:
     held_out: Array
     variance: float
     smoothness: Smoothness | None = None
+    most_consistent: Array | None = None

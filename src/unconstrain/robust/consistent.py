@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
-from ..learners import SOFTNESSES, Hybrid, within_one_error
+from ..learners import SOFTNESSES, Hybrid, within_errors
 from ..moments import Moments, total
 from ..objectives import inconsistency, standard_risk, unvec, vec
 from ..quadratic import NOISE, Quadratic, eigensystem, softened_minima
@@ -27,6 +27,9 @@ __all__ = ["by_segments", "noise_corrected", "softened"]
 
 _ROUNDS = 3
 _STEPS = 6
+_REFUTED = 3.0
+"""Standard errors by which held-out data has to speak against the prior's softness before it counts."""
+
 _CERTAIN = 2.0
 """Standard errors by which an eigenvalue has to be above the noise that was subtracted from it."""
 
@@ -51,23 +54,26 @@ def noise_corrected(samples: Samples, noise: float | None = None) -> Candidate:
         time = correlation_time(_residuals(samples, policy, used)[:, None], samples.groups)
         if noise is None:
             variance = min(most, _mean(samples, distances(samples.actions, policy).radial ** 2))
-    smooth, held_out, missed = smoothness.prior(unit), [], []
+    smooth, proposed = smoothness.prior(unit), float(np.median(softness))
+    softnesses = (proposed, *SOFTNESSES)
+    held_out, missed = np.empty((len(softnesses), *policy.shape)), []
     for fold, part in enumerate(parts):
         others = [i for i in range(len(parts)) if i != fold] or [fold]
         rest = _Corrected(total(weighted[i] for i in others), total(plain[i] for i in others), used, samples.sizes)
-        found = softened_minima(rest.consistent + smooth, rest.risk, SOFTNESSES)
-        held_out.append(np.stack([part.predict(unvec(found[..., k], d)) for k in range(len(SOFTNESSES))]))
-        missed.append([part.counts @ _residuals(part, one, used) ** 2 / part.counts.sum() for one in held_out[-1]])
-    chosen = _within_one_error(np.array(missed), float(np.median(softness)))
-    posterior = Posterior(whole.consistent, SOFTNESSES[chosen] * whole.risk + smooth)
+        found = softened_minima(rest.consistent + smooth, rest.risk, softnesses)
+        predicted = [part.predict(unvec(found[..., k], d)) for k in range(len(softnesses))]
+        missed.append([part.counts @ _residuals(part, one, used) ** 2 / part.counts.sum() for one in predicted])
+        held_out[:, samples.folds == fold] = predicted
+    chosen = _not_refuted(np.array(missed), np.log(np.array(softnesses) / proposed))
+    best = int(np.mean(missed, axis=0).argmin())
+    posterior = Posterior(whole.consistent, softnesses[chosen] * whole.risk + smooth)
     weights = posterior.weights(d)
-    predicted = np.empty_like(policy)
-    for fold, one in enumerate(held_out):
-        predicted[samples.folds == fold] = one[chosen]
     of_noise, residual = whole.noise(weights), whole.residual(weights)
     together = time * of_noise + _repeats(time, samples) * (residual - of_noise)
     smoothness = replace(smoothness, precision=smoothness.precision * unit / np.maximum(together, 1e-300))
-    return Candidate("noise-corrected", weights, _per(posterior, together), predicted, variance, smoothness)
+    return Candidate(
+        "noise-corrected", weights, _per(posterior, together), held_out[chosen], variance, smoothness, held_out[best]
+    )
 
 
 def _residuals(samples: Samples, policy: Array, variance: float) -> Array:
@@ -76,13 +82,13 @@ def _residuals(samples: Samples, policy: Array, variance: float) -> Array:
     return np.asarray(missed - samples.actions.shape[1] * variance)
 
 
-def _within_one_error(missed: Array, softness: float) -> int:
-    """The candidate nearest to a softness of those whose held-out loss (R, K) is within one standard error of the best.
+def _not_refuted(missed: Array, away: Array) -> int:
+    """The candidate least far ``away`` (K,) from the proposal that the held-out loss (R, K) does not speak against.
 
-    Errors are of the difference to the best, round by round: what held-out data cannot tell apart, the prior decides.
+    It does where the loss is above the best by so many standard errors of the difference, round by round.
     """
-    near = within_one_error(missed)
-    return int(near[np.abs(np.log(SOFTNESSES) - np.log(softness))[near].argmin()])
+    near = within_errors(missed, _REFUTED)
+    return int(near[np.abs(away[near]).argmin()])
 
 
 def softened(samples: Samples, folds: FoldedMoments) -> Candidate:

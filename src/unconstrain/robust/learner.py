@@ -33,7 +33,7 @@ CLEAR = 0.05
 INFORMED = 0.1
 """Where of fewer samples than this share more is known than that they are on their spheres, nothing is added by it."""
 
-WORSE = 2.1
+WORSE = 1.9
 """By which factor the inconsistency of the likelihood has to be larger to refute it, if it knows half of the samples.
 
 It fits more than the inconsistency, and may be the worse in that for it; the less else it knows, the less.
@@ -181,8 +181,9 @@ class Robust(_Climbing):
         corrected, consistent = _consistent(samples, folds)
         likely, mixture = self._climbed(samples, folds, corrected, consistent)
         learnt = {one.name: one for one in (corrected, consistent, likely)}
+        assert corrected.most_consistent is not None
         gaps = {
-            name: compared(samples, one.held_out, corrected.held_out, corrected.variance)
+            name: compared(samples, one.held_out, corrected.most_consistent, corrected.variance)
             for name, one in learnt.items()
         }
         informed = 1.0 - float(mixture[-1])
