@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from unconstrain import robust
+
 
 class Samples(NamedTuple):
     """States (N, n), actions (N, d), their groups, and what made them."""
@@ -41,3 +43,23 @@ def rotation(seed, d):
     """A random rotation of d dimensions."""
     Q, R = np.linalg.qr(np.random.default_rng(seed).standard_normal((d, d)))
     return Q * np.sign(np.diagonal(R))
+
+
+def samples_of(data, groups=None, features=None, models=1):
+    """Samples with plain features, one model unless told."""
+    count = len(data.states)
+    phi = np.column_stack([data.states, np.ones(count)]) if features is None else features
+    rng = np.random.default_rng(0)
+    share = rng.uniform(0.1, 1.0, (count, models))
+    named = data.groups if groups is None else groups
+    return robust.Samples(
+        phi,
+        data.actions,
+        np.ones(count),
+        share,
+        share / share.sum(axis=1, keepdims=True),
+        named,
+        np.unique(named, return_inverse=True)[1],
+        np.tile(np.eye(phi.shape[1]), (models, 1, 1)),
+        np.zeros((models, phi.shape[1], phi.shape[1])),
+    )

@@ -132,17 +132,15 @@ def trial(
             PAPER: policy.with_learner(Hybrid(settings.alpha)),
             "hybrid, auto": policy.with_learner(Hybrid(alpha="auto")),
         }
-        of_noise: dict[str, tuple[float, ...]] = {
-            method: (*_errors(one, test), np.nan, np.nan) for method, one in learnt.items()
-        }
+        of_noise: dict[str, tuple[float, ...]] = {method: _errors(one, test) for method, one in learnt.items()}
         chosen, judged = policy.solution_, learnt["direct"]
         assert isinstance(chosen, RobustSolution)
         for method in ("noise-corrected", "likelihood"):  # what the default learner chose from
             judged.solution_ = replace(chosen, weights=chosen.candidates[method])
-            of_noise[method] = (*_errors(judged, test), np.nan, np.nan)
+            of_noise[method] = _errors(judged, test)
         of_noise[DEFAULT] = (*_errors(policy, test), *_knowledge(policy, noisy, test))
-        of_noise[ORACLE] = (*_oracle(policy, test, settings.thresholds), np.nan, np.nan)
-        of_noise[KNOWN] = (*_knowing(policy, noisy, test), np.nan, np.nan)
+        of_noise[ORACLE] = _oracle(policy, test, settings.thresholds)
+        of_noise[KNOWN] = _knowing(policy, noisy, test)
         found.append(of_noise)
     return found
 
@@ -216,7 +214,7 @@ def _rows(of_regime: Sequence[dict[str, tuple[float, ...]]], **where: Any) -> li
     rows = []
     best = np.array([one[ORACLE][0] for one in of_regime])
     for method in of_regime[0]:
-        values = np.array([one[method] for one in of_regime])
+        values = np.array([(*one[method], np.nan, np.nan)[: len(_COLUMNS)] for one in of_regime])
         made = row(method, values[:, :3].tolist(), **where)
         made["nupe_geometric"] = float(np.exp(np.log(values[:, 0]).mean()))
         made["to_oracle"] = float(np.exp(np.log(values[:, 0] / best).mean()))

@@ -1,0 +1,303 @@
+"""The formulas that learners which look at samples are made of, each against its naive twin."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+import naive
+import unconstrain as uc
+from samples import draw, samples_of
+from unconstrain.learners import SOFTNESSES, within_errors
+from unconstrain.moments import gather
+from unconstrain.objectives import vec
+from unconstrain.quadratic import Quadratic, minimum, softened_minima
+from unconstrain.robust.consistent import _not_refuted
+from unconstrain.robust.likelihood import clearly_more
+from unconstrain.robust.noise import corrected, correlation_time, noise_by_differences
+from unconstrain.robust.posterior import Posterior
+from unconstrain.robust.segments import change_points, constrained_error, found_segments, projection_of
+from unconstrain.robust.smoothness import Smoothness
+from unconstrain.robust.sphere import SPREADS, beliefs, distances
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+# The sphere
+
+
+@given(seeds, st.integers(2, 7), st.integers(1, 6))
+def test_every_projection_lies_on_the_sphere(seed, d, rank):
+    rng = np.random.default_rng(seed)
+    policy = rng.standard_normal((5, d))
+    projections = uc.null_space_projection(rng.standard_normal((5, min(rank, d), d)))
+    actions = uc.project(projections, policy)
+    assert_allclose(distances(actions, policy).radial, 0.0, atol=1e-12)
+
+
+@given(seeds, st.integers(2, 5))
+def test_the_normal_is_minus_the_derivative_of_the_distance(seed, d):
+    rng = np.random.default_rng(seed)
+    actions, policy = rng.standard_normal((2, 4, d))
+    step = 1e-6
+    for axis in range(d):
+        moved = [distances(actions, policy + sign * step * np.eye(d)[axis]).radial for sign in (1, -1)]
+        assert_allclose(distances(actions, policy).normal[:, axis], -(moved[0] - moved[1]) / (2 * step), atol=1e-6)
+
+
+def test_on_the_sphere_the_normal_is_the_action_over_the_policys_length():
+    data = draw(noise=0.0)
+    place = distances(data.actions, data.policy)
+    assert_allclose(place.normal, data.actions / np.linalg.norm(data.policy, axis=1)[:, None], atol=1e-9)
+
+
+@pytest.mark.parametrize("only", [0, 3, len(SPREADS)])
+def test_each_density_has_a_mass_of_one(only):
+    axis = np.linspace(-2.5, 3.5, 1201)
+    points = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    policy = np.tile([1.0, 0.0], (len(points), 1))
+    mixture = np.eye(len(SPREADS) + 1)[only]
+    found = beliefs(points, policy, distances(points, policy), 0.02**2, mixture)
+    mass = np.exp(found.likelihood).sum() * (axis[1] - axis[0]) ** 2
+    assert_allclose(mass, 1.0, atol=0.03)
+    near = found.likelihood > -100.0
+    assert near.any()
+    assert_allclose(found.shares[near, only], 1.0)
+
+
+def test_free_samples_and_constrained_ones_are_told_apart():
+    policy = np.array([[1.0, 0.0], [1.0, 0.0]])
+    actions = np.array([[1.01, 0.01], [0.5, 0.5]])
+    mixture = np.full(len(SPREADS) + 1, 1 / (len(SPREADS) + 1))
+    free = beliefs(actions, policy, distances(actions, policy), 0.02**2, mixture).free
+    assert free[0] > 0.3
+    assert free[1] < 1e-6
+
+
+# Noise
+
+
+def test_corrected_moments_are_those_without_noise_on_average():
+    data = draw(samples=4000, noise=0.0)
+    phi, sigma = np.column_stack([data.states, np.ones(4000)]), 0.2
+    rng = np.random.default_rng(0)
+    found = []
+    for _ in range(200):
+        noisy = data.actions + sigma * rng.standard_normal(data.actions.shape)
+        squares = (noisy**2).sum(axis=1)[:, None]
+        plain = gather(phi, noisy)
+        found.append([sums.ravel() for sums in corrected(gather(phi, noisy, squares), plain, sigma**2).sums])
+    clean = gather(phi, data.actions, (data.actions**2).sum(axis=1)[:, None])
+    for drawn, expected in zip(zip(*found, strict=True), clean.sums, strict=True):
+        drawn = np.stack(drawn)
+        error = drawn.std(axis=0, ddof=1) / np.sqrt(len(drawn))
+        assert (np.abs(drawn.mean(axis=0) - expected.ravel()) < 5 * error + 1e-9).all()
+
+
+def test_residuals_of_the_true_policy_have_one_variance_whatever_the_constraint():
+    rng = np.random.default_rng(1)
+    policy, sigma = np.array([0.6, -0.5, 0.9]), 0.05
+    for held in (0, 1, 2):
+        N = uc.null_space_projection(rng.standard_normal((held, 3))) if held else np.eye(3)
+        u = N @ policy + sigma * rng.standard_normal((200_000, 3))
+        residual = (u**2).sum(axis=1) - u @ policy - 3 * sigma**2
+        assert abs(residual.mean()) < 1e-3
+        assert_allclose(residual.var(), sigma**2 * policy @ policy + 6 * sigma**4, rtol=0.02)
+
+
+def test_noise_shows_in_differences_and_a_switch_does_not():
+    times = np.linspace(0, 3, 300)
+    smooth = np.column_stack([np.sin(times), np.cos(times)])
+    smooth[150:] *= 0.2
+    noisy = smooth + 0.03 * np.random.default_rng(0).standard_normal(smooth.shape)
+    groups = np.zeros(300, dtype=int)
+    assert_allclose(np.sqrt(noise_by_differences(noisy, groups)), 0.03, rtol=0.15)
+    assert noise_by_differences(smooth, groups) < 1e-12
+    assert noise_by_differences(noisy[:4], groups[:4]) == np.inf
+    assert noise_by_differences(noisy, np.arange(300)) == np.inf
+
+
+def test_correlation_time_of_known_processes():
+    rng = np.random.default_rng(0)
+    white = rng.standard_normal((20_000, 2))
+    groups = np.arange(20_000) // 100
+    assert correlation_time(white, groups) < 1.2
+    slow = white.copy()
+    for i in range(1, len(slow)):
+        slow[i] = 0.6 * slow[i - 1] + white[i]
+    assert_allclose(correlation_time(slow, np.zeros(20_000, dtype=int)), (1 + 0.6) / (1 - 0.6), rtol=0.15)
+    assert correlation_time(np.zeros((10, 1)), np.zeros(10, dtype=int)) == 1.0
+
+
+# What is believed of the weights
+
+
+def random_quadratic(rng, size, models=2, rank=None):
+    half = rng.standard_normal((models, size, rank or size))
+    return Quadratic(half @ half.swapaxes(1, 2), rng.standard_normal((models, size)), np.ones(models))
+
+
+@given(seeds, st.integers(1, 6))
+def test_the_two_covariances_add_up_to_the_inverse(seed, rank):
+    rng = np.random.default_rng(seed)
+    evidence, prior = random_quadratic(rng, 6, rank=rank), random_quadratic(rng, 6)
+    prior = Quadratic(prior.hessian + np.eye(6), prior.linear, prior.constant)
+    from_noise, undetermined = Posterior(evidence, prior).spreads()
+    inverse = np.linalg.inv(evidence.hessian + prior.hessian)
+    assert_allclose(from_noise + undetermined, inverse, atol=1e-7 * np.abs(inverse).max())
+    assert_allclose(from_noise, inverse @ evidence.hessian @ inverse, atol=1e-7 * np.abs(inverse).max())
+    assert (Posterior(evidence, 1e-10 * prior).determined() == rank).all()
+
+
+@given(seeds)
+def test_softened_minima_are_those_of_each_sum(seed):
+    rng = np.random.default_rng(seed)
+    first, second = random_quadratic(rng, 5, rank=3), random_quadratic(rng, 5)
+    softnesses = (1e-3, 0.1, 3.0)
+    found = softened_minima(first, second, softnesses)
+    for place, softness in enumerate(softnesses):
+        expected = minimum(first + softness * second)
+        assert_allclose(found[..., place], expected, atol=1e-4 * np.abs(expected).max())
+
+
+def test_candidates_within_one_standard_error_of_the_best_are_as_good():
+    best_is_first = np.array([[1.0, 1.1, 1.3], [2.0, 1.9, 2.3], [3.0, 3.1, 3.2]])
+    assert within_errors(best_is_first).max() == 1
+    assert within_errors(best_is_first[:, [0, 2]]).max() == 0
+    assert within_errors(np.ones((4, 3))).max() == 2
+    assert_array_equal(within_errors(np.ones((1, 3))), [0])  # of one round there is no standard error
+
+
+@pytest.mark.parametrize(("errors", "chosen"), [(2.0, 0), (4.0, 2)])
+def test_the_proposed_softness_is_taken_unless_held_out_data_clearly_objects(errors, chosen):
+    """Columns: the proposal, the best, which is far from it, and one near it that is as good as the best."""
+    best = np.array([1.0, 3.0, 2.0, 5.0])
+    gap = np.array([-1.0, 1.0, -1.0, 1.0])
+    worse = best + gap + errors * gap.std(ddof=1) / 2.0
+    missed = np.column_stack([worse, best, best + 0.5 * gap + 0.01])
+    assert _not_refuted(missed, np.array([0.0, -7.0, 2.0])) == chosen
+
+
+def test_alpha_auto_is_a_softness():
+    data = draw(samples=200)
+    policy = uc.ParametricPolicy(uc.Affine(), uc.Hybrid(alpha="auto")).fit(
+        data.states, data.actions, groups=data.groups
+    )
+    softness = uc.Hybrid(alpha="auto").chosen_softness(policy._folds)
+    assert softness in SOFTNESSES
+    same = policy.with_learner(uc.Hybrid(softness=softness, threshold=0.0))
+    assert_array_equal(policy.predict(data.states), same.predict(data.states))
+    for wrong in ({"threshold": 0.1}, {"softness": 0.1}):
+        with pytest.raises(uc.UnconstrainError, match="auto"):
+            uc.Hybrid(alpha="auto", **wrong)
+
+
+@pytest.mark.parametrize("models", [1, 3])
+def test_risk_is_the_naive_sum(models):
+    data = draw(samples=20)
+    samples = samples_of(data, models=models)
+    weights = np.random.default_rng(2).uniform(0.5, 2, 20)
+    risk = samples.risk(data.actions, weights)
+    for m in range(models):
+        E0, g, H = naive.risk_terms(samples.features, data.actions, weights * samples.memberships[:, m])
+        assert_allclose(risk.hessian[m], H, atol=1e-12)
+        assert_allclose(risk.linear[m], g, atol=1e-12)
+        assert_allclose(risk.constant[m], E0)
+
+
+# Smoothness
+
+
+def rough_samples(models=1):
+    """Samples on a grid of kernels, which knows how rough weights are."""
+    data, grid = draw(samples=60), uc.NormalisedRBF.grid(-1, 1, 4)
+    samples = samples_of(data, features=grid(data.states), models=models)
+    return replace(samples, roughness=np.tile(grid.roughness(), (models, 1, 1)))
+
+
+def test_smoothness_is_the_naive_formula():
+    samples, rng = rough_samples(models=2), np.random.default_rng(3)
+    weights = rng.standard_normal((2, 2, 16))
+    evidence, prior = random_quadratic(rng, 32), random_quadratic(rng, 32)
+    found = Smoothness.of(samples).updated(weights, Posterior(evidence, prior), noise=0.5, unit=np.array([1.0, 0.1]))
+    for m, unit in enumerate((1.0, 0.1)):
+        R = samples.roughness[m]
+        C = unit * np.linalg.inv(evidence.hessian[m] + prior.hessian[m])
+        rough = sum(w @ R @ w for w in weights[m]) + np.trace(C @ np.kron(R, np.eye(2)))
+        assert_allclose(found.precision[m], 0.5 * np.linalg.matrix_rank(R, tol=1e-8) * 2 / rough, rtol=1e-6)
+    expected = [found.precision[m] * sum(w @ samples.roughness[m] @ w for w in weights[m]) for m in range(2)]
+    assert_allclose(found.prior()(vec(weights)), expected)
+
+
+def test_weights_that_are_drawn_tell_how_smooth_they_are():
+    samples, rng = rough_samples(), np.random.default_rng(0)
+    values, axes = np.linalg.eigh(samples.roughness[0])
+    scale = np.where(values > 1e-8, 1.0 / np.sqrt(np.maximum(values, 1e-8)), 0.0)
+    certain = Quadratic(1e9 * np.eye(32)[None], np.zeros((1, 32)), np.zeros(1))
+    found = [
+        Smoothness.of(samples)
+        .updated(((rng.standard_normal((2, 16)) * scale) @ axes.T)[None] / 4.0, Posterior(certain, certain), noise=1.0)
+        .precision[0]
+        for _ in range(200)
+    ]
+    assert_allclose(1.0 / np.mean(1.0 / np.array(found)), 4.0**2, rtol=0.1)
+
+
+def test_what_is_no_noise_is_not_smoothed():
+    samples, rng = rough_samples(), np.random.default_rng(1)
+    posterior = Posterior(random_quadratic(rng, 32, models=1), random_quadratic(rng, 32, models=1))
+    assert Smoothness.of(samples).updated(rng.standard_normal((1, 2, 16)), posterior, noise=0.0).precision == 0.0
+
+
+def test_one_fold_alone_does_not_make_an_end_more_probable():
+    samples = samples_of(draw(samples=200), groups=np.arange(200) % 10)
+    assert clearly_more(samples, np.full(200, 0.1))
+    assert not clearly_more(samples, np.full(200, -0.1))
+    assert not clearly_more(samples, np.where(samples.folds == 3, 5.0, -0.1))
+
+
+# Segments
+
+
+def test_a_segments_projection_is_that_of_its_constraint():
+    rng = np.random.default_rng(0)
+    N = uc.null_space_projection(rng.standard_normal((1, 3)))
+    actions = rng.standard_normal((40, 3)) @ N + 0.01 * rng.standard_normal((40, 3))
+    assert_allclose(projection_of(actions, 0.01), N, atol=0.02)
+    assert_allclose(projection_of(0.01 * rng.standard_normal((40, 3)), 0.01), 0.0)
+    assert_allclose(projection_of(np.zeros((5, 3)), 0.0), 0.0)
+    assert_allclose(projection_of(actions, 1e-4), np.eye(3), atol=1e-12)
+
+
+def test_changes_of_the_constraint_are_found():
+    rng = np.random.default_rng(3)
+    wanted = np.column_stack([1 + 0.2 * rng.standard_normal(60), 0.5 + 0.2 * rng.standard_normal(60)])
+    constraint = uc.constraints.SwitchingLine(np.array([[1.0, 0.2], [0.1, 1.0], [1.0, -1.0]]), np.array([20.0, 45.0]))
+    N = uc.null_space_projection(constraint(wanted, np.arange(60.0)))
+    actions = uc.project(N, wanted)
+    assert_array_equal(change_points(actions, 1e-3), [20, 45])
+    noisy = actions + 0.01 * rng.standard_normal(actions.shape)
+    assert np.abs(change_points(noisy, 0.01) - [20, 45]).max() <= 1
+    groups = np.repeat([0, 1], 30)
+    labels = found_segments(actions, groups, 1e-3)
+    assert_array_equal(np.flatnonzero(np.diff(labels)) + 1, [20, 30, 45])
+    assert len(change_points(wanted, 1e-3)) == 0
+
+
+def test_constrained_error_is_the_naive_sum():
+    data = draw(samples=30, noise=0.0)
+    samples, labels = samples_of(data), np.repeat([0, 1, 2], 10)
+    weights = np.random.default_rng(5).standard_normal((1, 2, 3))
+    predicted = samples.predict(weights)
+    expected = 0.0
+    for label in range(3):
+        rows = labels == label
+        N = projection_of(data.actions[rows], 0.2)
+        expected += sum(
+            w * (N @ u - N @ p) @ (N @ u - N @ p)
+            for u, p, w in zip(data.actions[rows], predicted[rows], samples.memberships[rows, 0], strict=True)
+        )
+    assert_allclose(constrained_error(samples, labels, 0.2)(vec(weights)), expected)
