@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import reduce
 from operator import add
@@ -41,14 +42,12 @@ def noise_corrected(samples: Samples, noise: float | None = None) -> Candidate:
     (too large where constraints change at every sample), and from the
     residuals (too large where the model does not fit). Or it is given.
     """
-    parts = samples.by_fold()
-    weighted = [part.moments(part.actions, (part.actions**2).sum(axis=1)) for part in parts]
-    plain = [part.moments(part.actions, np.ones(len(part))) for part in parts]
+    parts = _Parts(samples)
     d, rough, time = samples.actions.shape[1], Smoothness.of(samples), 1.0
     most, variance = noise_by_differences(samples.actions, samples.groups), 0.0 if noise is None else noise**2
     for _ in range(_ROUNDS):
         used = variance
-        whole = _Corrected(total(weighted), total(plain), used, samples.sizes)
+        whole = parts.corrected(used)
         softness, smoothness, unit = whole.balanced(rough, time)
         policy = samples.predict(whole.posterior(softness, smoothness.prior(unit)).weights(d))
         time = correlation_time(_residuals(samples, policy, used)[:, None], samples.groups)
@@ -56,16 +55,8 @@ def noise_corrected(samples: Samples, noise: float | None = None) -> Candidate:
             variance = min(most, _mean(samples, distances(samples.actions, policy).radial ** 2))
     smooth, proposed = smoothness.prior(unit), float(np.median(softness))
     softnesses = (proposed, *SOFTNESSES)
-    held_out, missed = np.empty((len(softnesses), *policy.shape)), []
-    for fold, part in enumerate(parts):
-        others = [i for i in range(len(parts)) if i != fold] or [fold]
-        rest = _Corrected(total(weighted[i] for i in others), total(plain[i] for i in others), used, samples.sizes)
-        found = softened_minima(rest.consistent + smooth, rest.risk, softnesses)
-        predicted = [part.predict(unvec(found[..., k], d)) for k in range(len(softnesses))]
-        missed.append([part.counts @ _residuals(part, one, used) ** 2 / part.counts.sum() for one in predicted])
-        held_out[:, samples.folds == fold] = predicted
-    chosen = _not_refuted(np.array(missed), np.log(np.array(softnesses) / proposed))
-    best = int(np.mean(missed, axis=0).argmin())
+    held_out, missed = parts.held_out(softnesses, smooth, used)
+    chosen, best = _not_refuted(missed, np.log(np.array(softnesses) / proposed)), int(missed.mean(axis=0).argmin())
     posterior = Posterior(whole.consistent, softnesses[chosen] * whole.risk + smooth)
     weights = posterior.weights(d)
     of_noise, residual = whole.noise(weights), whole.residual(weights)
@@ -144,6 +135,34 @@ def by_segments(samples: Samples, labels: NDArray[np.intp], noise: float) -> Can
     residual = np.maximum(missed, 1e-12 * reduce(add, risks).constant) / np.maximum(sizes, 1e-300)
     time = correlation_time(radial[:, None], samples.groups)
     return Candidate("segments", best, _per(found, time * residual), held_out, _mean(samples, radial**2))
+
+
+class _Parts:
+    """Samples and moments of each fold, to be corrected together, or all but one."""
+
+    def __init__(self, samples: Samples) -> None:
+        self._samples, self._parts = samples, samples.by_fold()
+        self._weighted = [part.moments(part.actions, (part.actions**2).sum(axis=1)) for part in self._parts]
+        self._plain = [part.moments(part.actions, np.ones(len(part))) for part in self._parts]
+
+    def corrected(self, variance: float, without: int | None = None) -> _Corrected:
+        """Of everything, or without one fold."""
+        kept = [fold for fold in range(len(self._parts)) if fold != without] or [0]
+        weighted, plain = (total(moments[fold] for fold in kept) for moments in (self._weighted, self._plain))
+        return _Corrected(weighted, plain, variance, self._samples.sizes)
+
+    def held_out(self, softnesses: Sequence[float], smooth: Quadratic, variance: float) -> tuple[Array, Array]:
+        """Predictions (K, N, d) by what the other folds say, softened so, and mean square of ρ in each fold (R, K)."""
+        predictions = np.empty((len(softnesses), *self._samples.actions.shape))
+        missed = np.empty((len(self._parts), len(softnesses)))
+        for fold, part in enumerate(self._parts):
+            rest = self.corrected(variance, without=fold)
+            found = softened_minima(rest.consistent + smooth, rest.risk, softnesses)
+            for k in range(len(softnesses)):
+                predicted = part.predict(unvec(found[..., k], part.actions.shape[1]))
+                predictions[k, self._samples.folds == fold] = predicted
+                missed[fold, k] = part.counts @ _residuals(part, predicted, variance) ** 2 / part.counts.sum()
+        return predictions, missed
 
 
 class _Corrected:
