@@ -238,13 +238,13 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
 def test_where_constraints_are_a_function_of_the_state_intervals_hold_the_truth(monkeypatch):
     rng = np.random.default_rng(20)
     training, test = regimes.demonstrate("arm", "1-2-3", rng)
-    noisy = regimes.with_noise(training[:60], 0.05, rng)
+    noisy = regimes.with_noise(training, 0.05, rng)
     policy = uc.LocallyLinearPolicy(3.0, 0.7, learner=uc.NoiseCorrected()).fit_demonstrations(noisy)
-    _, held = regimes._knowledge(policy, training[:60], test)
+    _, held = regimes._knowledge(policy, training, test)
     assert held > 0.8
     monkeypatch.setattr(consistent, "_repeats", lambda time, samples: time)
     naively = policy.with_learner(uc.NoiseCorrected())  # what the model misses is taken to average out
-    assert regimes._knowledge(naively, training[:60], test)[1] < held - 0.05
+    assert regimes._knowledge(naively, training, test)[1] < held - 0.1
 
 
 def test_what_no_action_shows_is_undetermined():

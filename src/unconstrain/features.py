@@ -116,9 +116,11 @@ class NormalisedRBF:
         # On a grid both kernels and what they sum to are products over the axes: few exponentials instead of many.
         _check_columns(states, self.centres)
         xp = namespace(states)
-        product: Array = xp.ones_like(states[:, :1]).T
-        for axis, ticks in enumerate(self._ticks):
-            along = shares(states[:, axis : axis + 1], ticks[:, None], self.variance).T
+        product, *others = (
+            shares(states[:, axis : axis + 1], ticks[:, None], self.variance).T
+            for axis, ticks in enumerate(self._ticks)
+        )
+        for along in others:
             product = xp.reshape(product[:, None, :] * along[None, :, :], (-1, states.shape[0]))
         return product.T
 
