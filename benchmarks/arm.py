@@ -8,13 +8,13 @@ import numpy as np
 from table import Row, row, script, side_by_side
 from threadpoolctl import threadpool_limits
 
-from unconstrain.demonstration import stack
-from unconstrain.experiments import table2
-from unconstrain.learners import Hybrid
-from unconstrain.moments import gather
+from unconstrain.learners.plain import Hybrid
+from unconstrain.paper.experiments import table2
+from unconstrain.paper.systems.arm import LWR3
 from unconstrain.policies import LocallyLinearPolicy
-from unconstrain.systems.arm import LWR3
-from unconstrain.validation import Folds
+from unconstrain.recordings.demonstration import stack
+from unconstrain.risks.moments import gather
+from unconstrain.training.validation import Folds
 
 
 def main() -> list[Row]:

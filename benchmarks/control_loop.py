@@ -14,7 +14,7 @@ import numpy as np
 from table import Row, row, script
 
 import unconstrain as uc
-from unconstrain.arrays import Array
+from unconstrain.base.arrays import Array
 
 FIELDS, JOINTS = 50, 7
 REPEATS, CALLS = 15, 5_000

@@ -16,7 +16,7 @@ import numpy as np
 from table import Row, row, script
 
 import unconstrain as uc
-from unconstrain.preparation import Recipe
+from unconstrain.recordings.preparation import Recipe
 
 SMALL = 100_000
 SAMPLES = 10_000_000

@@ -9,11 +9,11 @@ from table import Row, ratio, row, script, side_by_side
 from threadpoolctl import threadpool_limits
 
 import unconstrain as uc
-from unconstrain.arrays import Array, namespace
-from unconstrain.moments import Moments, Sums
-from unconstrain.objectives import inconsistency, standard_risk
-from unconstrain.quadratic import lexicographic_path
-from unconstrain.validation import FoldedMoments
+from unconstrain.base.arrays import Array, namespace
+from unconstrain.risks.moments import Moments, Sums
+from unconstrain.risks.objectives import inconsistency, standard_risk
+from unconstrain.risks.quadratic import lexicographic_path
+from unconstrain.training.validation import FoldedMoments
 
 SAMPLES = 100_000
 GRIDS = (5, 10, 20)

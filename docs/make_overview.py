@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from unconstrain import figures
-from unconstrain.experiments import toy
+from unconstrain.pages import figures
+from unconstrain.paper.experiments import toy
 
 settings = toy.ToySettings()
 demonstrations = toy.demonstrate(settings, np.random.default_rng(2), toy.random_lines)

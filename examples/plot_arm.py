@@ -26,7 +26,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import unconstrain as uc
-from unconstrain.experiments import table2
+from unconstrain.paper.experiments import table2
 
 settings = table2.Settings(demonstrations=40, steps=60)
 rng = np.random.default_rng(1)
@@ -85,6 +85,6 @@ plt.show()
 
 # %%
 # Your own arm takes the place of the light-weight robot with
-# ``Arm.from_urdf("robot.urdf", tip="hand")`` from ``unconstrain.systems.arm``
-# (extra ``arm``); ``unconstrain.constraints.JacobianRows(arm.jacobian, (0, 1))`` then
+# ``Arm.from_urdf("robot.urdf", tip="hand")`` from ``unconstrain.paper.systems.arm``
+# (extra ``arm``); ``unconstrain.constraints.known.JacobianRows(arm.jacobian, (0, 1))`` then
 # holds the first two coordinates of its hand in a rollout.

@@ -11,15 +11,15 @@ of the paper). No method is told that there is a rail.
 # Record, and learn
 # -----------------
 #
-# :mod:`unconstrain.experiments.figure4` does both and returns everything that a picture needs: the recordings, the
-# true policy on a grid of states, and what *direct* regression, the *inconsistency* alone and the *hybrid* make of
-# it.
+# :mod:`unconstrain.paper.experiments.figure4` does both and returns everything that a picture needs: the recordings,
+# the true policy on a grid of states, and what *direct* regression, the *inconsistency* alone and the *hybrid* make
+# of it.
 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from unconstrain.experiments import figure4
-from unconstrain.figures import COLOURS, LABELS, METHODS
+from unconstrain.pages.figures import COLOURS, LABELS, METHODS
+from unconstrain.paper.experiments import figure4
 
 result = figure4.run(figure4.Settings(seed=0))
 grid, true = result.details["grid"], result.details["policy"]

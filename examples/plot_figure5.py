@@ -17,8 +17,8 @@ angle of at most θmax, so that one number leads from the one end to the other (
 import matplotlib.pyplot as plt
 import numpy as np
 
-from unconstrain.experiments import figure5
-from unconstrain.figures import COLOURS, LABELS, METHODS
+from unconstrain.pages.figures import COLOURS, LABELS, METHODS
+from unconstrain.paper.experiments import figure5
 
 settings = figure5.Settings(widest=(0.0, 0.05, 0.1, 0.2, 0.3, 0.6, 1.0, 1.5), trials=4)
 result = figure5.run(settings)

@@ -16,8 +16,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import unconstrain as uc
-from unconstrain.experiments import regimes, toy
-from unconstrain.figures import COLOURS
+from unconstrain.pages.figures import COLOURS
+from unconstrain.paper.experiments import regimes, toy
 
 settings = toy.ToySettings()
 rng = np.random.default_rng(7001)

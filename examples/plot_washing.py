@@ -19,8 +19,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import unconstrain as uc
-from unconstrain.figures import COLOURS, LABELS, broken
-from unconstrain.systems.wiping import HELD_OUT, PLATES, demonstrate
+from unconstrain.pages.figures import COLOURS, LABELS, broken
+from unconstrain.paper.systems.wiping import HELD_OUT, PLATES, demonstrate
 
 plates = {plate.name: plate for plate in PLATES}
 demos = {name: demonstrate(plate, np.random.default_rng(seed)) for seed, (name, plate) in enumerate(plates.items())}

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from unconstrain import robust
+from unconstrain.learners import robust
 
 
 class Samples(NamedTuple):

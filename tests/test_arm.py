@@ -7,10 +7,10 @@ from numpy.testing import assert_allclose
 from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
-from unconstrain.constraints import JacobianRows
-from unconstrain.errors import InvalidDataError, ReadError, SettingError
-from unconstrain.projection import null_space_projection
-from unconstrain.systems.arm import LWR3, Arm
+from unconstrain.base.errors import InvalidDataError, ReadError, SettingError
+from unconstrain.constraints.known import JacobianRows
+from unconstrain.paper.systems.arm import LWR3, Arm
+from unconstrain.risks.projection import null_space_projection
 
 LWR3_TABLE = (
     np.zeros(7),

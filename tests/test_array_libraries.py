@@ -10,12 +10,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import samples
 import unconstrain as uc
-from unconstrain.arrays import as_matrix, beside, is_foreign, namespace, on_host
-from unconstrain.errors import InvalidDataError, MissingExtraError
-from unconstrain.moments import gather
-from unconstrain.objectives import inconsistency, standard_risk
-from unconstrain.quadratic import Quadratic, lexicographic_path, minimum
-from unconstrain.receptive_fields import ReceptiveFields
+from unconstrain.base.arrays import as_matrix, beside, is_foreign, namespace, on_host
+from unconstrain.base.errors import InvalidDataError, MissingExtraError
+from unconstrain.models.receptive_fields import ReceptiveFields
+from unconstrain.risks.moments import gather
+from unconstrain.risks.objectives import inconsistency, standard_risk
+from unconstrain.risks.quadratic import Quadratic, lexicographic_path, minimum
 
 LIBRARIES = {"strict": array_api_strict, "torch": torch}
 CENTRES = np.random.default_rng(0).uniform(-1, 1, (7, 2))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from unconstrain.arrays import (
+from unconstrain.base.arrays import (
     as_groups,
     as_matrix,
     as_table,
@@ -13,7 +13,7 @@ from unconstrain.arrays import (
     check_at_least,
     require_extra,
 )
-from unconstrain.errors import InvalidDataError, MissingExtraError, SettingError, UnconstrainError
+from unconstrain.base.errors import InvalidDataError, MissingExtraError, SettingError, UnconstrainError
 
 
 @pytest.mark.parametrize(

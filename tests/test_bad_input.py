@@ -12,7 +12,7 @@ from sklearn.base import clone
 import unconstrain as uc
 from conftest import LEARNERS, POLICIES
 from samples import draw
-from unconstrain.errors import InvalidDataError, UnconstrainError
+from unconstrain.base.errors import InvalidDataError, UnconstrainError
 
 
 def broken(table, row, column, value):

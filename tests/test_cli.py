@@ -17,10 +17,12 @@ from click.testing import CliRunner
 from numpy.testing import assert_allclose
 
 import unconstrain as uc
-from unconstrain import cli, experiments, report, storage
+from unconstrain import cli, storage
+from unconstrain.base.errors import MissingExtraError
 from unconstrain.cli import fitting
-from unconstrain.errors import MissingExtraError
-from unconstrain.experiments import table1, washing
+from unconstrain.paper import experiments
+from unconstrain.paper import pages as report
+from unconstrain.paper.experiments import table1, washing
 
 DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))
 RIM = DATA / "lasa_rim_wiping" / "demos_rim_processed_data.mat"
@@ -467,13 +469,12 @@ def test_fit_and_inspect_read_parquet_and_hdf5(folder, policy, tmp_path):
 
 
 def test_a_report_of_more_than_memory_shows_its_beginning(folder, tmp_path, monkeypatch):
-    from unconstrain import streams
-    from unconstrain.cli.reading import beginning
+    from unconstrain.recordings import streams
 
     stream = uc.Stream(sorted(folder.glob("swing_*.csv")))
-    assert len(beginning(stream)) == 8
+    assert len(stream.beginning()) == 8
     monkeypatch.setattr(streams, "HELD_BYTES", 3000)
-    assert len(beginning(uc.Stream(stream.paths))) == 2
+    assert len(uc.Stream(stream.paths).beginning()) == 2
 
 
 # score
@@ -1084,8 +1085,8 @@ def test_doctor_finds_everything_that_the_tests_need():
 
 
 def test_doctor_tells_how_to_mend_what_is_missing(monkeypatch):
-    from unconstrain import simulation
     from unconstrain.cli import doctor
+    from unconstrain.paper import simulation
 
     versions = {"plotly": None}
     monkeypatch.setattr(doctor, "_version", lambda package: versions.get(package, "1.0"))

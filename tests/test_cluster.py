@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import unconstrain as uc
 from samples import draw
 from unconstrain import cli, cluster
-from unconstrain.errors import InvalidDataError, MissingExtraError, SettingError
+from unconstrain.base.errors import InvalidDataError, MissingExtraError, SettingError
 
 dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")

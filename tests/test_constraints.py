@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from unconstrain.constraints import JacobianRows, Plane, PolicyAligned, SwitchingLine
-from unconstrain.errors import InvalidDataError, SettingError
-from unconstrain.projection import null_space_projection
+from unconstrain.base.errors import InvalidDataError, SettingError
+from unconstrain.constraints.known import JacobianRows, Plane, PolicyAligned, SwitchingLine
+from unconstrain.risks.projection import null_space_projection
 
 
 def circle(states):

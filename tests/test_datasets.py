@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from unconstrain import datasets
-from unconstrain.datasets import WipingBout, load_rim_wiping
-from unconstrain.errors import MissingExtraError, ReadError
+from unconstrain.base.errors import MissingExtraError, ReadError
+from unconstrain.paper import datasets
+from unconstrain.paper.datasets import WipingBout, load_rim_wiping
 
 DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))
 RIM = DATA / "lasa_rim_wiping"

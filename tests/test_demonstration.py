@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from unconstrain import Demonstration, Recording, Truth, stack
-from unconstrain.errors import InvalidDataError
+from unconstrain.base.errors import InvalidDataError
 
 
 def demonstration(steps=4, n=2, d=3, name="wipe"):

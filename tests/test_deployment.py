@@ -19,8 +19,8 @@ import naive
 import unconstrain as uc
 from conftest import POLICIES
 from samples import draw
+from unconstrain.base.errors import InvalidDataError, MissingExtraError, SettingError
 from unconstrain.deployment import c_source
-from unconstrain.errors import InvalidDataError, MissingExtraError, SettingError
 
 DATA = draw(noise=0.02)
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs the C compiler gcc")

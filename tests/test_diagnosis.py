@@ -12,10 +12,10 @@ from numpy.testing import assert_allclose
 import unconstrain as uc
 from test_cli import call, refused, run, write
 from test_report import References, browser, opened  # noqa: F401 - a fixture
-from unconstrain import report
-from unconstrain.diagnosis import Diagnosis, diagnose, sentences
-from unconstrain.errors import InvalidDataError, SettingError
-from unconstrain.robust import covariances
+from unconstrain.base.errors import InvalidDataError, SettingError
+from unconstrain.evaluation.diagnosis import Diagnosis, diagnose, sentences
+from unconstrain.learners.robust import covariances
+from unconstrain.pages import diagnosis, fit
 
 TURN = np.array([[-0.3, 1.0], [-1.0, -0.3]])
 
@@ -147,7 +147,7 @@ class TestWhatIsFound:
         policy = uc.ParametricPolicy(learner=uc.NoiseCorrected()).fit_demonstrations(demos)
         found = diagnose(policy, demos)
         assert "nothing was compared" in " ".join(sentences(found, ["x", "y"], ["vx", "vy"]))
-        assert "Nothing was compared" in report.diagnosis_page(found, demos, "A page", ["x", "y"], ["vx", "vy"])
+        assert "Nothing was compared" in diagnosis.diagnosis_page(found, demos, "A page", ["x", "y"], ["vx", "vy"])
 
     def test_another_learner_is_told_what_to_do(self, fitted):
         with pytest.raises(SettingError, match=r"Fit with learner=Robust\(\)"):
@@ -221,13 +221,13 @@ class TestPage:
         policy, demos = fitted
         evil = "<script>alert(1)</script>"
         named = [replace(demo, name=evil) for demo in demos]
-        page = report.diagnosis_page(diagnose(policy, named), named, "A diagnosis", ["x", evil], ["vx", "vy"])
+        page = diagnosis.diagnosis_page(diagnose(policy, named), named, "A diagnosis", ["x", evil], ["vx", "vy"])
         assert evil not in page
         assert len(opened(browser, page, tmp_path)) == 2
 
     def test_a_page_fits_on_a_phone(self, fitted, browser, tmp_path):  # noqa: F811
         policy, demos = fitted
-        page = report.diagnosis_page(diagnose(policy, demos), demos, "A diagnosis", ["x", "y"], ["vx", "vy"])
+        page = diagnosis.diagnosis_page(diagnose(policy, demos), demos, "A diagnosis", ["x", "y"], ["vx", "vy"])
         metrics = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         try:
@@ -237,11 +237,11 @@ class TestPage:
             browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
     def test_the_page_of_a_robust_fit_says_what_is_not_known(self, fitted, browser, tmp_path):  # noqa: F811
-        page = report.policy_page(*fitted, "A policy")
+        page = fit.policy_page(*fitted, "A policy")
         assert "What is not known" in page
         assert [one["id"] for one in opened(browser, page, tmp_path)][-1] == "known-1"
 
     def test_a_fit_of_which_nothing_can_be_said_says_so(self):
         demos = [replace(one, actions=one.actions[:, :1]) for one in movements()]
         policy = uc.ParametricPolicy(learner=uc.Robust()).fit_demonstrations(demos)
-        assert "Nothing can be said about that: got one action column" in report.policy_page(policy, demos, "A policy")
+        assert "Nothing can be said about that: got one action column" in fit.policy_page(policy, demos, "A policy")

@@ -11,14 +11,14 @@ from numpy.testing import assert_allclose
 
 import unconstrain as uc
 from test_cli import DATA, needs_data
-from unconstrain import experiments
-from unconstrain.errors import SettingError
-from unconstrain.experiments import figure4, figure5, table1, table2, toy, trials, washing
-from unconstrain.experiments.journal import Journal
-from unconstrain.experiments.washing.surfaces import simulated_split
-from unconstrain.systems.limit_cycle import LimitCycle
-from unconstrain.systems.wiping import HELD_OUT, PLATES, Plate, Strokes, WipingPolicy
-from unconstrain.systems.wiping import demonstrate as wipe
+from unconstrain.base.errors import SettingError
+from unconstrain.paper import experiments
+from unconstrain.paper.experiments import figure4, figure5, table1, table2, toy, trials, washing
+from unconstrain.paper.experiments.journal import Journal
+from unconstrain.paper.experiments.washing.surfaces import simulated_split
+from unconstrain.paper.systems.limit_cycle import LimitCycle
+from unconstrain.paper.systems.wiping import HELD_OUT, PLATES, Plate, Strokes, WipingPolicy
+from unconstrain.paper.systems.wiping import demonstrate as wipe
 
 METHODS = ["direct", "inconsistency", "hybrid"]
 MEASURES = [f"{metric}_{what}" for metric in ("nupe", "ncpe", "ninc") for what in ("mean", "sd")]

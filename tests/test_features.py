@@ -10,8 +10,8 @@ from scipy.special import softmax
 
 import naive
 from unconstrain import Affine, KMeansRBF, NormalisedRBF
-from unconstrain.errors import InvalidDataError, SettingError
-from unconstrain.features import Placeable, shares, squared_distances
+from unconstrain.base.errors import InvalidDataError, SettingError
+from unconstrain.models.features import Placeable, shares, squared_distances
 
 seeds = st.integers(0, 1000)
 

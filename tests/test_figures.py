@@ -7,11 +7,11 @@ import sys
 import numpy as np
 import pytest
 
-from unconstrain import figures
-from unconstrain.demonstration import Demonstration
-from unconstrain.errors import MissingExtraError
-from unconstrain.figures.planes import arrow_lines, broken, clipped
-from unconstrain.figures.style import DASHES, MARKERS
+from unconstrain.base.errors import MissingExtraError
+from unconstrain.pages import figures
+from unconstrain.pages.figures.planes import arrow_lines, broken, clipped
+from unconstrain.pages.figures.style import DASHES, MARKERS
+from unconstrain.recordings.demonstration import Demonstration
 
 rng = np.random.default_rng(0)
 NORMALS = [np.array(normal, float) for normal in ([0, 0, 1], [0, 0.3, 1], [1, 0, 0], [-0.95, 0.1, 0.1], [0, -1, 0])]

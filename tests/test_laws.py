@@ -10,10 +10,10 @@ from sklearn.base import clone
 import naive
 import unconstrain as uc
 from samples import draw, rotation
-from unconstrain.moments import Moments, gather
-from unconstrain.objectives import inconsistency, standard_risk
-from unconstrain.quadratic import lexicographic_path
-from unconstrain.validation import FoldedMoments
+from unconstrain.risks.moments import Moments, gather
+from unconstrain.risks.objectives import inconsistency, standard_risk
+from unconstrain.risks.quadratic import lexicographic_path
+from unconstrain.training.validation import FoldedMoments
 
 seeds = st.integers(0, 2**32 - 1)
 

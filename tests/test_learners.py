@@ -7,10 +7,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 import naive
 from samples import draw
 from unconstrain import Direct, Hybrid, Inconsistency
-from unconstrain.errors import SettingError
-from unconstrain.learners import Solution
-from unconstrain.moments import Moments, gather
-from unconstrain.validation import FoldedMoments
+from unconstrain.base.errors import SettingError
+from unconstrain.learners.plain import Solution
+from unconstrain.risks.moments import Moments, gather
+from unconstrain.training.validation import FoldedMoments
 
 AVERAGES = {
     "arithmetic": lambda each, weight: sum(w * e for e, w in zip(each, weight, strict=True)) / sum(weight),

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 import naive
 import unconstrain as uc
 from samples import draw
-from unconstrain.constraints import Plane
-from unconstrain.errors import InvalidDataError, SettingError
+from unconstrain.base.errors import InvalidDataError, SettingError
+from unconstrain.constraints.known import Plane
 
 
 def demonstrations(seed=0, noise=0.0, groups=3):

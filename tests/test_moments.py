@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import naive
-from unconstrain import moments as module
-from unconstrain.moments import Moments, Sums, gather, total
-from unconstrain.objectives import inconsistency, standard_risk, unvec, vec
+from unconstrain.risks import moments as module
+from unconstrain.risks.moments import Moments, Sums, gather, total
+from unconstrain.risks.objectives import inconsistency, standard_risk, unvec, vec
 
 NAMES = ("weight", "energy", "cross", "gram", "consistent")
 

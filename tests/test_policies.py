@@ -18,9 +18,9 @@ from sklearn.utils.estimator_checks import check_estimator
 import naive
 import unconstrain as uc
 from samples import draw
-from unconstrain.errors import InvalidDataError, SettingError, UnconstrainError
+from unconstrain.base.errors import InvalidDataError, SettingError, UnconstrainError
+from unconstrain.paper.systems.limit_cycle import LimitCycle
 from unconstrain.policies import PLACING_SAMPLES
-from unconstrain.systems.limit_cycle import LimitCycle
 
 POLICIES = [uc.ParametricPolicy, uc.LocallyLinearPolicy]
 LEARNERS = [uc.Direct(), uc.Inconsistency(), uc.Inconsistency(None), uc.Hybrid(), uc.Hybrid(softness=0.1, threshold=0)]

@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from unconstrain.demonstration import Demonstration, Recording
-from unconstrain.errors import InvalidDataError, SettingError, UnconstrainError
-from unconstrain.preparation import (
+from unconstrain.base.errors import InvalidDataError, SettingError, UnconstrainError
+from unconstrain.recordings.demonstration import Demonstration, Recording
+from unconstrain.recordings.preparation import (
     Gap,
     PreparationWarning,
     Recipe,
@@ -27,7 +27,7 @@ from unconstrain.preparation import (
     survey,
     trim,
 )
-from unconstrain.readers import read
+from unconstrain.recordings.readers import read
 
 DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))
 needs_data = pytest.mark.skipif(
@@ -544,7 +544,7 @@ def test_any_numbers_give_a_finite_demonstration_or_one_of_our_errors(
 
 
 @needs_data
-@pytest.mark.filterwarnings("ignore::unconstrain.preparation.PreparationWarning")
+@pytest.mark.filterwarnings("ignore::unconstrain.recordings.preparation.PreparationWarning")
 def test_a_tracked_finger_tip_moves_as_its_positions_say() -> None:
     recordings = read(DATA / "ccl_trakstar_planar" / "planer_circle_unflipped.csv")
     demonstration = only(prepare(recordings, Recipe(states=("x", "y", "z"), differentiate="savgol", rate=20)))

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import null_space
 
 from unconstrain import action_projection, null_space_projection, project
-from unconstrain.errors import InvalidDataError
-from unconstrain.projection import unit_actions
+from unconstrain.base.errors import InvalidDataError
+from unconstrain.risks.projection import unit_actions
 
 numbers = st.floats(-1e100, 1e100)
 matrices = hnp.arrays(float, hnp.array_shapes(min_dims=2, max_dims=3, max_side=4), elements=numbers)

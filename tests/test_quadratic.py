@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import minimize
 
 import naive
-from unconstrain.quadratic import Quadratic, lexicographic_path, minimum
+from unconstrain.risks.quadratic import Quadratic, lexicographic_path, minimum
 
 
 def least_squares(A, b):

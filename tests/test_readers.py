@@ -14,10 +14,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from unconstrain.demonstration import Recording
-from unconstrain.errors import ReadError, SettingError, UnconstrainError
-from unconstrain.readers import read
-from unconstrain.readers.table import seconds, unique_names
+from unconstrain.base.errors import ReadError, SettingError, UnconstrainError
+from unconstrain.recordings.demonstration import Recording
+from unconstrain.recordings.readers import read
+from unconstrain.recordings.readers.table import seconds, unique_names
 
 DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))
 needs_data = pytest.mark.skipif(

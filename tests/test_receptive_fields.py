@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import naive
 from unconstrain import ReceptiveFields, cover
-from unconstrain.errors import InvalidDataError, SettingError
-from unconstrain.receptive_fields import choose_variance
+from unconstrain.base.errors import InvalidDataError, SettingError
+from unconstrain.models.receptive_fields import choose_variance
 
 
 def states(seed=0, samples=60, n=2):

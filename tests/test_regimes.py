@@ -5,10 +5,11 @@ import pytest
 
 import unconstrain as uc
 from test_report import References, browser, opened  # noqa: F401 - a fixture
-from unconstrain import report
+from unconstrain.base.errors import SettingError
 from unconstrain.cli import printing
-from unconstrain.errors import SettingError
-from unconstrain.experiments import regimes
+from unconstrain.pages import html
+from unconstrain.paper import pages as report
+from unconstrain.paper.experiments import regimes
 
 PLAIN = {"direct", "inconsistency", "hybrid", "hybrid, auto"}
 METHODS = PLAIN | {"noise-corrected", "likelihood", "robust", "oracle", "constraints known"}
@@ -124,4 +125,4 @@ def test_the_page_has_a_picture_for_each_noise_and_the_numbers_of_the_summary(re
     assert references.found == []
     assert len(opened(browser, page, tmp_path)) == 2
     for one in result.tables["summary"]:
-        assert f"<td>{report.html.number(one['to_oracle'])}</td>" in page
+        assert f"<td>{html.number(one['to_oracle'])}</td>" in page

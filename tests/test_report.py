@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 import unconstrain as uc
-from unconstrain import report
-from unconstrain.errors import MissingExtraError
-from unconstrain.experiments import figure4, figure5, table1, table2, toy, washing
-from unconstrain.experiments.trials import Result
-from unconstrain.report import html
-from unconstrain.systems.wiping import PLATES, Strokes, demonstrate
+from unconstrain.base.errors import MissingExtraError
+from unconstrain.pages import fit, html
+from unconstrain.paper import pages as report
+from unconstrain.paper.experiments import figure4, figure5, table1, table2, toy, washing
+from unconstrain.paper.experiments.trials import Result
+from unconstrain.paper.systems.wiping import PLATES, Strokes, demonstrate
 
 DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))
 SMALL = {"demonstrations": 8, "steps": 10, "per_axis": 4, "folds": 4}
@@ -93,7 +93,7 @@ def results():
 
 def fit_page(name, title="A policy"):
     policy, demos = FITS[name][0], FITS[name][1]()
-    return report.policy_page(policy.fit_demonstrations(demos), demos, title)
+    return fit.policy_page(policy.fit_demonstrations(demos), demos, title)
 
 
 class TestFiles:
@@ -196,7 +196,7 @@ class TestPages:
     def test_names_are_text_and_never_markup(self):
         evil = "<script>alert(1)</script>"
         demos = [replace(demo, name=evil) for demo in plane()]
-        page = report.policy_page(uc.ParametricPolicy().fit_demonstrations(demos), demos, evil)
+        page = fit.policy_page(uc.ParametricPolicy().fit_demonstrations(demos), demos, evil)
         assert evil not in page
         assert "&lt;script&gt;alert(1)" in page
 

@@ -9,9 +9,9 @@ from sklearn.base import clone
 
 import unconstrain as uc
 from samples import draw, rotation, samples_of, spiral
-from unconstrain.experiments import regimes
-from unconstrain.objectives import inconsistency, standard_risk
-from unconstrain.robust import RobustSolution, consistent
+from unconstrain.learners.robust import RobustSolution, consistent
+from unconstrain.paper.experiments import regimes
+from unconstrain.risks.objectives import inconsistency, standard_risk
 
 LEARNERS = {
     "robust": uc.Robust(),

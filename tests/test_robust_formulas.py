@@ -11,17 +11,17 @@ from numpy.testing import assert_allclose, assert_array_equal
 import naive
 import unconstrain as uc
 from samples import draw, samples_of
-from unconstrain.learners import SOFTNESSES, within_errors
-from unconstrain.moments import gather
-from unconstrain.objectives import vec
-from unconstrain.quadratic import Quadratic, minimum, softened_minima
-from unconstrain.robust.consistent import _not_refuted
-from unconstrain.robust.likelihood import clearly_more
-from unconstrain.robust.noise import corrected, correlation_time, noise_by_differences
-from unconstrain.robust.posterior import Posterior
-from unconstrain.robust.segments import change_points, constrained_error, found_segments, projection_of
-from unconstrain.robust.smoothness import Smoothness
-from unconstrain.robust.sphere import SPREADS, beliefs, distances
+from unconstrain.learners.plain import SOFTNESSES, within_errors
+from unconstrain.learners.robust.consistent import _not_refuted
+from unconstrain.learners.robust.likelihood import clearly_more
+from unconstrain.learners.robust.noise import corrected, correlation_time, noise_by_differences
+from unconstrain.learners.robust.posterior import Posterior
+from unconstrain.learners.robust.segments import change_points, constrained_error, found_segments, projection_of
+from unconstrain.learners.robust.smoothness import Smoothness
+from unconstrain.learners.robust.sphere import SPREADS, beliefs, distances
+from unconstrain.risks.moments import gather
+from unconstrain.risks.objectives import vec
+from unconstrain.risks.quadratic import Quadratic, minimum, softened_minima
 
 seeds = st.integers(0, 2**32 - 1)
 

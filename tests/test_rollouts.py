@@ -6,9 +6,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import unconstrain as uc
 from samples import draw
-from unconstrain.constraints import Plane, SwitchingLine
-from unconstrain.errors import InvalidDataError, SettingError
-from unconstrain.systems.limit_cycle import LimitCycle
+from unconstrain.base.errors import InvalidDataError, SettingError
+from unconstrain.constraints.known import Plane, SwitchingLine
+from unconstrain.paper.systems.limit_cycle import LimitCycle
 
 
 def decay(states):

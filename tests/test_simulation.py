@@ -9,15 +9,16 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 
-from unconstrain import figures, simulation
-from unconstrain.containment import Contained
-from unconstrain.demonstration import Demonstration
-from unconstrain.errors import InvalidDataError, MissingExtraError, SettingError, UnconstrainError
-from unconstrain.simulation import control, pictures
-from unconstrain.simulation.postures import in_plane
-from unconstrain.simulation.scene import LINK_MASSES, TOOL
-from unconstrain.systems.arm import LWR3
-from unconstrain.systems.wiping import HELD_OUT, PLATES, Plate, Strokes, WipingPolicy
+from unconstrain.base.errors import InvalidDataError, MissingExtraError, SettingError, UnconstrainError
+from unconstrain.motion.containment import Contained
+from unconstrain.pages import figures
+from unconstrain.paper import simulation
+from unconstrain.paper.simulation import control, pictures
+from unconstrain.paper.simulation.postures import in_plane
+from unconstrain.paper.simulation.scene import LINK_MASSES, TOOL
+from unconstrain.paper.systems.arm import LWR3
+from unconstrain.paper.systems.wiping import HELD_OUT, PLATES, Plate, Strokes, WipingPolicy
+from unconstrain.recordings.demonstration import Demonstration
 
 SHORT = Strokes(count=2, duration=4.0)
 
@@ -174,7 +175,7 @@ def test_without_graphics_the_arm_is_lines(wiped, monkeypatch):
 
 
 def test_the_first_backend_that_works_is_taken(monkeypatch):
-    engine = sys.modules["unconstrain.simulation.engine"]  # the package has a function of that name
+    engine = sys.modules["unconstrain.paper.simulation.engine"]  # the package has a function of that name
     for working, found in (({"egl", "osmesa"}, "egl"), ({"osmesa"}, "osmesa"), (set(), None)):
         engine.backend.cache_clear()
         monkeypatch.setattr(engine, "_works", working.__contains__)

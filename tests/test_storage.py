@@ -22,7 +22,7 @@ from sklearn.base import clone
 import unconstrain as uc
 from samples import draw
 from unconstrain import storage
-from unconstrain.errors import ModelFileError
+from unconstrain.base.errors import ModelFileError
 
 VALIDATIONS = {
     "default": None,

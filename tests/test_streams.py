@@ -13,11 +13,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 import unconstrain as uc
 from conftest import POLICIES
 from samples import draw
-from unconstrain import batches, streams
-from unconstrain.batches import Batch, FirstLook
-from unconstrain.errors import InvalidDataError, MissingExtraError, ReadError, SettingError
-from unconstrain.preparation import Recipe
-from unconstrain.readers import hdf5, parquet, read_blocks
+from unconstrain.base.errors import InvalidDataError, MissingExtraError, ReadError, SettingError
+from unconstrain.recordings import batches, streams
+from unconstrain.recordings.batches import Batch, FirstLook
+from unconstrain.recordings.preparation import Recipe
+from unconstrain.recordings.readers import hdf5, parquet, read_blocks
 
 DATA = draw(samples=400, groups=7)
 
@@ -97,7 +97,7 @@ def test_batches_that_do_not_fit_together_are_refused():
 def test_bad_numbers_far_into_an_array_are_named(monkeypatch):
     states = DATA.states.copy()
     states[317, 1] = np.nan
-    monkeypatch.setattr("unconstrain.arrays.BLOCK_ROWS", 50)
+    monkeypatch.setattr("unconstrain.base.arrays.BLOCK_ROWS", 50)
     with pytest.raises(InvalidDataError, match=r"states: found nan at row 317, column 1 \(NaN or infinity in 1 places"):
         uc.ParametricPolicy().fit(states, DATA.actions)
 

@@ -6,9 +6,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from unconstrain import rollout
-from unconstrain.systems.arm import JointLimitAvoidance
-from unconstrain.systems.limit_cycle import LimitCycle
-from unconstrain.systems.wiping import HELD_OUT, PLATES, Plate, Strokes, WipingPolicy, demonstrate
+from unconstrain.paper.systems.arm import JointLimitAvoidance
+from unconstrain.paper.systems.limit_cycle import LimitCycle
+from unconstrain.paper.systems.wiping import HELD_OUT, PLATES, Plate, Strokes, WipingPolicy, demonstrate
 
 
 def test_the_limit_cycle_is_the_paper_s_in_polar_coordinates():

@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 import samples
 import unconstrain as uc
-from unconstrain.threads import WORTH_A_THREAD, workers
+from unconstrain.base.threads import WORTH_A_THREAD, workers
 
 
 def blas_threads():
@@ -86,7 +86,7 @@ def test_an_error_in_a_thread_is_the_error():
 
 
 def test_the_number_of_threads_does_not_change_what_is_learnt(monkeypatch):
-    monkeypatch.setattr("unconstrain.threads.WORTH_A_THREAD", 0)
+    monkeypatch.setattr("unconstrain.base.threads.WORTH_A_THREAD", 0)
     data = samples.draw()
     found = []
     for threads in (1, 2):

@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from samples import draw
 from unconstrain import Folds, HeldOut, Hybrid, ParametricPolicy
-from unconstrain.batches import Batch, FirstLook
-from unconstrain.errors import SettingError
-from unconstrain.moments import gather
-from unconstrain.validation import FoldedMoments, Splitter
+from unconstrain.base.errors import SettingError
+from unconstrain.recordings.batches import Batch, FirstLook
+from unconstrain.risks.moments import gather
+from unconstrain.training.validation import FoldedMoments, Splitter
 
 
 def splitter(validation, states, groups=None, weights=None):

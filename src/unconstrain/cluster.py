@@ -17,12 +17,12 @@ from typing import Any, TypeVar
 
 from sklearn.base import clone
 
-from .arrays import require_extra
-from .batches import Batch, FirstLook
-from .errors import InvalidDataError, SettingError
+from .base.arrays import require_extra
+from .base.errors import InvalidDataError, SettingError
+from .learners import SampleLearner
 from .policies import Policy
-from .robust import SampleLearner
-from .validation import FoldedMoments
+from .recordings import Batch, FirstLook
+from .training import FoldedMoments
 
 __all__ = ["FAN_IN", "check_learner", "connected", "fit", "fit_batches"]
 

@@ -20,9 +20,14 @@ from typing import Any
 
 import numpy as np
 
-from . import features, learners, moments, policies, receptive_fields, robust, validation
-from .errors import ModelFileError
+from . import policies
+from .base.errors import ModelFileError
+from .learners import plain as learners
+from .learners import robust
+from .models import features, receptive_fields
 from .policies import Policy
+from .risks import moments
+from .training import validation
 
 __all__ = ["VERSION", "load", "load_notes", "register", "save"]
 

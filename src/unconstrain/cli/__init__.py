@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from .. import experiments
-from ..errors import ModelFileError, ReadError, SettingError, UnconstrainError
+from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainError
+from ..paper import experiments
 from .diagnosing import diagnose
 from .fitting import MODELS, Alpha, check_speed_power, check_writable, default_learner, learn, learner_of, policy_of
 from .printing import Group, deliver, number, print_table, progress_bar, say_fit
 from .reading import (
     Numbers,
-    beginning,
     complete,
     options_for_reading,
     recipe_of,
@@ -30,8 +29,8 @@ from .reading import (
 
 if TYPE_CHECKING:  # everything heavy is imported by the command that needs it
     from ..constraints import Plane
-    from ..demonstration import Demonstration
     from ..policies import Policy
+    from ..recordings import Demonstration
 
 __all__ = ["main"]
 
@@ -56,8 +55,7 @@ def main() -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     """Say what is in FILEs, such as rates, gaps and zero actions."""
-    from ..preparation import survey
-    from ..readers.table import unique_names
+    from ..recordings import survey, unique_names
 
     recipe = recipe_of(**reading)
     surveys, first = [], None
@@ -142,8 +140,9 @@ def fit(
 
     What does not fit into memory is read twice, one file or block at a time.
     """
-    from .. import storage, validation
-    from ..readers import expand
+    from .. import storage
+    from ..recordings import expand
+    from ..training import validation
 
     paths = expand(files)
     check_writable((output, report), paths)
@@ -159,9 +158,9 @@ def fit(
     say_fit(fitted, stream if scheduler is None else None, learner)
     click.echo(f"policy: {output}")
     if report is not None:
-        from ..report import policy_page
+        from ..pages.fit import policy_page
 
-        Path(report).write_text(policy_page(fitted, beginning(stream), Path(output).stem), encoding="utf-8")
+        Path(report).write_text(policy_page(fitted, stream.beginning(), Path(output).stem), encoding="utf-8")
         click.echo(f"report: {report}")
 
 
@@ -175,7 +174,9 @@ def score(policy: str, files: Sequence[str], plane: tuple[float, ...] | None, as
 
     They are prepared as those were that it learnt from.
     """
-    from .. import metrics, preparation, storage
+    from .. import storage
+    from ..evaluation import metrics
+    from ..recordings import preparation
 
     learnt, notes = _fitted(policy), storage.load_notes(policy)
     recipe = preparation.Recipe.from_dict(notes.get("recipe", {}))
@@ -215,7 +216,8 @@ def rollout(
     policy: str, start: tuple[float, ...], steps: int, dt: float, plane: tuple[float, ...] | None, output: str
 ) -> None:
     """Follow POLICY, freely or on a plane, and write it as CSV."""
-    from .. import rollouts, storage
+    from .. import storage
+    from ..motion import rollouts
 
     learnt, recipe = _fitted(policy), storage.load_notes(policy).get("recipe", {})
     if len(start) != learnt.n_features_in_:
@@ -278,7 +280,7 @@ def reproduce(experiment: str, trials: int | None, seed: int, only: tuple[str, .
 
     An interrupted run goes on where it stopped.
     """
-    from ..experiments.journal import Journal
+    from ..paper.experiments.journal import Journal
 
     if workers == 0:
         raise SettingError("--workers: got 0, expected a number of processes, or -1 for one on each core.")
@@ -317,7 +319,7 @@ def demo(real: bool, download: bool, plate: tuple[float, ...] | None, seed: int,
 
     Writes a report to look at.
     """
-    from ..experiments import washing
+    from ..paper.experiments import washing
 
     if plate is not None and len(plate) != 2:
         raise SettingError(f"--plate: got {len(plate)} numbers, expected two, the tilts about x and y in degrees.")

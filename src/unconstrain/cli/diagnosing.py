@@ -14,7 +14,7 @@ from .printing import print_table
 from .reading import complete, options_for_reading, recipe_of, recordings_in, said_recipe
 
 if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
-    from ..diagnosis import Diagnosis
+    from ..evaluation import Diagnosis
 
 __all__ = ["diagnose"]
 
@@ -41,10 +41,9 @@ def diagnose(
 
     How much noise there is, where the constraints varied too little, and which demonstrations look free.
     """
-    from .. import diagnosis
-    from ..preparation import prepare
-    from ..readers import expand
-    from ..robust import Robust
+    from ..evaluation import diagnosis
+    from ..learners import Robust
+    from ..recordings import expand, prepare
 
     paths = expand(files)
     check_writable((report,), paths)
@@ -61,7 +60,7 @@ def diagnose(
         click.echo(f"{len(demonstrations)} demonstrations, {len(found.undetermined)} samples; {said_recipe(recipe)}.")
         _say(found, states, actions)
     if report is not None:
-        from ..report import diagnosis_page
+        from ..pages.diagnosis import diagnosis_page
 
         page = diagnosis_page(found, demonstrations, Path(report).stem, states, actions)
         Path(report).write_text(page, encoding="utf-8")
@@ -69,7 +68,7 @@ def diagnose(
 
 
 def _say(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> None:
-    from ..diagnosis import named, sentences
+    from ..evaluation import named, sentences
 
     for line in sentences(found, states, actions):
         click.echo(line)

@@ -52,7 +52,7 @@ def examine() -> list[Finding]:
 
 
 def _graphics() -> Finding:
-    from ..simulation import BACKENDS, backend
+    from ..paper.simulation import BACKENDS, backend
 
     what, serves = "graphics", "pictures of the arm without a screen"
     if _version("mujoco") is None:

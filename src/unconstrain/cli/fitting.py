@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from ..errors import SettingError
+from ..base.errors import SettingError
 
 if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
     from ..policies import Policy
-    from ..streams import Stream
+    from ..recordings import Stream
 
 __all__ = [
     "MODELS",
@@ -67,8 +67,7 @@ def default_learner(
 
 def learner_of(name: str, alpha: float | Literal["auto"] | None, softness: float | None) -> Any:
     """Make the learner that the options say."""
-    from ..learners import Direct, Hybrid, Inconsistency
-    from ..robust import Robust
+    from ..learners import Direct, Hybrid, Inconsistency, Robust
 
     given = {key: value for key, value in (("alpha", alpha), ("softness", softness)) if value is not None}
     if name != "hybrid":
@@ -92,7 +91,8 @@ def check_writable(outputs: Sequence[str | None], paths: Sequence[str | Path]) -
 
 def policy_of(model: str, variance: float | None, centres: int | None, **chosen: Any) -> Policy:
     """Make the policy that the options say."""
-    from .. import features, policies
+    from .. import policies
+    from ..models import features
 
     for option, value, needed in (("--variance", variance, "local"), ("--centres", centres, "rbf")):
         if value is not None and model != needed:

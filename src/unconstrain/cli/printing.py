@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import UnconstrainError
+from ..base.errors import UnconstrainError
 
 if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
     from collections.abc import Iterator
 
-    from ..experiments.trials import Progress, Result
+    from ..learners import RobustSolution
+    from ..paper.experiments.trials import Progress, Result
     from ..policies import Policy
-    from ..robust import RobustSolution
-    from ..streams import Stream
+    from ..recordings import Stream
 
 __all__ = ["Group", "deliver", "number", "print_table", "progress_bar", "say_fit", "show_warning"]
 
@@ -51,8 +51,8 @@ class Group(click.Group):
 
 def deliver(result: Result, headlines: Sequence[str], out: str) -> bool:
     """Print and write a result; False where it could not be written."""
-    from .. import report
-    from ..errors import MissingExtraError
+    from ..base.errors import MissingExtraError
+    from ..paper import pages as report
 
     _print_result(result)
     for line in headlines:
@@ -68,7 +68,7 @@ def deliver(result: Result, headlines: Sequence[str], out: str) -> bool:
 
 def _print_result(result: Result) -> None:
     """The paper's values stay in the files: mean and s.d. fill the 80 columns of a terminal."""
-    from ..experiments.trials import LABELS
+    from ..paper.experiments.trials import LABELS
 
     titles = {"constraint": "constr.", "theta_max": "θmax", "ninc": "norm. incon."} | {
         name: LABELS[name] for name in ("nupe", "ncpe")
@@ -96,7 +96,7 @@ def say_fit(policy: Policy, stream: Stream | None, learner: str) -> None:
 
     Without a stream nothing is said that would need to look at the samples again.
     """
-    from ..robust import RobustSolution
+    from ..learners import RobustSolution
 
     solution = policy.solution_
     models = f", {len(solution.weights)} local models" if len(solution.weights) > 1 else ""

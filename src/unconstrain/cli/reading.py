@@ -10,17 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import SettingError
+from ..base.errors import SettingError
 
 if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
-    from ..demonstration import Demonstration, Recording
-    from ..preparation import Recipe
-    from ..streams import Stream
+    from ..recordings import Recipe, Recording, Stream
 
 __all__ = [
     "Names",
     "Numbers",
-    "beginning",
     "complete",
     "options_for_reading",
     "recipe_of",
@@ -94,7 +91,7 @@ def recipe_of(
     **_: Any,
 ) -> Recipe:
     """How the options say that recordings are to be prepared."""
-    from ..preparation import Recipe
+    from ..recordings import Recipe
 
     if differentiate or by:
         if action is not None:
@@ -106,7 +103,7 @@ def recipe_of(
 
 def complete(recipe: Recipe, recording: Recording) -> Recipe:
     """Guess what was not said; what was said has to be there."""
-    from ..preparation.recipes import complete_recipe
+    from ..recordings import complete_recipe
 
     recording.select([*(recipe.states or ()), *(recipe.actions or ())])
     return complete_recipe(recipe, recording)
@@ -124,7 +121,7 @@ def recordings_in(
     paths: Sequence[str | Path], group: str | None = None, time: str | None = None, **_: Any
 ) -> list[Recording]:
     """Read files as the options say."""
-    from ..readers import read
+    from ..recordings import read
 
     return read(paths, group=group, time=time)
 
@@ -133,7 +130,7 @@ def recordings_one_by_one(
     paths: Sequence[str | Path], group: str | None = None, time: str | None = None, **_: Any
 ) -> Iterator[Recording]:
     """Read files as the options say, holding one at a time."""
-    from ..readers import expand, read_blocks
+    from ..recordings import expand, read_blocks
 
     for path in expand(paths):
         yield from read_blocks(path, group=group, time=time, whole=True)
@@ -141,22 +138,8 @@ def recordings_one_by_one(
 
 def stream_of(paths: Sequence[str | Path], speed_power: float, **reading: Any) -> Stream:
     """Files as batches to learn from, as the options say."""
-    from ..streams import Stream
+    from ..recordings import Stream
 
     roles = {"group": reading["group"], "time": reading["time"]}
     asked = recipe_of(**reading)
     return Stream(paths, complete(asked, Stream(paths, asked, **roles).first), speed_power=speed_power, **roles)
-
-
-def beginning(stream: Stream) -> list[Demonstration]:
-    """Demonstrations, as many from the first on as may be held."""
-    from ..streams import HELD_BYTES
-
-    shown: list[Demonstration] = []
-    size = 0
-    for _, demonstration in stream.named_demonstrations():
-        size += demonstration.states.nbytes + demonstration.actions.nbytes
-        if shown and size > HELD_BYTES:
-            break
-        shown.append(demonstration)
-    return shown

@@ -7,9 +7,9 @@ from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
-from ..arrays import Array
-from ..closed_form import ClosedForm
-from ..errors import SettingError
+from ..base.arrays import Array
+from ..base.errors import SettingError
+from ..models import ClosedForm
 
 __all__ = ["TOLERANCE", "c_source"]
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, require_extra
-from ..closed_form import ClosedForm
+from ..base.arrays import Array, require_extra
+from ..models import ClosedForm
 
 __all__ = ["onnx_model"]
 

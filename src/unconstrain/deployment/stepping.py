@@ -9,9 +9,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array
-from ..closed_form import ClosedForm
-from ..errors import InvalidDataError
+from ..base.arrays import Array
+from ..base.errors import InvalidDataError
+from ..models import ClosedForm
 
 __all__ = ["Step", "stepper", "stepper_on"]
 

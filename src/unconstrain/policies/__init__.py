@@ -8,7 +8,7 @@ samples, solve.
 
 from __future__ import annotations
 
-from ..batches import PLACING_SAMPLES
+from ..recordings import PLACING_SAMPLES
 from .base import Policy
 from .local import LocallyLinearPolicy
 from .parametric import ParametricPolicy

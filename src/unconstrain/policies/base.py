@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from ..arrays import (
+from ..base.arrays import (
     BLOCK_ROWS,
     Array,
     as_groups,
@@ -29,16 +29,12 @@ from ..arrays import (
     on_host,
     slices,
 )
-from ..batches import Batch, FirstLook, Groups
-from ..demonstration import Demonstration, stack
-from ..errors import InvalidDataError, SettingError
-from ..learners import Hybrid, Learner, Solution
-from ..moments import Moments, Sums
-from ..objectives import inconsistency, vec
-from ..projection import unit_actions
-from ..robust import RobustSolution, SampleLearner
-from ..threads import Workers, workers
-from ..validation import FoldedMoments, Folds, Splitter, Validation
+from ..base.errors import InvalidDataError, SettingError
+from ..base.threads import Workers, workers
+from ..learners import Hybrid, Learner, RobustSolution, SampleLearner, Solution
+from ..recordings import Batch, Demonstration, FirstLook, Groups, stack
+from ..risks import Moments, Sums, inconsistency, unit_actions, vec
+from ..training import FoldedMoments, Folds, Splitter, Validation
 from .deployable import Deployable
 from .looking import Looking
 

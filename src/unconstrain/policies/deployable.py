@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted
 
-from ..arrays import Array
-from ..closed_form import ClosedForm
+from ..base.arrays import Array
+from ..base.errors import SettingError
 from ..deployment import Step, c_source, onnx_model, stepper, stepper_on
-from ..errors import SettingError
 from ..learners import Solution
+from ..models import ClosedForm
 
 __all__ = ["Deployable"]
 

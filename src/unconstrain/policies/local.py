@@ -6,14 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted
 
-from ..arrays import Array, as_matrix
-from ..batches import FirstLook
-from ..closed_form import ClosedForm, exponents
-from ..features import Affine
-from ..learners import Learner
-from ..receptive_fields import ReceptiveFields, choose_variance, cover
-from ..robust import SampleLearner
-from ..validation import Validation
+from ..base.arrays import Array, as_matrix
+from ..learners import Learner, SampleLearner
+from ..models import Affine, ClosedForm, ReceptiveFields, choose_variance, cover, exponents
+from ..recordings import FirstLook
+from ..training import Validation
 from .base import Policy
 
 __all__ = ["LocallyLinearPolicy"]

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted
 
-from ..arrays import Array, on_host
-from ..batches import Batch
-from ..errors import SettingError
-from ..learners import Learner, Solution
-from ..robust import RobustSolution, SampleLearner, Samples, Uncertainty, uncertainty
-from ..validation import FoldedMoments, Splitter
+from ..base.arrays import Array, on_host
+from ..base.errors import SettingError
+from ..learners import Learner, RobustSolution, SampleLearner, Samples, Solution, Uncertainty
+from ..learners.robust import uncertainty
+from ..recordings import Batch
+from ..training import FoldedMoments, Splitter
 
 __all__ = ["Looking"]
 

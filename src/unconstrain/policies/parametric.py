@@ -6,14 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted
 
-from ..arrays import Array, as_matrix
-from ..batches import FirstLook
-from ..closed_form import ClosedForm
-from ..errors import SettingError
-from ..features import FeatureMap, KMeansRBF, Placeable
-from ..learners import Learner
-from ..robust import SampleLearner
-from ..validation import Validation
+from ..base.arrays import Array, as_matrix
+from ..base.errors import SettingError
+from ..learners import Learner, SampleLearner
+from ..models import ClosedForm, FeatureMap, KMeansRBF, Placeable
+from ..recordings import FirstLook
+from ..training import Validation
 from .base import Policy
 
 __all__ = ["ParametricPolicy"]

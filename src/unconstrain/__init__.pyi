@@ -1,0 +1,56 @@
+"""The public names and where they live: what a type checker sees, and what is imported on first use."""
+
+from . import cluster as cluster
+from . import constraints as constraints
+from . import storage as storage
+from .base import errors as errors
+from .base.errors import UnconstrainError as UnconstrainError
+from .evaluation import cpe as cpe
+from .evaluation import inconsistency as inconsistency
+from .evaluation import metrics as metrics
+from .evaluation import ncpe as ncpe
+from .evaluation import ninconsistency as ninconsistency
+from .evaluation import nupe as nupe
+from .evaluation import upe as upe
+from .learners import Direct as Direct
+from .learners import Hybrid as Hybrid
+from .learners import Inconsistency as Inconsistency
+from .learners import Likelihood as Likelihood
+from .learners import NoiseCorrected as NoiseCorrected
+from .learners import Robust as Robust
+from .learners import Segments as Segments
+from .learners import Solution as Solution
+from .learners import robust as robust
+from .models import Affine as Affine
+from .models import ClosedForm as ClosedForm
+from .models import KMeansRBF as KMeansRBF
+from .models import NormalisedRBF as NormalisedRBF
+from .models import ReceptiveFields as ReceptiveFields
+from .models import cover as cover
+from .motion import rollout as rollout
+from .paper import datasets as datasets
+from .paper import experiments as experiments
+from .paper import systems as systems
+from .policies import LocallyLinearPolicy as LocallyLinearPolicy
+from .policies import ParametricPolicy as ParametricPolicy
+from .recordings import Demonstration as Demonstration
+from .recordings import Recording as Recording
+from .recordings import Stream as Stream
+from .recordings import Truth as Truth
+from .recordings import preparation as preparation
+from .recordings import prepare as prepare
+from .recordings import read as read
+from .recordings import readers as readers
+from .recordings import stack as stack
+from .risks import Moments as Moments
+from .risks import Quadratic as Quadratic
+from .risks import action_projection as action_projection
+from .risks import gather as gather
+from .risks import null_space_projection as null_space_projection
+from .risks import project as project
+from .storage import load as load
+from .storage import save as save
+from .training import Folds as Folds
+from .training import HeldOut as HeldOut
+
+__version__: str

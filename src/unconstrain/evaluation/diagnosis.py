@@ -1,0 +1,357 @@
+"""What a robust fit knows of its demonstrations, what it does not, and what to record next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from math import exp
+from typing import Any
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.errors import InvalidDataError, SettingError
+from ..learners import HIDDEN, RobustSolution, covariances, noise_by_differences
+from ..models import choose_variance, cover
+from ..policies import Policy
+from ..recordings import Demonstration, stack, unique_names
+
+__all__ = ["Diagnosis", "Movement", "Region", "diagnose", "named", "sentences"]
+
+SMALL = 0.1
+"""An undetermined spread below this share of the typical action does not count."""
+
+MISFIT = 1.5
+"""Noise of this many times the jitter is a misfit of the model, for the most part."""
+
+FREE, CONSTRAINED = 0.5, 0.1
+"""Above and below these mean probabilities of a free sample, a demonstration looks free and constrained."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """A part of state space, and the recorded state in it at which least is known of the policy.
+
+    Parameters
+    ----------
+    centre : tuple of float
+        Of the receptive field, in units of the state.
+    samples : int
+        Of which this field is the nearest.
+    determined : float
+        Share of them at which the policy is determined.
+    spread : float
+        Root-mean-square undetermined spread over them, as a share of the typical action.
+    state : tuple of float
+        Where it is largest.
+    demonstration : str
+        In which that was recorded.
+    direction : tuple of float
+        Unit vector of the actions of which least is known there.
+    along : float
+        Standard deviation of the policy along it there, undetermined part, as a share of the typical action.
+    """
+
+    centre: tuple[float, ...]
+    samples: int
+    determined: float
+    spread: float
+    state: tuple[float, ...]
+    demonstration: str
+    direction: tuple[float, ...]
+    along: float
+
+
+@dataclass(frozen=True)
+class Movement:
+    """One demonstration: its name, samples, mean probability of a free sample (None if unknown), and as in Region."""
+
+    name: str
+    samples: int
+    free: float | None
+    determined: float
+    spread: float
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What is known of the policy, and what is not.
+
+    Parameters
+    ----------
+    method : str
+        Which candidate :class:`~unconstrain.Robust` took.
+    compared : dict
+        Each candidate's held-out inconsistency over that on noise-corrected moments.
+    refuted : bool
+        Whether that of the most probable policy was too far above.
+    noise : float
+        Standard deviation of the noise on each action coordinate, misfit of the model included; units of the action.
+    noise_share : float
+        Of all coordinates together, over the typical action.
+    jitter : float
+        The noise by differences in time, which know no model; infinite where demonstrations are too short. Too large
+        where constraints change at every sample.
+    typical : float
+        Root mean square length of the recorded actions.
+    directions : int
+        Weight directions, of all models together.
+    directions_determined : float
+        Share of them in which the data says more than the prior.
+    states_determined : float
+        Share of the recorded states at which the undetermined spread is below that from noise, or below a tenth of
+        the typical action.
+    free_share : float
+        Estimated share of samples that nothing constrained.
+    regions : tuple of Region
+        All, the least known first.
+    movements : tuple of Movement
+        Each demonstration.
+    undetermined, from_noise : ndarray, shape (N,)
+        Length of the standard deviations at each recorded state, as a share of the typical action.
+    free : ndarray, shape (N,), optional
+        Probability that each sample was free; None where the policy was fitted to others.
+    """
+
+    method: str
+    compared: dict[str, float]
+    refuted: bool
+    noise: float
+    noise_share: float
+    jitter: float
+    typical: float
+    directions: int
+    directions_determined: float
+    states_determined: float
+    free_share: float
+    regions: tuple[Region, ...]
+    movements: tuple[Movement, ...]
+    undetermined: Array
+    from_noise: Array
+    free: Array | None
+
+    def to_json(self) -> dict[str, Any]:
+        """All but what there is for each sample; None for what is not finite."""
+        plain = {one.name: getattr(self, one.name) for one in fields(self)}
+        kept = {name: value for name, value in plain.items() if name not in ("undetermined", "from_noise", "free")}
+        kept["jitter"] = self.jitter if np.isfinite(self.jitter) else None
+        return kept | {name: [vars(one) for one in plain[name]] for name in ("regions", "movements")}
+
+
+def diagnose(policy: Policy, demonstrations: Sequence[Demonstration]) -> Diagnosis:
+    """Say what a policy fitted with :class:`~unconstrain.Robust` knows at the states of some demonstrations.
+
+    Parameters
+    ----------
+    policy : Policy
+    demonstrations : sequence of Demonstration
+        What it was fitted to, in the same order, or others.
+
+    Raises
+    ------
+    SettingError
+        If the learner does not look at samples.
+    InvalidDataError
+        If there is one action column only, no motion, or too little data to hold anything out.
+    """
+    solution, demos = policy.solution_, list(demonstrations)
+    states, actions, groups = stack(demos)
+    spread = policy.uncertainty(states)  # says what to do where the learner cannot tell
+    if not isinstance(solution, RobustSolution):  # pragma: no cover - uncertainty has refused
+        raise SettingError(f"learner: got a {type(solution).__name__}, expected one of a robust learner.")
+    typical = _typical(actions, solution)
+    undetermined, from_noise = (
+        np.linalg.norm(one, axis=1) / typical for one in (spread.undetermined, spread.from_noise)
+    )
+    known = (undetermined < from_noise) | (undetermined < SMALL)
+    models, d, _ = solution.weights.shape
+    free = solution.free if len(solution.free) == len(states) else None
+    return Diagnosis(
+        method=solution.method,
+        compared={name: exp(gap) for name, gap in solution.compared.items()},
+        refuted=solution.refuted,
+        noise=solution.noise,
+        noise_share=float(np.sqrt(d)) * solution.noise / typical,
+        jitter=float(np.sqrt(noise_by_differences(actions, groups))),
+        typical=typical,
+        directions=models * solution.directions,
+        directions_determined=solution.determined_share,
+        states_determined=float(known.mean()),
+        free_share=solution.free_share,
+        regions=_regions(policy, demos, undetermined, known, typical),
+        movements=_movements(demos, undetermined, known, free),
+        undetermined=undetermined,
+        from_noise=from_noise,
+        free=free,
+    )
+
+
+def _typical(actions: Array, solution: RobustSolution) -> float:
+    """Root mean square length of the actions; refuses what has nothing to diagnose."""
+    typical = float(np.sqrt((actions**2).sum(axis=1).mean()))
+    if actions.shape[1] == 1:
+        raise InvalidDataError(
+            "got one action column, expected at least two: in one dimension a constraint takes all or nothing, "
+            "and there is nothing to tell apart."
+        )
+    if typical == 0.0:
+        raise InvalidDataError("all actions are zero, expected some motion: nothing can be said about a policy.")
+    if np.isnan(solution.held_out_score):
+        raise InvalidDataError(
+            "too little could be held out, expected at least two different samples or demonstrations in motion."
+        )
+    return typical
+
+
+def _regions(
+    policy: Policy, demos: list[Demonstration], undetermined: Array, known: Array, typical: float
+) -> tuple[Region, ...]:
+    states, _, groups = stack(demos)
+    fields = policy.fields_ if hasattr(policy, "fields_") else cover(states, choose_variance(states))
+    nearest = fields.weights(states).argmax(axis=1)
+    found = [
+        (centre, rows) for index, centre in enumerate(fields.centres) if len(rows := np.flatnonzero(nearest == index))
+    ]
+    found.sort(key=lambda one: -undetermined[one[1]].max())
+    worst = [int(rows[undetermined[rows].argmax()]) for _, rows in found]
+    directions, along = _least_known(policy, states[worst])
+    names = _names(demos)
+    return tuple(
+        Region(
+            _numbers(centre),
+            len(rows),
+            float(known[rows].mean()),
+            float(np.sqrt((undetermined[rows] ** 2).mean())),
+            _numbers(states[row]),
+            names[groups[row]],
+            _numbers(direction),
+            float(size) / typical,
+        )
+        for (centre, rows), row, direction, size in zip(found, worst, directions, along, strict=True)
+    )
+
+
+def _least_known(policy: Policy, states: Array) -> tuple[Array, Array]:
+    """Direction of the actions (K, d) of which least is known, towards the prediction, and the spread along it (K,)."""
+    assert isinstance(policy.solution_, RobustSolution)
+    values, vectors = np.linalg.eigh(covariances(policy.solution_.undetermined, *policy._in_models(states)))
+    directions = vectors[:, :, -1]
+    ahead = (directions * policy(states)).sum(axis=1) >= 0
+    return np.where(ahead[:, None], directions, -directions), np.sqrt(np.maximum(values[:, -1], 0.0))
+
+
+def _movements(
+    demos: list[Demonstration], undetermined: Array, known: Array, free: Array | None
+) -> tuple[Movement, ...]:
+    ends = np.cumsum([len(demo) for demo in demos])
+    rows = [slice(end - len(demo), end) for end, demo in zip(ends, demos, strict=True)]
+    return tuple(
+        Movement(
+            name,
+            len(demos[index]),
+            None if free is None else float(free[part].mean()),
+            float(known[part].mean()),
+            float(np.sqrt((undetermined[part] ** 2).mean())),
+        )
+        for index, (name, part) in enumerate(zip(_names(demos), rows, strict=True))
+    )
+
+
+def _names(demos: list[Demonstration]) -> tuple[str, ...]:
+    return unique_names([demo.name or f"demonstration {index + 1}" for index, demo in enumerate(demos)])
+
+
+def _numbers(values: Array) -> tuple[float, ...]:
+    return tuple(map(float, values))
+
+
+def sentences(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> list[str]:
+    """The diagnosis in plain words.
+
+    Parameters
+    ----------
+    found : Diagnosis
+    states, actions : sequence of str
+        Names of the columns.
+    """
+    return [
+        _about_noise(found),
+        _about_method(found),
+        _about_variability(found),
+        *_about_regions(found, states, actions),
+        _about_freedom(found),
+    ]
+
+
+def _about_noise(found: Diagnosis) -> str:
+    verdict = "little" if found.noise_share < SMALL else "some" if found.noise_share < 3 * SMALL else "much"
+    hidden = " That hides most of what follows." if found.noise_share > HIDDEN else ""
+    said = (
+        f"Noise: {verdict}, {found.noise:.3g} on each action coordinate, {found.noise_share:.1%} of a typical action "
+        f"({found.typical:.3g}) in all.{hidden}"
+    )
+    if found.noise_share < 0.5 * SMALL or found.noise < MISFIT * found.jitter:
+        return said
+    return said + (
+        f" Only {found.jitter:.3g} of it changes from sample to sample; the rest is what the model cannot follow; "
+        "a smaller --variance or --model rbf may."
+    )
+
+
+def _about_method(found: Diagnosis) -> str:
+    """Which candidate was taken, and what speaks for it; see :class:`~unconstrain.Robust`."""
+    if "likelihood" not in found.compared or len(found.compared) < 2:
+        return f"Policy: learnt as {found.method}; nothing was compared with it."
+    other = found.compared["likelihood"]
+    times = f"its inconsistency where held out is {other:.2f} times that on noise-corrected moments"
+    if found.method == "likelihood":
+        return f"Policy: the most probable one if constraints vary at random: {times}, which does not speak against it."
+    corrected = found.method == "noise-corrected"
+    kind = "on moments without the noise" if corrected else "as what it misses goes on in time and is no noise"
+    why = "or it tells no more than consistency does"
+    if found.noise_share > HIDDEN:
+        why = "and so much noise hides how samples lie about their spheres"
+    elif found.refuted:
+        why = "so constraints do not seem to vary at random"
+    return f"Policy: the consistent one, {kind}. The most probable one was not taken: {times}, {why}."
+
+
+def _about_variability(found: Diagnosis) -> str:
+    share = found.states_determined
+    verdict = "rich enough" if share > 0.95 else "rich enough in most places" if share > 0.7 else "not rich enough"
+    if found.noise_share > HIDDEN:
+        verdict = "cannot be told under so much noise"
+    return (
+        f"Variability of the constraints: {verdict}. The data determines {found.directions_determined:.0%} of "
+        f"{found.directions} weight directions, and the policy at {share:.0%} of the recorded states."
+    )
+
+
+def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> list[str]:
+    open_ = [one for one in found.regions if one.determined < 1.0]
+    worst = found.regions[0]
+    advice = (
+        f"demonstrate around {named(worst.state, states)} with motion along {named(worst.direction, actions)} left "
+        f"free (policy known there to {worst.along:.0%} of a typical action, as in '{worst.demonstration}')."
+    )
+    if not open_:
+        return [f"Every recorded state is determined. If you record more: {advice}"]
+    where = f"{len(open_)} of {len(found.regions)} regions hold states at which the policy is not determined."
+    return [where, f"What would help most: {advice}"]
+
+
+def _about_freedom(found: Diagnosis) -> str:
+    share = f"about {found.free_share:.0%} of the samples"
+    if found.free is None:
+        return f"Free: {share} that the policy was fitted to."
+    means = np.array([one.free for one in found.movements], dtype=np.float64)
+    free, held = int((means > FREE).sum()), int((means < CONSTRAINED).sum())
+    between = len(means) - free - held
+    return f"Free: {share}. Of {len(means)} demonstrations, {free} look free and {held} constrained" + (
+        f"; {between} cannot be told." if between else "."
+    )
+
+
+def named(values: Sequence[float], names: Sequence[str]) -> str:
+    """Such as ``(x = 0.1, y = -2)``."""
+    return "(" + ", ".join(f"{name} = {value:.3g}" for name, value in zip(names, values, strict=True)) + ")"

@@ -1,0 +1,153 @@
+"""How far a policy is from the truth, or from what was observed.
+
+Each error is the quadratic of :mod:`unconstrain.risks.moments` at the difference
+π − π̃, with another metric: ``P = I`` (UPE), ``P = N`` (CPE) and ``P = ûûᵀ``
+(inconsistency), so that always inconsistency ≤ CPE ≤ UPE. Normalised errors
+are divided by the number of samples and the variance of the policy, summed
+over its coordinates (section IV-A).
+
+Where the truth is not known, the observed action takes the place of Nπ, and
+its variance that of the policy's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.errors import InvalidDataError, SettingError
+from ..recordings import Demonstration, stack
+from ..risks import action_projection, null_space_projection, project
+
+__all__ = ["cpe", "inconsistency", "ncpe", "ninconsistency", "nupe", "upe"]
+
+PolicyLike = Callable[[Array], Array]
+ConstraintLike = Callable[[Array, Array], Array]
+Demonstrations = Demonstration | Sequence[Demonstration]
+
+
+def upe(policy: PolicyLike, demonstrations: Demonstrations) -> float:
+    """Unconstrained policy error, ``Σ ‖π − π̃‖²``.
+
+    Parameters
+    ----------
+    policy : callable
+        States (N, n) to actions (N, d); a fitted policy is one.
+    demonstrations : Demonstration or sequence of Demonstration
+        With their truth.
+
+    Raises
+    ------
+    InvalidDataError
+        If a demonstration has no truth.
+    SettingError
+        If the policy does not return one action for each state.
+    """
+    demos = _listed(demonstrations)
+    predicted = _predicted(policy, demos)
+    return _squares(_true_policy(demos) - predicted)
+
+
+def cpe(policy: PolicyLike, demonstrations: Demonstrations, constraint: ConstraintLike | None = None) -> float:
+    """Constrained policy error, ``Σ ‖N (π − π̃)‖² = Σ ‖u − N π̃‖²``.
+
+    Parameters
+    ----------
+    policy, demonstrations
+        As in :func:`upe`.
+    constraint : callable, optional
+        A(x, t) where no truth tells N, such as the plane that was wiped.
+
+    Raises
+    ------
+    InvalidDataError
+        If neither a truth nor a constraint tells the projection.
+    """
+    demos = _listed(demonstrations)
+    predicted = _predicted(policy, demos)
+    projections = np.concatenate([_projections(demo, constraint) for demo in demos])
+    return _squares(_constrained(demos, constraint) - project(projections, predicted))
+
+
+def inconsistency(policy: PolicyLike, demonstrations: Demonstrations) -> float:
+    """Inconsistency, ``Σ ‖u − ûûᵀ π̃‖²`` (eq. 4). Needs no truth."""
+    demos = _listed(demonstrations)
+    actions = stack(demos).actions
+    return _squares(actions - project(action_projection(actions), _predicted(policy, demos)))
+
+
+def nupe(policy: PolicyLike, demonstrations: Demonstrations) -> float:
+    """Normalised unconstrained policy error; see :func:`upe`."""
+    return upe(policy, demonstrations) / _norm(demonstrations)
+
+
+def ncpe(policy: PolicyLike, demonstrations: Demonstrations, constraint: ConstraintLike | None = None) -> float:
+    """Normalised constrained policy error; see :func:`cpe`."""
+    return cpe(policy, demonstrations, constraint) / _norm(demonstrations)
+
+
+def ninconsistency(policy: PolicyLike, demonstrations: Demonstrations) -> float:
+    """Normalised inconsistency; see :func:`inconsistency`."""
+    return inconsistency(policy, demonstrations) / _norm(demonstrations)
+
+
+def _norm(demonstrations: Demonstrations) -> float:
+    demos = _listed(demonstrations)
+    vectors = stack(demos).actions if any(demo.truth is None for demo in demos) else _true_policy(demos)
+    variance = _squares(vectors - vectors.mean(axis=0))
+    if variance <= vectors.size * (1e-12 * np.abs(vectors).max()) ** 2:  # rounding of the mean is no variance
+        raise InvalidDataError(
+            "the policy is the same at every sample, so errors cannot be normalised by its variance."
+        )
+    return variance
+
+
+def _listed(demonstrations: Demonstrations) -> list[Demonstration]:
+    demos = [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
+    if not demos:
+        raise InvalidDataError("got no demonstration, expected at least one.")
+    return demos
+
+
+def _predicted(policy: PolicyLike, demos: list[Demonstration]) -> Array:
+    states, actions, _ = stack(demos)
+    predicted = np.asarray(policy(states))
+    if predicted.shape != actions.shape and (actions.shape[1] > 1 or predicted.shape != (len(states),)):
+        raise SettingError(
+            f"policy: got actions of shape {predicted.shape} for {len(states)} states, expected {actions.shape}."
+        )
+    return predicted.reshape(actions.shape)
+
+
+def _true_policy(demos: list[Demonstration]) -> Array:
+    for index, demo in enumerate(demos):
+        if demo.truth is None:
+            raise InvalidDataError(
+                f"demonstration {index} ('{demo.name}') has no truth, and this error needs the true policy. "
+                "On recordings use ncpe with a constraint, or ninconsistency."
+            )
+    return np.concatenate([demo.truth.policy for demo in demos if demo.truth is not None])
+
+
+def _projections(demo: Demonstration, constraint: ConstraintLike | None) -> Array:
+    if constraint is not None:
+        times = demo.times if demo.times is not None else np.zeros(len(demo))
+        return null_space_projection(constraint(demo.states, times))
+    if demo.truth is None:
+        raise InvalidDataError(
+            f"'{demo.name}' has no truth that tells how it was constrained: expected a constraint A(x, t)."
+        )
+    return demo.truth.projections
+
+
+def _constrained(demos: list[Demonstration], constraint: ConstraintLike | None) -> Array:
+    if constraint is None and all(demo.truth is not None for demo in demos):
+        # N π rather than the observed u: noise on the actions is no error of the policy.
+        return np.concatenate([project(d.truth.projections, d.truth.policy) for d in demos if d.truth is not None])
+    return stack(demos).actions
+
+
+def _squares(vectors: Array) -> float:
+    return float((vectors**2).sum())

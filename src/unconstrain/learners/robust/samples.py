@@ -1,0 +1,108 @@
+"""The samples themselves, for learners that need more than their sums."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.arrays import Array
+from ...risks import Moments, Quadratic, gather
+from ...training import FoldedMoments
+from ..plain import Solution
+
+__all__ = ["SampleLearner", "Samples"]
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Samples as a policy sees them, in the order in which they were recorded.
+
+    Parameters
+    ----------
+    features : ndarray, shape (N, p)
+    actions : ndarray, shape (N, d)
+    counts : ndarray, shape (N,)
+        Sample weights; two is the same as a repetition.
+    memberships : ndarray, shape (N, M)
+        How much each sample counts in each model, without its sample weight.
+    shares : ndarray, shape (N, M)
+        Share of each model in the prediction.
+    groups : ndarray of int, shape (N,)
+        Which demonstration each sample is from.
+    folds : ndarray of int, shape (N,)
+        What is held out together, from 0; every number up to the largest occurs.
+    centring : ndarray, shape (M, p, p)
+        T_m, with which model m is solved in features ``T_m φ``, for the sake of rounding.
+    roughness : ndarray, shape (M, p, p)
+        Measures how rough each model's policy is, over ``T_m φ``; zero where nothing is said of it.
+    """
+
+    features: Array
+    actions: Array
+    counts: Array
+    memberships: Array
+    shares: Array
+    groups: NDArray[np.intp]
+    folds: NDArray[np.intp]
+    centring: Array
+    roughness: Array
+
+    def __len__(self) -> int:
+        """Number of samples N."""
+        return len(self.features)
+
+    def __getitem__(self, rows: slice | NDArray[np.intp] | NDArray[np.bool_]) -> Samples:
+        """Some of them."""
+        per_sample = ("features", "actions", "counts", "memberships", "shares", "groups", "folds")
+        return replace(self, **{name: getattr(self, name)[rows] for name in per_sample})
+
+    @property
+    def sizes(self) -> Array:
+        """Number of samples in each model, shape (M,)."""
+        return self.counts @ self.memberships
+
+    @property
+    def energy(self) -> float:
+        """Mean of ‖u‖²."""
+        return float(self.counts @ (self.actions**2).sum(axis=1) / self.counts.sum())
+
+    def predict(self, weights: Array) -> Array:
+        """What models of these weights (M, d, p), over ``T_m φ``, predict, shape (N, d)."""
+        plain = weights @ self.centring
+        if plain.shape[0] == 1:
+            return self.features @ plain[0].T
+        return np.asarray(
+            sum(share[:, None] * (self.features @ one.T) for share, one in zip(self.shares.T, plain, strict=True))
+        )
+
+    def moments(self, actions: Array, weights: Array) -> Moments:
+        """Moments of any actions (N, d) at these features, each sample weighted (N,)."""
+        counted = (self.counts * weights)[:, None] * self.memberships
+        return gather(self.features, actions, counted).in_features(self.centring)
+
+    def risk(self, targets: Array, weights: Array) -> Quadratic:
+        """``Σ w ‖v − π̃‖²`` for targets v (N, d), without the sums that it does not need."""
+        counted = (self.counts * weights)[:, None] * self.memberships
+        d, p = targets.shape[1], self.features.shape[1]
+        gram = gather(self.features, np.ones((len(self), 1)), counted).gram
+        cross = (counted.T @ (self.features[:, :, None] * targets[:, None, :]).reshape(len(self), -1)).reshape(-1, p, d)
+        gram = self.centring @ gram @ self.centring.swapaxes(1, 2)
+        linear = (self.centring @ cross).reshape(len(gram), p * d)
+        hessian = np.einsum("mij,kl->mikjl", gram, np.eye(d)).reshape(-1, p * d, p * d)
+        return Quadratic(hessian, linear, counted.T @ (targets**2).sum(axis=1))
+
+    def by_fold(self) -> list[Samples]:
+        """What is held out together."""
+        return [self[self.folds == fold] for fold in range(int(self.folds.max()) + 1)]
+
+
+@runtime_checkable
+class SampleLearner(Protocol):
+    """A learner that needs the samples, not only their moments."""
+
+    def learn(self, samples: Samples, folds: FoldedMoments) -> Solution:
+        """Learn from all of them; ``folds`` are their moments over ``T_m φ``, the solution's weights are over φ."""
+        ...

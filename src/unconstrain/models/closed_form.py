@@ -1,0 +1,58 @@
+"""A fitted policy as one formula, without estimator, moments or feature map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.arrays import Array
+
+__all__ = ["ClosedForm", "exponents"]
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedForm:
+    """Affine maps, blended by normalised Gaussian kernels.
+
+    With ``z = x − origin``,
+
+        ``π̃(x) = Σ_m s_m(x) (A_m z + b_m)``,  ``s_m = exp(e_m) / Σ_k exp(e_k)``,
+
+    where ``e_m = slope_mᵀ z + offset_m`` is the logarithm of a Gaussian
+    kernel without ``−‖z‖² / 2σ²``, which is common to all and cancels.
+    An affine policy has M = 1, a parametric policy on normalised RBFs has no
+    A, a locally linear one has everything. Every target of
+    :mod:`~unconstrain.deployment` is made from this.
+
+    Parameters
+    ----------
+    origin : ndarray, shape (n,)
+    maps : ndarray, shape (M, d, n + 1) or (M, d, 1)
+        ``(A_m, b_m)``, or ``b_m`` alone.
+    exponents : ndarray, shape (M, n + 1), optional
+        ``(slope_m, offset_m)``; see :func:`exponents`. Without it M is 1.
+    reach : ndarray, shape (n,)
+        How far from the origin the policy is at home, along each axis; where self-tests look.
+    """
+
+    origin: Array
+    maps: Array
+    exponents: Array | None
+    reach: Array
+
+    @property
+    def sizes(self) -> tuple[int, int, int]:
+        """Numbers of states n, of actions d, and of models M."""
+        return len(self.origin), self.maps.shape[1], self.maps.shape[0]
+
+    @property
+    def is_affine(self) -> bool:
+        """Whether the models are affine maps rather than constants."""
+        return self.maps.shape[2] > 1
+
+
+def exponents(centres: Array, variance: float, origin: Array) -> Array:
+    """Slopes and offsets of Gaussian kernels, shape (M, n + 1): ``(c_m / σ², −‖c_m‖² / 2σ²)``, from the origin."""
+    far = centres - origin
+    return np.column_stack([far, -0.5 * (far**2).sum(axis=1)]) / variance

@@ -1,0 +1,103 @@
+"""Gaussian receptive fields and where to put them (section III-D)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.arrays import SMALLEST_VARIANCE, Array, as_matrix, check_at_least, namespace
+from ..base.errors import SettingError
+from .features import gaussian, shares, squared_distances
+
+__all__ = ["MOST_FIELDS", "ReceptiveFields", "choose_variance", "cover"]
+
+MOST_FIELDS = 100
+"""How many fields :func:`choose_variance` puts up with before it widens them."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReceptiveFields:
+    """Isotropic Gaussian fields, ``w_m(x) = exp(−‖x − c_m‖² / 2σ²)``.
+
+    Parameters
+    ----------
+    centres : array_like, shape (M, n)
+    variance : float
+        The fields' σ², in squared units of the state.
+    """
+
+    centres: Array
+    variance: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centres", as_matrix(self.centres, "centres"))
+        check_at_least("variance", self.variance, SMALLEST_VARIANCE, strict=True)
+
+    def weights(self, states: Array) -> Array:
+        """How much each sample counts in each field, shape (N, M) (eq. 14)."""
+        return gaussian(squared_distances(states, self.centres), self.variance)
+
+    def shares(self, states: Array) -> Array:
+        """The same weights, normalised over the fields, shape (N, M)."""
+        return shares(states, self.centres, self.variance)
+
+    def support(self, states: Array) -> Array:
+        """Weight in the nearest field, from 1 at a centre to 0 far from all, shape (N,)."""
+        distances = squared_distances(states, self.centres)
+        return gaussian(namespace(distances).min(distances, axis=1), self.variance)
+
+
+def cover(states: Array, variance: float, at_least: float = 0.7) -> ReceptiveFields:
+    """Place fields on the samples so that each sample counts enough in one of them.
+
+    Farthest-first: the sample nearest to the mean becomes the first centre;
+    from then on always the sample that is least well covered, until every
+    sample has ``w_m(x) ≥ at_least`` for some m (section IV-B).
+
+    Parameters
+    ----------
+    states : array_like, shape (N, n)
+    variance : float
+        The fields' σ².
+    at_least : float
+        The weight to reach, between 0 and 1.
+
+    Returns
+    -------
+    ReceptiveFields
+
+    Raises
+    ------
+    SettingError
+        If the weight is not between 0 and 1 or the variance is not positive.
+    """
+    return _cover(as_matrix(states, "states"), variance, at_least, most=None)
+
+
+def choose_variance(states: Array, at_least: float = 0.7, most: int = MOST_FIELDS) -> float:
+    """Choose a variance for fields that cover these states.
+
+    A quarter of the states' total variance, doubled until ``most`` fields suffice.
+    Returns 1 where the states do not vary.
+    """
+    total = float(states.var(axis=0).sum())
+    # What rounding of the mean leaves is no variance.
+    least = max((1e-12 * np.abs(states).max()) ** 2, 8 * SMALLEST_VARIANCE)
+    variance = total / 4 if total > least else 1.0
+    while len(_cover(states, variance, at_least, most).centres) > most:
+        variance *= 2
+    return variance
+
+
+def _cover(states: Array, variance: float, at_least: float, most: int | None) -> ReceptiveFields:
+    if not 0.0 < at_least < 1.0:
+        raise SettingError(f"at_least: got {at_least!r}, expected a weight between 0 and 1.")
+    check_at_least("variance", variance, SMALLEST_VARIANCE, strict=True)
+    reach = -2.0 * variance * np.log(at_least)
+    chosen = [int(((states - states.mean(axis=0)) ** 2).sum(axis=1).argmin())]
+    nearest = ((states - states[chosen[0]]) ** 2).sum(axis=1)
+    while nearest.max() > reach and (most is None or len(chosen) <= most):
+        chosen.append(int(nearest.argmax()))
+        np.minimum(nearest, ((states - states[chosen[-1]]) ** 2).sum(axis=1), out=nearest)
+    return ReceptiveFields(states[chosen], variance)

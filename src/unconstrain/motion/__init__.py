@@ -1,0 +1,6 @@
+"""A policy in motion: roll-outs under constraints, and keeping near the data."""
+
+from .containment import Contained
+from .rollouts import rollout
+
+__all__ = ["Contained", "rollout"]

@@ -1,0 +1,149 @@
+"""Follow a policy under constraints: makes demonstrations, and reproduces what was learnt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..base.arrays import LARGEST, Array, as_table, check_at_least
+from ..base.errors import InvalidDataError, SettingError
+from ..recordings import Demonstration, Truth
+from ..risks import null_space_projection, project
+
+__all__ = ["rollout"]
+
+ConstraintLike = Callable[[Array, Array], Array]
+
+
+@overload
+def rollout(
+    policy: Callable[[Array], Array],
+    start: Sequence[float] | np.ndarray[tuple[int], np.dtype[np.float64]],
+    steps: int = ...,
+    dt: float = ...,
+    constraint: ConstraintLike | None = ...,
+    *,
+    name: str = ...,
+) -> Demonstration: ...
+
+
+@overload
+def rollout(
+    policy: Callable[[Array], Array],
+    start: Sequence[Sequence[float]] | np.ndarray[tuple[int, int], np.dtype[np.float64]],
+    steps: int = ...,
+    dt: float = ...,
+    constraint: ConstraintLike | Sequence[ConstraintLike] | None = ...,
+    *,
+    name: str = ...,
+) -> list[Demonstration]: ...
+
+
+def rollout(
+    policy: Callable[[Array], Array],
+    start: ArrayLike,
+    steps: int = 200,
+    dt: float = 0.02,
+    constraint: ConstraintLike | Sequence[ConstraintLike] | None = None,
+    *,
+    name: str = "rollout",
+) -> Demonstration | list[Demonstration]:
+    """Follow ``u = N(x, t) π(x)`` with Euler steps ``x ← x + dt u``.
+
+    Parameters
+    ----------
+    policy : callable
+        States (K, n) to actions (K, n); a fitted policy is one.
+    start : array_like, shape (n,) or (K, n)
+        Where to start; several starts run side by side.
+    steps : int
+        Number of samples.
+    dt : float
+        Seconds between samples.
+    constraint : callable or sequence of K callables, optional
+        A(x, t), for all or one for each start. None leaves the policy free.
+    name : str
+        Of the demonstrations; several are numbered.
+
+    Returns
+    -------
+    Demonstration or list of Demonstration
+        With their truth: the policy and the projections that were applied.
+
+    Raises
+    ------
+    SettingError
+        If the policy's actions do not fit the states, or a setting is out of range.
+    InvalidDataError
+        If the movement leaves the finite numbers.
+    """
+    check_at_least("steps", steps, 1, whole=True)
+    check_at_least("dt", dt, 0.0, strict=True)
+    table, single = as_table(start, "start")
+    state = table.reshape(1, -1) if single else table
+    runs, n = state.shape
+    apart = None if constraint is None or callable(constraint) else list(constraint)
+    if apart is not None and len(apart) != runs:
+        raise SettingError(f"constraint: got {len(apart)} constraints for {runs} starts, expected one for each.")
+    shape = (runs, steps, n)
+    states, actions, wanted, projections = (np.empty(s) for s in (shape, shape, shape, (*shape, n)))
+    times = dt * np.arange(steps, dtype=np.float64)
+    for step in range(steps):
+        states[:, step] = state
+        wanted[:, step] = _action(policy, state)
+        projections[:, step] = _projections(constraint, apart, state, times[step])
+        actions[:, step] = _without_rounding(project(projections[:, step], wanted[:, step]), wanted[:, step])
+        with np.errstate(over="ignore", invalid="ignore"):
+            state = state + dt * actions[:, step]
+        if not (np.abs(state) <= LARGEST).all():
+            raise InvalidDataError(
+                f"the movement left the finite numbers at step {step}: start nearer to the data or take a smaller dt."
+            )
+    demos = [
+        Demonstration(
+            states[k], actions[k], times, Truth(wanted[k], projections[k]), name if single else f"{name} {k + 1}"
+        )
+        for k in range(runs)
+    ]
+    return demos[0] if single else demos
+
+
+def _projections(constraint: object, apart: Sequence[ConstraintLike] | None, states: Array, time: float) -> Array:
+    """What the constraint, or that of each run, leaves free, shape (K, n, n)."""
+    runs, n = states.shape
+    if constraint is None:
+        return np.broadcast_to(np.eye(n), (runs, n, n))
+    now = np.full(runs, time)
+    if apart is None:
+        return null_space_projection(_matrix(constraint, states, now))
+    rows = [_matrix(one, states[k : k + 1], now[k : k + 1]) for k, one in enumerate(apart)]
+    return null_space_projection(np.concatenate(rows))
+
+
+def _without_rounding(actions: Array, wanted: Array) -> Array:
+    """Exactly no motion where the constraint takes all of it: rounding has a direction, rest has none."""
+    rounding = np.abs(actions).max(axis=1, keepdims=True) <= 1e-12 * np.abs(wanted).max(axis=1, keepdims=True)
+    return np.where(rounding, 0.0, actions)
+
+
+def _action(policy: Callable[[Array], Array], state: Array) -> Array:
+    action = np.asarray(policy(state))
+    if action.shape != state.shape:
+        raise SettingError(
+            f"policy: got actions of shape {action.shape} for states of shape {state.shape}; a rollout expects "
+            "actions that are velocities of the state."
+        )
+    return action
+
+
+def _matrix(constraint: object, state: Array, time: Array) -> Array:
+    matrix = np.asarray(constraint(state, time))  # type: ignore[operator]
+    if matrix.ndim != 3 or matrix.shape[0] != len(state) or matrix.shape[2] != state.shape[1]:
+        raise SettingError(
+            f"constraint: got A of shape {matrix.shape} for {len(state)} states, "
+            f"expected ({len(state)}, k, {state.shape[1]})."
+        )
+    return matrix

@@ -1,0 +1,183 @@
+"""The page of what a robust fit knows of its demonstrations, what it does not, and what to record next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+
+from ..base.errors import InvalidDataError
+from ..evaluation import CONSTRAINED, FREE, SMALL, Diagnosis, diagnose, named, sentences
+from ..policies import Policy
+from ..recordings import Demonstration, stack
+from . import figures, html
+
+__all__ = ["diagnosis_page", "unknown"]
+
+MOST_POINTS = 4000
+MOST_REGIONS = 8
+MOST_MOVEMENTS = 60
+
+
+def diagnosis_page(
+    found: Diagnosis, demonstrations: Sequence[Demonstration], title: str, states: Sequence[str], actions: Sequence[str]
+) -> str:
+    """Make the page of a diagnosis.
+
+    Parameters
+    ----------
+    found : Diagnosis
+    demonstrations : sequence of Demonstration
+        Those that it is of, in the same order.
+    title : str
+        Of the page; text.
+    states, actions : sequence of str
+        Names of the columns; text.
+
+    Returns
+    -------
+    str
+        A whole HTML document.
+
+    Raises
+    ------
+    MissingExtraError
+        If plotly is not installed.
+    """
+    demos = list(demonstrations)
+    said = "".join(f"<li>{escape(one)}</li>" for one in sentences(found, states, actions))
+    return html.document(
+        title,
+        "What was recorded is the wish of the demonstrator with whatever the surroundings took away. This page says "
+        "how well the wish can be told from these recordings: how much noise is in the way, where the constraints "
+        "varied too little, and which further demonstration would help most.",
+        _tiles(found, demos),
+        f"<ul>{said}</ul>",
+        html.section("Where the policy is not known", _map(found, demos, states, actions)),
+        html.section("What to record next", _next(found, states, actions)),
+        html.section("Free or constrained", _freedom(found)),
+        html.section("How the policy was chosen", _chosen(found)),
+    )
+
+
+def unknown(policy: Policy, demos: list[Demonstration]) -> str:
+    """The map and what to record next, for the page of a fit; HTML."""
+    try:
+        found = diagnose(policy, demos)
+    except InvalidDataError as error:
+        return html.paragraph(f"Nothing can be said about that: {escape(str(error))}")
+    states = [f"state {index + 1}" for index in range(demos[0].states.shape[1])]
+    actions = [f"action {index + 1}" for index in range(demos[0].actions.shape[1])]
+    told = "".join(html.paragraph(escape(one)) for one in sentences(found, states, actions))
+    return told + _map(found, demos, states, actions) + _next(found, states, actions)
+
+
+def _tiles(found: Diagnosis, demos: list[Demonstration]) -> str:
+    return html.tiles(
+        [
+            (str(len(demos)), f"demonstrations, {len(found.undetermined)} samples"),
+            (f"{found.noise_share:.1%}", "noise, of a typical action"),
+            (f"{found.states_determined:.0%}", "of the recorded states determined"),
+            (f"{found.directions_determined:.0%}", f"of {found.directions} weight directions determined"),
+            (f"{found.free_share:.0%}", "of the samples free"),
+        ]
+    )
+
+
+def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], actions: Sequence[str]) -> str:
+    """Two state columns, coloured by how little is known."""
+    recorded = stack(demos).states
+    regions = found.regions[:MOST_REGIONS]
+    worst = np.array([region.state for region in regions])
+    texts = [escape(f"{named(one.state, states)}: leave {named(one.direction, actions)} free") for one in regions]
+    if recorded.shape[1] == 1:
+        recorded, worst = (np.column_stack([one, np.zeros(len(one))]) for one in (recorded, worst))
+        states = [*states, ""]
+    shown = sorted(np.argsort(-recorded.var(axis=0), kind="stable")[:2])
+    every = -(-len(recorded) // MOST_POINTS)
+    least = int(found.undetermined.argmax())
+    rows = np.unique([*range(0, len(recorded), every), least])
+    same = len(actions) == len(states)
+    ways = np.array([region.direction for region in regions])[:, shown] if same else None
+    picture = figures.known_map(
+        recorded[rows][:, shown],
+        found.undetermined[rows],
+        worst[:, shown],
+        labels=(escape(states[shown[0]]), escape(states[shown[1]])),
+        scale="undetermined spread / typical action",
+        texts=texts,
+        directions=ways,
+        top=SMALL,
+    )
+    caption = (
+        "Each dot is a recorded state. Its colour is the standard deviation that the data leaves open, noise apart, as "
+        f"a share of the typical action, {html.number(found.typical)} in units of the actions: dark is known. The "
+        "numbers are those of the table below"
+    )
+    caption += ", the lines through them the motion of which least is known there." if same else "."
+    if len(states) > 2:
+        caption += " Of all state columns, the two that vary most are drawn."
+    return html.picture("known", [picture], caption)
+
+
+def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> str:
+    shown = found.regions[:MOST_REGIONS]
+    rows = [
+        [
+            str(number),
+            ", ".join(map(html.number, one.state)),
+            ", ".join(map(html.number, one.direction)),
+            escape(one.demonstration),
+            f"{one.along:.1%}",
+            f"{one.spread:.1%}",
+            f"{one.determined:.0%}",
+            str(one.samples),
+        ]
+        for number, one in enumerate(shown, 1)
+    ]
+    around, along = (escape(", ".join(names)) for names in (states, actions))
+    header = ["", f"demonstrate around<br>({around})", f"with motion left free along<br>({along})", "recorded in"]
+    header += ["unknown<br>along it", "unknown in<br>the region", "states<br>determined", "samples"]
+    note = (
+        f"The {len(shown)} of {len(found.regions)} regions with the least known state. What is unknown is a standard "
+        "deviation as a share of the typical action; a state is determined where less than a tenth, or less than noise "
+        "leaves open, is unknown."
+    )
+    return html.table(header, rows, left=4, note=note)
+
+
+def _freedom(found: Diagnosis) -> str:
+    if found.free is None:
+        return html.paragraph("The policy was fitted to other demonstrations.")
+    shown = found.movements[:MOST_MOVEMENTS]
+    names = [escape(one.name) for one in shown]
+    free = [one.free or 0.0 for one in shown]
+    picture = figures.bars(
+        names,
+        {"hybrid": free},
+        title="",
+        label="probability of being free",
+        height=360,
+    )
+    picture.update_yaxes(range=[0.0, 1.0])
+    picture.update_xaxes(showticklabels=len(shown) <= 40, tickangle=-90 if len(shown) > 12 else 0)
+    more = f" The first {len(shown)} of {len(found.movements)} are drawn." if len(found.movements) > len(shown) else ""
+    caption = (
+        "One bar for each demonstration, the mean over its samples: above "
+        f"{FREE:g} it looks free, below {CONSTRAINED:g} constrained. A constraint that takes little looks free where "
+        f"there is noise.{more}"
+    )
+    return html.picture("free", [picture], caption)
+
+
+def _chosen(found: Diagnosis) -> str:
+    if not found.compared:
+        return html.paragraph(f"Nothing was compared with the policy, which was learnt as {escape(found.method)}.")
+    rows = [
+        [escape(name), html.number(times), "yes" if name == found.method else "no"]
+        for name, times in found.compared.items()
+    ]
+    note = "Inconsistency on held-out demonstrations over that on noise-corrected moments; the most probable policy is "
+    note += "refuted where it is too far above 1; the less it knows of its samples, the sooner."
+    return html.table(["candidate", "held-out inconsistency, ratio", "taken"], rows, note=note)

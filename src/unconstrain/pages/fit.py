@@ -1,0 +1,245 @@
+"""The page of a policy that somebody fitted to demonstrations of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import is_dataclass
+from html import escape
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.errors import InvalidDataError, SettingError
+from ..evaluation import ncpe, ninconsistency, nupe
+from ..learners import Hybrid, RobustSolution
+from ..policies import Policy
+from ..recordings import Demonstration, stack
+from ..risks import action_projection, project
+from . import figures, html
+from .diagnosis import unknown
+
+__all__ = ["policy_page"]
+
+MOST_PANELS = 4
+MOST_ROWS = 30
+MOST_POINTS = 2000
+ARROWS = 15
+
+
+def policy_page(policy: Policy, demonstrations: Sequence[Demonstration], title: str) -> str:
+    """Make the page of a fitted policy.
+
+    Parameters
+    ----------
+    policy : Policy
+        Fitted.
+    demonstrations : sequence of Demonstration
+        What it was fitted to, or others.
+    title : str
+        Of the page; text.
+
+    Returns
+    -------
+    str
+        A whole HTML document.
+
+    Raises
+    ------
+    MissingExtraError
+        If plotly is not installed.
+    """
+    demos = list(demonstrations)
+    learner = policy.learner if policy.learner is not None else Hybrid()
+    parts = [
+        _summary(policy, demos),
+        html.section("The demonstrations", _movements(policy, demos)),
+        html.section("Predicted and observed actions", _actions(policy, demos)),
+        html.section("Errors and support", _errors(policy, demos)),
+        html.section("What the data determined", _determined(policy)),
+    ]
+    if isinstance(policy.solution_, RobustSolution):
+        parts.append(html.section("What is not known", unknown(policy, demos)))
+    if is_dataclass(learner):
+        parts.append(html.settings_table(learner))
+    return html.document(title, _lead(policy, demos, type(learner).__name__), *parts)
+
+
+def _lead(policy: Policy, demos: list[Demonstration], learner: str) -> str:
+    states, actions, _ = stack(demos)
+    kind = "Locally linear" if hasattr(policy, "fields_") else "Parametric"
+    return (
+        f"{kind} policy with the {escape(learner)} learner, for {states.shape[1]} state and {actions.shape[1]} action "
+        "columns. What was recorded is the wish of the demonstrator with whatever the surroundings took away; what was "
+        "learnt is meant to be the wish alone. So it should agree with the recordings <i>along the observed motion</i> "
+        "and may differ from them across it."
+    )
+
+
+def _summary(policy: Policy, demos: list[Demonstration]) -> str:
+    solution = policy.solution_
+    models, d, p = solution.weights.shape
+    shape = f"{models} × {p}" if models > 1 else str(p)
+    return html.tiles(
+        [
+            (str(len(demos)), "demonstrations"),
+            (f"{sum(map(len, demos)):,}".replace(",", " "), "samples"),
+            (shape, "local models × features" if models > 1 else "features"),
+            (f"{solution.determined_share:.0%}", f"of {models * d * p} weight directions determined"),
+            (html.number(_or_nan(ninconsistency, policy, demos)), "normalised inconsistency"),
+        ]
+    )
+
+
+def _movements(policy: Policy, demos: list[Demonstration]) -> str:
+    n, d = demos[0].states.shape[1], demos[0].actions.shape[1]
+    tracks = [_thin(demo) for demo in demos]
+    if n >= 3:
+        panel = figures.movements(
+            [("training", demo.name, demo.states[:, :3]) for demo in tracks],
+            labels=("state 1", "state 2", "state 3"),
+        )
+        rest = f" The other {n - 3} columns are not drawn." if n > 3 else ""
+        return html.picture("movements", [panel], f"The first three state columns.{rest} Drag to turn, scroll to zoom.")
+    if n == 2 and d == 2:
+        return html.picture(
+            "movements",
+            [_field(policy, tracks)],
+            "Grey lines are the demonstrations, green arrows the learnt policy where nothing is in its way. Arrows are "
+            "not to the scale of the axes; those longer than the longest observed action are cut to it.",
+            keys=("hybrid", "training"),
+            labels={"hybrid": "learnt policy", "training": "demonstrations"},
+        )
+    panel = figures.vector_field(
+        np.zeros((1, 2)),
+        {},
+        longest=1.0,
+        scale=1.0,
+        trajectories=[demo.states if n == 2 else np.column_stack([_times(demo), demo.states]) for demo in tracks],
+        labels=("state 1", "state 2") if n == 2 else (_time_label(demos[0]), "state 1"),
+        equal=n == 2,
+    )
+    return html.picture("movements", [panel], "All demonstrations.")
+
+
+def _field(policy: Policy, demos: list[Demonstration]) -> object:
+    states, actions, _ = stack(demos)
+    low, high = states.min(axis=0), states.max(axis=0)
+    points = np.stack(np.meshgrid(*np.linspace(low, high, ARROWS).T), axis=-1).reshape(-1, 2)
+    longest = max(float(np.linalg.norm(actions, axis=1).max()), 1e-300)
+    return figures.vector_field(
+        points,
+        {"hybrid": policy(points)},
+        longest=longest,
+        scale=1.3 * float((high - low).max()) / (ARROWS - 1) / longest,
+        trajectories=[demo.states for demo in demos],
+        labels=("state 1", "state 2"),
+        height=560,
+    )
+
+
+def _actions(policy: Policy, demos: list[Demonstration]) -> str:
+    shown = demos[:MOST_PANELS]
+    panels = []
+    for demo in map(_thin, shown):
+        predicted = policy(demo.states)
+        along = project(action_projection(demo.actions), predicted)
+        names = [f"action {index + 1}" for index in range(demo.actions.shape[1])]
+        series = {"hybrid": predicted, "direct": along, "observed": demo.actions}
+        panels.append(
+            figures.over_time(
+                _times(demo), series, names, title=demo.name, time_label=_time_label(demo), row_height=130
+            )
+        )
+    more = f" The first {len(shown)} of {len(demos)} demonstrations." if len(demos) > len(shown) else ""
+    return html.picture(
+        "actions",
+        panels,
+        "Black is what was observed. Green is what the policy would do if nothing were in its way; where it differs "
+        "from black, it says that the surroundings took something away. Dashed blue is green projected onto the "
+        f"observed motion, which should lie on black.{more}",
+        keys=("observed", "hybrid", "direct"),
+        labels={"observed": "observed", "hybrid": "learnt policy", "direct": "along the observed motion"},
+    )
+
+
+def _errors(policy: Policy, demos: list[Demonstration]) -> str:
+    known = all(demo.truth is not None for demo in demos)
+    support = _support(policy, demos)
+    header = ["demonstration", "samples", "norm. inconsistency"]
+    header += ["nCPE", "nUPE"] if known else []
+    header += ["median support", "least support"] if support is not None else []
+    metrics = (ninconsistency, ncpe, nupe) if known else (ninconsistency,)
+
+    def cells(name: str, of: list[Demonstration], near: Array | None) -> list[str]:
+        row = [escape(name), str(sum(map(len, of))), *(html.number(_or_nan(metric, policy, of)) for metric in metrics)]
+        return row if near is None else [*row, html.number(float(np.median(near))), html.number(float(near.min()))]
+
+    shown = demos[:MOST_ROWS]
+    rows = [
+        cells(demo.name or f"demonstration {index + 1}", [demo], None if support is None else support[index])
+        for index, demo in enumerate(shown)
+    ]
+    rows.append(cells("all", demos, None if support is None else np.concatenate(support)))
+    note = "Errors are squared, as a share of the motion’s variance: 0 is perfect, 1 no better than a constant. "
+    note += (
+        "Support is 1 at the middle of what was recorded and 0 far away from it, where predictions are guesses. "
+        if support is not None
+        else "These features do not tell how near a state is to the data. "
+    )
+    note += "" if known else "Without the truth, errors across the observed motion cannot be told. "
+    note += f"The first {len(shown)} demonstrations are listed." if len(demos) > len(shown) else ""
+    return html.table(header, rows, note=note, rules=(len(shown),))
+
+
+def _determined(policy: Policy) -> str:
+    solution = policy.solution_
+    panels = []
+    if solution.eigenvalues is not None:
+        title = "how strongly it is pinned down"
+        panels.append(figures.spectra(solution.eigenvalues, title=title))
+    if solution.scores is not None:
+        chosen = solution.directions - solution.determined
+        panels.append(figures.step_scores(solution.scores, chosen, title="held-out score along the threshold"))
+    share = f"The data determined {solution.determined_share:.1%} of all weight directions."
+    if not panels:
+        return html.paragraph(f"{share} This learner has nothing to choose.")
+    words = f"{share} "
+    if solution.eigenvalues is not None:
+        words += (
+            "Directions of the weights, sorted by how strongly the first objective pins them down; the black line is "
+        )
+        words += "the median over the models. "
+    if solution.scores is not None:
+        words += (
+            "Every number of undetermined directions was tried on held-out demonstrations, for each model; green dots "
+        )
+        words += "are what was chosen, and 1 is the best. What is undetermined follows the standard risk."
+    return html.picture("determined", panels, words)
+
+
+def _support(policy: Policy, demos: list[Demonstration]) -> list[Array] | None:
+    try:
+        return [policy.support(demo.states) for demo in demos]
+    except (SettingError, AttributeError):
+        return None
+
+
+def _or_nan(metric: object, policy: Policy, demos: list[Demonstration]) -> float:
+    """An error, or NaN where the motion has no variance to normalise by."""
+    try:
+        return float(metric(policy, demos))  # type: ignore[operator]
+    except InvalidDataError:
+        return float("nan")
+
+
+def _thin(demo: Demonstration) -> Demonstration:
+    """At most so many samples as a picture can show."""
+    return demo[:: -(-len(demo) // MOST_POINTS)]
+
+
+def _times(demo: Demonstration) -> Array:
+    return demo.times if demo.times is not None else np.arange(len(demo), dtype=np.float64)
+
+
+def _time_label(demo: Demonstration) -> str:
+    return "time (s)" if demo.times is not None else "sample"

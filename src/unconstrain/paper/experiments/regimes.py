@@ -1,0 +1,383 @@
+"""Every learner in every regime of constraints and noise, beside an oracle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.errors import SettingError
+from ...constraints import Constraint, JacobianRows, PolicyAligned, SwitchingLine
+from ...evaluation import ncpe, ninconsistency, nupe
+from ...learners import Direct, Hybrid, Inconsistency, Robust, RobustSolution
+from ...models import NormalisedRBF
+from ...motion import rollout
+from ...policies import LocallyLinearPolicy, ParametricPolicy, Policy
+from ...recordings import Demonstration, stack
+from ...risks import (
+    Moments,
+    Quadratic,
+    gather,
+    inconsistency,
+    lexicographic_path,
+    softened_minima,
+    standard_risk,
+    unvec,
+    vec,
+)
+from ...training import Folds
+from ..systems.arm import LWR3, JointLimitAvoidance
+from ..systems.limit_cycle import LimitCycle
+from ..systems.pendulum import Pendulum
+from . import toy
+from .journal import Journal
+from .trials import Progress, Result, row, run_trials
+
+__all__ = ["ARM", "DEFAULT", "PLANAR", "Settings", "demonstrate", "headlines", "run", "with_noise"]
+
+PLANAR = ("none", "random", "half", "quarter free", "0.1", "0.3", "0.6", "1", "1.5")
+"""Constraints of the two systems in the plane. Numbers are the θ_max of eq. 20, rad; "half" and "quarter free"
+say which share of the demonstrations nothing constrains, while the others are constrained at random (eq. 19)."""
+
+ARM = ("none", "half", "1", "1-2-3", "1-...-5", "1-...-6")
+"""Coordinates of the arm's hand that are held; "half" of the demonstrations are free, and in the others 1-2-3 is."""
+
+DEFAULT = "robust"
+"""The learner that people are to take who know nothing of their constraints."""
+
+PAPER = "hybrid"
+ORACLE = "oracle"
+KNOWN = "constraints known"
+"""What could be learnt if every sample's constraint were known, and a ridge chosen by the truth."""
+
+_SOFTNESSES = tuple(np.logspace(-9, 0, 10).tolist())
+_HELD = {"1": 1, "1-2-3": 3, "half": 3, "1-...-5": 5, "1-...-6": 6}
+_SYSTEMS: dict[str, Callable[[Array], Array]] = {"limit cycle": LimitCycle(), "pendulum": Pendulum()}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of the benchmark.
+
+    Parameters
+    ----------
+    trials, seed : int
+        Data sets of each regime, and what draws them. Everything was developed on other seeds.
+    noise : tuple of float
+        Standard deviation of the noise on each action coordinate, as a share of the root-mean-square spread of the
+        policy over its coordinates.
+    alpha : float
+        Of the paper's hybrid.
+    thresholds : int
+        That the oracle chooses from, evenly over ten decades.
+    only : tuple of str
+        Systems, constraints, or both as in "limit cycle, half", to which to keep; all if empty.
+        Data sets do not depend on it. The arm takes most of the time.
+    """
+
+    trials: int = 20
+    seed: int = 0
+    noise: tuple[float, ...] = (0.0, 0.02, 0.05, 0.1)
+    alpha: float = 1e-2
+    thresholds: int = 61
+    only: tuple[str, ...] = ()
+
+
+def run(
+    settings: Settings | None = None, workers: int = 1, progress: Progress | None = None, journal: Journal | None = None
+) -> Result:
+    """Run the benchmark; parameters and result as in :func:`unconstrain.paper.experiments.table1.run`.
+
+    Rows are as those of Table I, with ``system``, ``constraint``, ``noise``,
+    the geometric mean of nUPE over the trials and its ratio to the oracle's;
+    ``tables["summary"]`` has one row for each method and noise.
+    """
+    chosen = settings or Settings()
+    regimes = _regimes(chosen.only)
+    seeds = np.random.SeedSequence(chosen.seed).spawn(chosen.trials)
+    calls = [(chosen, *regime, seed) for seed in seeds for regime in regimes]
+    found = run_trials(trial, calls, workers, progress, journal)
+    rows = []
+    for index, (system, constraint) in enumerate(regimes):
+        of_regime = found[index :: len(regimes)]
+        for place, noise in enumerate(chosen.noise):
+            rows += _rows([one[place] for one in of_regime], system=system, constraint=constraint, noise=noise)
+    return Result("regimes", chosen, rows, tables={"summary": _summary(rows, chosen)})
+
+
+def _regimes(only: Sequence[str]) -> list[tuple[str, str]]:
+    every = [(system, constraint) for system in _SYSTEMS for constraint in PLANAR]
+    every += [("arm", constraint) for constraint in ARM]
+    names = {regime: {*regime, ", ".join(regime)} for regime in every}
+    for name in only:
+        if not any(name in called for called in names.values()):
+            systems, constraints = (list(dict.fromkeys(column)) for column in zip(*every, strict=True))
+            raise SettingError(
+                f"only: got {name!r}, expected a system ({', '.join(systems)}), a constraint "
+                f"({', '.join(constraints)}), or both, such as {', '.join(every[0])!r}."
+            )
+    return [regime for regime, called in names.items() if not only or called.intersection(only)]
+
+
+def trial(
+    settings: Settings, system: str, constraint: str, seed: np.random.SeedSequence
+) -> list[dict[str, tuple[float, ...]]]:
+    """Learn from one data set; for each noise level, what is found of each method, see :data:`_COLUMNS`."""
+    name = sum(ord(letter) * (place + 1) for place, letter in enumerate(f"{system} {constraint}"))
+    rng = np.random.default_rng([name, *seed.generate_state(4)])
+    training, test = demonstrate(system, constraint, rng)
+    found = []
+    for noise in settings.noise:
+        noisy = with_noise(training, noise, rng)
+        policy = _policy(system).set_params(learner=Robust()).fit_demonstrations(noisy)
+        learnt = {
+            "direct": policy.with_learner(Direct()),
+            "inconsistency": policy.with_learner(Inconsistency()),
+            PAPER: policy.with_learner(Hybrid(settings.alpha)),
+            "hybrid, auto": policy.with_learner(Hybrid(alpha="auto")),
+        }
+        of_noise: dict[str, tuple[float, ...]] = {method: _errors(one, test) for method, one in learnt.items()}
+        chosen, judged = policy.solution_, learnt["direct"]
+        assert isinstance(chosen, RobustSolution)
+        for method in ("noise-corrected", "likelihood"):  # what the default learner chose from
+            judged.solution_ = replace(chosen, weights=chosen.candidates[method])
+            of_noise[method] = _errors(judged, test)
+        of_noise[DEFAULT] = (*_errors(policy, test), *_knowledge(policy, noisy, test))
+        of_noise[ORACLE] = _oracle(policy, test, settings.thresholds)
+        of_noise[KNOWN] = _knowing(policy, noisy, test)
+        found.append(of_noise)
+    return found
+
+
+def demonstrate(
+    system: str, constraint: str, rng: np.random.Generator
+) -> tuple[list[Demonstration], list[Demonstration]]:
+    """Demonstrations to learn from and to be tested on, without noise."""
+    if system == "arm":
+        return _by_arm(constraint, 100, rng), _by_arm(constraint, 50, rng)
+    settings, flow = toy.ToySettings(), _SYSTEMS[system]
+    starts = rng.uniform(-settings.start, settings.start, (settings.demonstrations, 2))
+    draws = [_planar(constraint, flow, index, settings, rng) for index in range(len(starts))]
+    demos: list[Demonstration] = []
+    for start, drawn in zip(starts, draws, strict=True):
+        constraints = None if drawn is None else [drawn]
+        demos += rollout(flow, start[None], settings.steps, settings.dt, constraints, name=system)
+    return toy.split(demos, settings.test_share, rng)
+
+
+def with_noise(demonstrations: Sequence[Demonstration], share: float, rng: np.random.Generator) -> list[Demonstration]:
+    """The same with normal noise on the actions, as a share of the policy's rms spread per coordinate."""
+    policies = np.concatenate([demo.truth.policy for demo in demonstrations if demo.truth is not None])
+    size = share * float(np.sqrt(((policies - policies.mean(axis=0)) ** 2).mean()))
+    return [
+        replace(demo, actions=demo.actions + size * rng.standard_normal(demo.actions.shape)) for demo in demonstrations
+    ]
+
+
+def headlines(result: Result) -> list[str]:
+    """The default learner at each noise level, in a sentence; and what else a person asks."""
+    summary = {(one["method"], one["noise"]): one for one in result.tables["summary"]}
+    said = []
+    for noise in result.settings.noise:  # type: ignore[attr-defined]
+        ours, bound = summary[DEFAULT, noise], summary[KNOWN, noise]
+        said.append(
+            f"noise {noise:.0%}: {DEFAULT} nUPE {ours['to_paper']:.3f} times the paper's hybrid (geometric mean over "
+            f"{ours['regimes']} regimes); against the oracle {ours['to_oracle']:.2f} times, at worst "
+            f"{ours['worst_to_oracle']:.2f} times ({ours['worst']}); with all {KNOWN} it would be "
+            f"{bound['to_paper']:.3f} times the paper's"
+        )
+    for one in result.rows:
+        if (
+            one["method"] == DEFAULT
+            and one["noise"] in (0.0, 0.05)
+            and one["constraint"] in ("half", "1-2-3", "1-...-5")
+        ):
+            told = "" if one["auc_mean"] is None else f", free told apart with an area of {one['auc_mean']:.4f}"
+            error = one["nupe_sd"] / np.sqrt(result.settings.trials)  # type: ignore[attr-defined]
+            mean, error, geometric = (
+                f"{100 * value:.4f}e-2" for value in (one["nupe_mean"], error, one["nupe_geometric"])
+            )
+            said.append(
+                f"{one['system']}, {one['constraint']}, noise {one['noise']:.0%}: nUPE {mean} (mean, standard error "
+                f"{error}; geometric mean {geometric}){told}"
+            )
+    covered = [
+        one["coverage_mean"] for one in result.rows if one["method"] == DEFAULT and one["coverage_mean"] is not None
+    ]
+    said.append(
+        f"95 % intervals of {DEFAULT} hold the true policy where the data determines it: {np.mean(covered):.1%} over "
+        f"all regimes, {min(covered):.1%} to {max(covered):.1%} in single ones"
+    )
+    return said
+
+
+_COLUMNS = ("nupe", "ncpe", "ninc", "auc", "coverage")
+
+
+def _rows(of_regime: Sequence[dict[str, tuple[float, ...]]], **where: Any) -> list[dict[str, Any]]:
+    rows = []
+    best = np.array([one[ORACLE][0] for one in of_regime])
+    for method in of_regime[0]:
+        values = np.array([(*one[method], np.nan, np.nan)[: len(_COLUMNS)] for one in of_regime])
+        made = row(method, values[:, :3].tolist(), **where)
+        made["nupe_geometric"] = float(np.exp(np.log(values[:, 0]).mean()))
+        made["to_oracle"] = float(np.exp(np.log(values[:, 0] / best).mean()))
+        for name, column in zip(_COLUMNS[3:], values[:, 3:].T, strict=True):
+            known = column[np.isfinite(column)]
+            made[f"{name}_mean"] = float(known.mean()) if len(known) else None
+        rows.append(made)
+    return rows
+
+
+def _summary(rows: Sequence[dict[str, Any]], settings: Settings) -> list[dict[str, Any]]:
+    """One row for each method and noise level, over all regimes."""
+    said = []
+    for method in dict.fromkeys(one["method"] for one in rows):
+        for noise in settings.noise:
+            mine = [one for one in rows if one["method"] == method and one["noise"] == noise]
+            paper = [one for one in rows if one["method"] == PAPER and one["noise"] == noise]
+            worst = max(mine, key=lambda one: one["to_oracle"])
+            logs = [np.log(a["nupe_geometric"] / b["nupe_geometric"]) for a, b in zip(mine, paper, strict=True)]
+            said.append(
+                {
+                    "method": method,
+                    "noise": noise,
+                    "regimes": len(mine),
+                    "to_paper": float(np.exp(np.mean(logs))),
+                    "to_oracle": float(np.exp(np.mean([np.log(one["to_oracle"]) for one in mine]))),
+                    "worst_to_oracle": worst["to_oracle"],
+                    "worst": f"{worst['system']}, {worst['constraint']}",
+                }
+            )
+    return said
+
+
+def _errors(policy: Policy, test: Sequence[Demonstration]) -> tuple[float, float, float]:
+    return nupe(policy, test), ncpe(policy, test), ninconsistency(policy, test)
+
+
+def _knowledge(policy: Policy, training: Sequence[Demonstration], test: Sequence[Demonstration]) -> tuple[float, float]:
+    """How well free samples are told from constrained ones, and how often intervals hold the truth; NaN if unknown."""
+    solution = policy.solution_
+    assert isinstance(solution, RobustSolution)
+    free = np.concatenate([_is_free(demo) for demo in training])
+    states = np.concatenate([demo.states for demo in test])
+    truth = np.concatenate([demo.truth.policy for demo in test if demo.truth is not None])
+    spread = policy.uncertainty(states)
+    known = spread.undetermined < spread.from_noise
+    held = np.abs(truth - policy(states)) <= 1.96 * spread.total
+    return area_under_curve(solution.free, free), float(held[known].mean()) if known.any() else np.nan
+
+
+def area_under_curve(scores: Array, labels: Array) -> float:
+    """Probability that a labelled sample scores above one that is not, ties half; NaN without one of either."""
+    from scipy.stats import rankdata
+
+    count = int(labels.sum())
+    if count in (0, len(labels)):
+        return float("nan")
+    ranks = rankdata(scores)[labels].sum()
+    return float((ranks - count * (count + 1) / 2) / (count * (len(labels) - count)))
+
+
+def _is_free(demo: Demonstration) -> Array:
+    assert demo.truth is not None
+    d = demo.actions.shape[1]
+    return np.abs(demo.truth.projections - np.eye(d)).max(axis=(1, 2)) < 1e-9
+
+
+def _oracle(policy: Policy, test: Sequence[Demonstration], count: int) -> tuple[float, float, float]:
+    """The best point of the paper's path, one threshold for all models, chosen by the truth."""
+    whole = _whole(policy)
+    path = lexicographic_path(inconsistency(whole), standard_risk(whole))
+    return _best(policy, test, [path.at(path.split(threshold)) for threshold in (0.0, *np.logspace(-10, 0, count))])
+
+
+def _knowing(
+    policy: Policy, training: Sequence[Demonstration], test: Sequence[Demonstration]
+) -> tuple[float, float, float]:
+    """The constrained error minimised with the true projections, beside as much of the risk as the truth says."""
+    N = np.concatenate([demo.truth.projections for demo in training if demo.truth is not None])
+    states, actions, _ = stack(training)
+    features, centring, d = policy._features(states), policy._centring(), actions.shape[1]
+    in_models = policy._weights(states)
+    members = np.ones((len(states), 1)) if in_models is None else in_models
+
+    def along(direction: Array) -> Moments:
+        """Moments with what is observed along one direction, each sample as far as its constraint leaves it."""
+        weights = np.einsum("a,nab,b->n", direction, N, direction)
+        moments = gather(features, np.ones((len(states), 1)), np.maximum(weights, 0.0)[:, None] * members)
+        return moments if centring is None else moments.in_features(centring)
+
+    axes = np.eye(d)
+    alone = [along(axis).gram for axis in axes]
+    p = features.shape[1]
+    hessian = np.zeros((members.shape[1], p, d, p, d))
+    for a in range(d):
+        hessian[:, :, a, :, a] = alone[a]
+        for b in range(a):  # weights must not be negative, and eᵀ N e is not
+            mixed = 0.5 * (along(axes[a] + axes[b]).gram - alone[a] - alone[b])
+            hessian[:, :, a, :, b] = hessian[:, :, b, :, a] = mixed
+    whole, seen = _whole(policy), gather(features, np.einsum("nab,nb->na", N, actions), members)
+    linear = vec((seen if centring is None else seen.in_features(centring)).cross)
+    error = Quadratic(hessian.reshape(-1, p * d, p * d), linear, whole.energy)
+    minima = softened_minima(error, standard_risk(whole), _SOFTNESSES)
+    return _best(policy, test, [minima[..., k] for k in range(len(_SOFTNESSES))])
+
+
+def _whole(policy: Policy) -> Moments:
+    folds, centring = policy._folds, policy._centring()
+    return folds.whole if centring is None else folds.whole.in_features(centring)
+
+
+def _best(policy: Policy, test: Sequence[Demonstration], found: Sequence[Array]) -> tuple[float, float, float]:
+    """Errors of the weights (M, P), over ``T_m φ``, that are nearest to the truth."""
+    centring, d = policy._centring(), policy.n_outputs_
+    states, truth = stack(test).states, np.concatenate([demo.truth.policy for demo in test if demo.truth is not None])
+    judged = policy.with_learner(Direct())
+    plain = best = judged.solution_
+    least = np.inf
+    for each in found:
+        weights = unvec(each, d)
+        judged.solution_ = replace(plain, weights=weights if centring is None else weights @ centring)
+        missed = float(((judged(states) - truth) ** 2).sum())
+        if missed < least:
+            best, least = judged.solution_, missed
+    judged.solution_ = best
+    return _errors(judged, test)
+
+
+def _policy(system: str) -> Policy:
+    if system == "arm":
+        return LocallyLinearPolicy(3.0, 0.7, validation=Folds())
+    settings = toy.ToySettings()
+    grid = NormalisedRBF.grid(-settings.reach, settings.reach, settings.per_axis, width=settings.width)
+    return ParametricPolicy(grid, validation=Folds(by="demonstration"))
+
+
+def _planar(
+    kind: str, flow: Callable[[Array], Array], index: int, settings: toy.ToySettings, rng: np.random.Generator
+) -> Constraint | None:
+    duration = settings.steps * settings.dt
+    free = {"none": True, "half": index % 2 == 0, "quarter free": index % 4 == 0}
+    if free.get(kind, False):
+        return None
+    if kind == "random" or kind in free:
+        return SwitchingLine.random(rng, duration, settings.switches)
+    return PolicyAligned.random(rng, flow, float(kind), settings.steps, settings.dt)
+
+
+def _by_arm(kind: str, count: int, rng: np.random.Generator) -> list[Demonstration]:
+    starts = rng.uniform(-0.5, 0.5, (count, LWR3.joints)) * LWR3.upper
+    free = {"none": count, "half": count // 2}.get(kind, 0)
+    demos: list[Demonstration] = []
+    for part, held in ((starts[:free], 0), (starts[free:], _HELD.get(kind, 0))):
+        constraint = JacobianRows(LWR3.jacobian, tuple(range(held))) if held else None
+        if len(part):
+            demos += cast(
+                "list[Demonstration]", rollout(JointLimitAvoidance(0.05, 1.8), part, 100, 0.5, constraint, name="arm")
+            )
+    return demos

@@ -1,0 +1,123 @@
+"""Many trials of one experiment: the same numbers whatever the number of workers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed
+from threadpoolctl import threadpool_limits
+
+from ...evaluation import ncpe, ninconsistency, nupe
+from ...learners import Learner
+from ...policies import Policy
+from ...recordings import Demonstration
+from .journal import DataClass, Journal
+
+__all__ = ["LABELS", "METRICS", "Progress", "Result", "errors", "row", "run_trials"]
+
+METRICS = ("nupe", "ncpe", "ninc")
+"""Normalised unconstrained and constrained policy error, and inconsistency."""
+
+LABELS = {"nupe": "nUPE", "ncpe": "nCPE", "ninc": "normalised inconsistency"}
+"""What people call them."""
+
+Progress = Callable[[int, int], None]
+"""Called with how many trials are done, and of how many."""
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What an experiment found.
+
+    Parameters
+    ----------
+    name : str
+    settings : dataclass
+        Everything that the numbers depend on.
+    rows : list of dict
+        One for each method and setting, in plain units.
+    details : dict
+        What pictures need and tables do not.
+    tables : dict
+        Further rows, by name.
+    """
+
+    name: str
+    settings: DataClass
+    rows: list[dict[str, Any]]
+    details: dict[str, Any] = field(default_factory=dict)
+    tables: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Settings and rows as plain values."""
+        return {"name": self.name, "settings": asdict(self.settings), "rows": self.rows, **self.tables}
+
+
+def run_trials(
+    trial: Callable[..., Any],
+    arguments: Iterable[Sequence[Any]],
+    workers: int = 1,
+    progress: Progress | None = None,
+    journal: Journal | None = None,
+) -> list[Any]:
+    """Run independent trials, in order, on some processes.
+
+    Linear algebra runs on one thread in each: it does not pay at these sizes,
+    and the order of its additions must not depend on the machine.
+
+    Parameters
+    ----------
+    trial : callable
+        Of the module's top level, so that it can be sent to a process.
+    arguments : iterable of sequences
+        Of each call.
+    workers : int
+        Processes; -1 for one on each core.
+    progress : callable, optional
+        See :data:`Progress`.
+    journal : Journal, optional
+        Keeps what is finished, so that an interrupted run goes on where it stopped.
+    """
+    calls = list(arguments)
+    found: dict[int, Any] = journal.begin() if journal is not None else {}
+    left = [index for index in range(len(calls)) if index not in found]
+    with threadpool_limits(1):
+        jobs = (delayed(_on_one_thread)(trial, calls[index]) for index in left)
+        for index, result in zip(
+            left, Parallel(n_jobs=workers, return_as="generator", batch_size=1)(jobs), strict=True
+        ):
+            found[index] = result
+            if journal is not None:
+                journal.add(index, result)
+            if progress is not None:
+                progress(len(found), len(calls))
+    return [found[index] for index in range(len(calls))]
+
+
+def errors(
+    policy: Policy, learners: Mapping[str, Learner], demonstrations: Sequence[Demonstration]
+) -> dict[str, tuple[float, ...]]:
+    """The three normalised errors of each learner, from one set of moments."""
+    found = {}
+    for name, learner in learners.items():
+        learnt = policy.with_learner(learner)
+        found[name] = tuple(metric(learnt, demonstrations) for metric in (nupe, ncpe, ninconsistency))
+    return found
+
+
+def row(method: str, values: Sequence[Sequence[float]], **where: Any) -> dict[str, Any]:
+    """Mean and standard deviation over trials of the three errors, as one row of a table."""
+    table = np.asarray(values, dtype=np.float64)
+    spread = table.std(axis=0, ddof=1) if len(table) > 1 else np.zeros(table.shape[1])
+    result: dict[str, Any] = {"method": method, **where}
+    for metric, mean, sd in zip(METRICS, table.mean(axis=0), spread, strict=True):
+        result |= {f"{metric}_mean": float(mean), f"{metric}_sd": float(sd)}
+    return result
+
+
+def _on_one_thread(trial: Callable[..., Any], call: Sequence[Any]) -> Any:
+    with threadpool_limits(1):
+        return trial(*call)

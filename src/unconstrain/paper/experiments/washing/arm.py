@@ -1,0 +1,151 @@
+"""The learnt policy on the arm: on a plate that it was learnt from, and on plates that nobody showed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ....base.arrays import Array
+from ....base.errors import SettingError
+from ....motion import Contained
+from ....policies import Policy
+from ....recordings import Demonstration
+from ... import simulation
+from ...simulation import Wipe, turning
+from ...systems.wiping import HELD_OUT, PLATES, Plate, WipingPolicy
+from .learning import Split, fitted
+from .surfaces import Surface
+
+if TYPE_CHECKING:
+    from . import Settings
+
+__all__ = ["Reproduction", "check_reach", "jobs", "plates", "reproduce"]
+
+SEEN = PLATES[3]
+"""Of the plates that are learnt from, the arm wipes this one."""
+
+NOT_RECORDED = Plate(-12.0, 24.0)
+"""No recorded bout has a tilt near this one."""
+
+MEASURES = (
+    "contact_share", "force_mean", "force_sd", "frequency", "spread_m", "drift_m", "path_error_m", "cycles",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Reproduction:
+    """The arm on one plate.
+
+    Parameters
+    ----------
+    trial : int
+    plate : Plate
+    seen : bool
+        Whether the policy was learnt from it.
+    wipe : Wipe or None
+        What the arm did; None where it could not.
+    failed : str
+        Why it could not.
+    demonstration : Demonstration or None
+        What the hand did on this plate, where that is known.
+    frequency, spread : float
+        Of the demonstrations, turns per second and m.
+    """
+
+    trial: int
+    plate: Plate
+    seen: bool
+    wipe: Wipe | None
+    failed: str
+    demonstration: Demonstration | None
+    frequency: float
+    spread: float
+
+    def row(self) -> dict[str, Any]:
+        """All that was measured, in plain units."""
+        found: dict[str, Any] = dict.fromkeys(MEASURES) if self.wipe is None else dict(self.wipe.measures())
+        return {
+            "surface": self.plate.name,
+            "seen": self.seen,
+            "trial": self.trial,
+            **found,
+            "frequency_demonstrated": self.frequency,
+            "spread_demonstrated_m": self.spread,
+            "torque_share": None if self.wipe is None else self.wipe.torque_share,
+            "speed": None if self.wipe is None else self.wipe.speed,
+            "failed": self.failed,
+        }
+
+
+def plates(settings: Settings) -> list[Plate]:
+    """Plates that the arm wipes; none without physics."""
+    if not settings.contact:
+        return []
+    own = [NOT_RECORDED] if settings.real else [SEEN, *HELD_OUT]
+    return own if settings.extra is None else [*own, settings.extra]
+
+
+def check_reach(plate: Plate) -> None:
+    """Refuse a plate on which the arm cannot wipe a circle, before anything long is begun."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 24)
+    circle = WipingPolicy().radius * np.column_stack([np.cos(angles), np.sin(angles)]) @ plate.rotation[:, :2].T
+    simulation.postures_along(circle, plate)
+
+
+def jobs(settings: Settings, wiped: Sequence[Plate], splits: Sequence[Split]) -> list[tuple[Any, ...]]:
+    """Arguments of :func:`reproduce`: each trial's hybrid on each plate, or the one learnt from all recorded bouts."""
+    if not settings.real:
+        return [
+            (
+                settings,
+                trial,
+                split.policies["hybrid"],
+                split.training,
+                plate,
+                _on(plate, split.surfaces),
+                plate == SEEN,
+            )
+            for trial, split in enumerate(splits)
+            for plate in wiped
+        ]
+    surfaces = [surface for split in splits for surface in split.held_out]
+    policy = fitted(settings, surfaces)["hybrid"] if wiped else None
+    return [(settings, 0, policy, surfaces, plate, surfaces, False) for plate in wiped]
+
+
+def reproduce(
+    settings: Settings,
+    trial: int,
+    policy: Policy,
+    training: Sequence[Surface],
+    plate: Plate,
+    shown: Sequence[Surface],
+    seen: bool,
+) -> Reproduction:
+    """Let the arm wipe a plate with a policy, kept near the states it was learnt from."""
+    pairs = [
+        (demo, normals["plane"])
+        for surface in shown
+        for demo, normals in zip(surface.demonstrations, surface.normals, strict=True)
+    ]
+    frequency = float(np.mean([abs(turning(demo, normal)) for demo, normal in pairs]))
+    spread = float(np.mean([np.sqrt(demo.states.var(axis=0).sum()) for demo, _ in pairs]))
+    wipe, failed = None, ""
+    kept = Contained(policy, _states(training), settings.reach)
+    try:
+        wipe = simulation.wipe(kept, plate, pairs[0][0].states[-1], settings.cycles / frequency)
+    except SettingError as error:
+        failed = str(error)
+    demonstration = pairs[0][0] if not settings.real else None
+    return Reproduction(trial, plate, seen, wipe, failed, demonstration, frequency, spread)
+
+
+def _states(surfaces: Sequence[Surface]) -> Array:
+    return np.concatenate([demo.states for surface in surfaces for demo in surface.demonstrations])
+
+
+def _on(plate: Plate, surfaces: Sequence[Surface]) -> list[Surface]:
+    return [surface for surface in surfaces if surface.name == plate.name]

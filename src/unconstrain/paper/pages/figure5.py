@@ -1,0 +1,100 @@
+"""The page of figure 5."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...pages import figures, html
+from ..experiments import figure5
+from ..experiments.trials import LABELS, Result
+
+__all__ = ["page"]
+
+TITLES = {metric: LABELS[metric] for metric in ("nupe", "ncpe")}
+ANGLE = "how far constraints vary, θ<sub>max</sub> (rad)"
+
+Curves = dict[str, tuple[Array, Array]]
+
+
+def page(result: Result) -> str:
+    """Errors against how much the constraints vary."""
+    widest = np.array(sorted({row["theta_max"] for row in result.rows}))
+    curves = {metric: _curves(result.rows, metric) for metric in TITLES}
+    return html.document(
+        "Figure 5: from one constraint to many",
+        "Movement is allowed only along the policy turned by a random angle of at most θ<sub>max</sub>. At 0 the "
+        "recordings are the policy itself; to the right the constraint takes away more, and differently at each "
+        "sample. Direct learning is good at the left and gets worse steadily; inconsistency alone is the other way "
+        "round. The hybrid has to follow the lower of the two without being told where on this axis the data lies. "
+        "<b>nUPE</b> is the error of the learnt policy where it is free, <b>nCPE</b> after the constraint has "
+        "taken its share, both as a share of the policy’s variance.",
+        html.section("Errors", _errors(widest, curves)),
+        html.section("The hybrid against the better of the other two", _ratio(widest, result)),
+        html.section("Numbers", _table(widest, curves, result)),
+        html.settings_table(result.settings),
+    )
+
+
+def _curves(rows: list[dict[str, Any]], metric: str) -> Curves:
+    found: Curves = {}
+    for method in figures.METHODS:
+        own = sorted((row for row in rows if row["method"] == method), key=lambda row: row["theta_max"])
+        found[method] = tuple(np.array([row[f"{metric}_{what}"] for row in own]) for what in ("mean", "sd"))  # type: ignore[assignment]
+    return found
+
+
+def _errors(widest: Array, curves: dict[str, Curves]) -> str:
+    panels = []
+    for metric, title in TITLES.items():
+        ours = curves[metric]
+        # The inconsistency's nUPE at 0 would flatten everything else.
+        top = 1.1 * max(float((mean + sd).max()) for key, (mean, sd) in ours.items() if key != "inconsistency")
+        panels.append(figures.bands(widest, ours, title=f"{title}, linear", labels=(ANGLE, title), top=top))
+        panels.append(figures.bands(widest, ours, title=f"{title}, logarithmic", labels=(ANGLE, title), log=True))
+    return html.picture(
+        "errors",
+        panels,
+        "Lines are means over the data sets, bands one standard deviation (on a logarithmic axis they end at its "
+        "lower edge where they reach zero). The linear axes stop where direct learning does; inconsistency alone "
+        "leaves the first picture at the left.",
+        keys=figures.METHODS,
+    )
+
+
+def _ratio(widest: Array, result: Result) -> str:
+    found = {title: figure5.ratios(result, metric) for metric, title in TITLES.items()}
+    made = figures.ratios(
+        widest,
+        {title: np.array([by_angle[angle] for angle in widest]) for title, by_angle in found.items()},
+        labels=(ANGLE, "hybrid / better of the two"),
+    )
+    return html.picture(
+        "ratio",
+        [made],
+        "At 1 the hybrid is as good as if it had been told which of the two methods to use; below, it beats both. "
+        "Ratios of the means over the data sets. Far to the left the nCPE of inconsistency alone is minute because it "
+        "fits what was seen and nothing else; its policy is useless there, as its nUPE tells.",
+        keys=tuple(TITLES.values()),
+        colours=figures.RATIO_COLOURS,
+    )
+
+
+def _table(widest: Array, curves: dict[str, Curves], result: Result) -> str:
+    header = ["θ<sub>max</sub> (rad)"]
+    header += [f"{title}<br>{method}" for title in TITLES.values() for method in figures.METHODS]
+    rows = [
+        [
+            html.number(angle),
+            *(
+                html.mean_sd(curves[metric][method][0][index], curves[metric][method][1][index])
+                for metric in TITLES
+                for method in figures.METHODS
+            ),
+        ]
+        for index, angle in enumerate(widest)
+    ]
+    trials = getattr(result.settings, "trials", 1)
+    return html.table(header, rows, note=f"Mean ± standard deviation over {trials} data sets, all × 10⁻².")

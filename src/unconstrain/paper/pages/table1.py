@@ -1,0 +1,77 @@
+"""The page of Table I."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...pages import figures, html
+from ..experiments.trials import METRICS, Result
+
+__all__ = ["dots", "page", "table"]
+
+WORDS = {"none": "free", "random": "constrained"}
+TITLES = {"nupe": "nUPE", "ncpe": "nCPE", "ninc": "inconsistency"}
+
+
+def page(result: Result) -> str:
+    """Ours beside the paper's, as a table and as dots."""
+    return html.document(
+        "Table I: free and randomly constrained demonstrations",
+        "A point moves in the plane on a limit cycle. It is recorded either <b>free</b> or while a rail that nobody "
+        "tells the learner about holds it to one direction, and the rail turns twice on the way. Three methods learn "
+        "from these recordings. <b>nUPE</b> says how far the learnt policy is from the true one where nothing holds it "
+        "back, and <b>nCPE</b> how far after the rail has taken its share; both are squared errors as a share of the "
+        "policy’s variance, so 1 is as bad as always answering the mean. Direct learning fails on constrained "
+        "data and inconsistency alone on free data; the hybrid should be good at both.",
+        html.section("Errors", table(result, 100)),
+        html.section("The same, to compare at a glance", dots(result)),
+        html.settings_table(result.settings),
+    )
+
+
+def table(result: Result, trials_of_paper: int) -> str:
+    """Ours beside the paper's, row by row."""
+    header = ["method", "data"]
+    for metric in METRICS:
+        header += [f"{TITLES[metric]}<br>ours", f"{TITLES[metric]}<br>paper"]
+    rows, rules = [], []
+    for index, row in enumerate(result.rows):
+        if index and row["method"] != result.rows[index - 1]["method"]:
+            rules.append(index)
+        cells = [html.label(row["method"]), WORDS.get(row["constraint"], row["constraint"])]
+        for metric in METRICS:
+            cells += [html.mean_sd(*_pair(row, metric)), html.mean_sd(*_pair(row, f"paper_{metric}"))]
+        rows.append(cells)
+    trials = getattr(result.settings, "trials", 1)
+    note = f"Mean ± standard deviation over {trials} data sets, all × 10⁻². The paper’s are over {trials_of_paper}."
+    return html.table(header, rows, left=2, note=note, rules=rules)
+
+
+def dots(result: Result) -> str:
+    """Means of both, method by method, on logarithmic axes."""
+    constraints = list(dict.fromkeys(row["constraint"] for row in result.rows))
+    found = {(row["method"], row["constraint"]): row for row in result.rows}
+    panels = []
+    for metric in ("nupe", "ncpe"):
+        values = {
+            method: [_pair(found[method, one], metric, 100.0) for one in constraints] for method in figures.METHODS
+        }
+        printed = {
+            method: [_pair(found[method, one], f"paper_{metric}", 100.0)[0] for one in constraints]
+            for method in figures.METHODS
+        }
+        title = f"{TITLES[metric]} × 10⁻²"
+        groups = [WORDS.get(one, one) for one in constraints]
+        panels.append(figures.dots(groups, values, printed, title=title, label=title))
+    return html.picture(
+        "errors",
+        panels,
+        "Filled: ours. Open: the paper’s. The axis is logarithmic, so whiskers show one standard deviation "
+        "upwards only; downwards it would often pass zero. Lower is better.",
+        keys=figures.METHODS,
+    )
+
+
+def _pair(row: dict[str, Any], metric: str, scale: float = 1.0) -> tuple[float | None, float | None]:
+    mean, sd = row.get(f"{metric}_mean"), row.get(f"{metric}_sd")
+    return (None if mean is None else scale * mean, None if sd is None else scale * sd)

@@ -1,0 +1,235 @@
+"""The page of the car-washing experiment, simulated or recorded."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...pages import figures, html
+from ...recordings import Demonstration
+from ...risks import null_space_projection, project
+from ..experiments.trials import Result
+from ..experiments.washing import Split, Surface
+from ..systems.wiping import WipingPolicy
+from .washing_arm import on_the_arm
+from .washing_scores import bars, scores
+
+__all__ = ["page"]
+
+ARROWS = 11
+"""Fields are drawn on so many points along each axis of a plate."""
+
+
+class Case(NamedTuple):
+    """A demonstration that nobody learnt from, on its plate, and the split that held it out."""
+
+    split: Split
+    surface: Surface
+    demonstration: Demonstration
+    normal: Array
+
+    @property
+    def plate(self) -> figures.Quad:
+        """Where the demonstration was, as a piece of its plane."""
+        return figures.Quad.around(self.demonstration.states, self.normal)
+
+    @property
+    def title(self) -> str:
+        """Such as ``"+16° about y"`` or ``"tilt40 (B1)"``."""
+        name = self.demonstration.name
+        return self.surface.name if name in ("", self.surface.name) else f"{self.surface.name} ({name})"
+
+
+def page(result: Result) -> str:
+    """Demonstrations, fields, predictions, movements, scores and what the data determined."""
+    splits: list[Split] = result.details["splits"]
+    real = bool(result.rows and "normal" in result.rows[0])
+    cases = [
+        Case(split, surface, surface.demonstrations[0], surface.normals[0]["plane"])
+        for split in splits
+        for surface in split.held_out
+    ]
+    return html.document(
+        "Wiping a car rim, as recorded" if real else "Washing a car, simulated",
+        _lead(real),
+        html.section("How well each method does", scores(result), bars(result)),
+        html.section("On the arm", *on_the_arm(result)),
+        html.section("The demonstrations", _demonstrations(splits)),
+        html.section("The policy on plates that nobody learnt from", _fields(cases, real)),
+        html.section("Predicted and observed velocity on these plates", _velocities(cases)),
+        html.section("Wiping a plate that nobody learnt from", _rollouts(splits)),
+        html.section("What the data determined", _spectra(splits, result.settings)),
+        html.settings_table(result.settings),
+    )
+
+
+def _lead(real: bool) -> str:
+    task = (
+        "A robot arm is led by hand to wipe a car rim at four tilts. One tilt at a time is left out: the policy is "
+        "learnt from the other three, put under the constraint of the fourth, and compared with what was done there. "
+        "The true policy is not known, so only the error along the surface can be told (<b>nCPE</b>)."
+        if real
+        else "One wish in three dimensions (circle, come back to height, press down) wipes seven plates, and each "
+        "plate takes away what points into it. A camera watches with millimetres of noise. The policy is learnt from "
+        "the five plates that are tilted about x and tested on the two that are tilted about y. <b>nCPE</b> is its "
+        "error along the plate, <b>nUPE</b> its error where nothing is in the way."
+    )
+    return (
+        f"{task} Nobody tells the learner where the plates are. Direct learning averages them into the skill; "
+        "inconsistency alone removes them, but trusts noisy directions as much as clear ones; the hybrid weighs the "
+        "one against the other."
+    )
+
+
+def _demonstrations(splits: list[Split]) -> str:
+    if len(splits) == 1:
+        [split] = splits
+        kinds = [("training", one) for one in split.training] + [("held out", one) for one in split.held_out]
+        caption = "Each plate is drawn translucent around the movement that was made on it. Grey ones are learnt from, "
+        caption += "the coloured ones are for testing."
+    else:
+        kinds = [(one.name, one) for split in splits for one in split.held_out]
+        caption = (
+            "Each translucent plane is the one nearest to a bout; bouts of one colour share a tilt, and each tilt "
+        )
+        caption += "is held out once."
+    tracks, quads = [], {}
+    for key, surface in kinds:
+        for demo, normals in zip(surface.demonstrations, surface.normals, strict=True):
+            tracks.append((key, demo.name, demo.states))
+            quads[demo.name] = figures.Quad.around(demo.states, normals["plane"])
+    keys = tuple(dict.fromkeys(key for key, _ in kinds))
+    colours = {key: figures.COLOURS.get(key, figures.PALETTE[at % len(figures.PALETTE)]) for at, key in enumerate(keys)}
+    return html.picture(
+        "demonstrations",
+        [figures.movements(tracks, quads)],
+        f"{caption} Positions are relative to the middle of each plate. Drag to turn, scroll to zoom.",
+        keys=keys,
+        colours=colours,
+    )
+
+
+def _fields(cases: list[Case], real: bool) -> str:
+    panels = []
+    for case in cases:
+        plate = case.plate
+        points = plate.grid(ARROWS)
+        states = plate.place(points)
+        fields = {name: case.split.policies[name](states) @ plate.axes for name in figures.METHODS}
+        if not real:
+            fields["truth"] = WipingPolicy()(states) @ plate.axes
+        demo = case.demonstration
+        reference = (demo.truth.policy if demo.truth is not None else demo.actions) @ plate.axes
+        longest = float(np.linalg.norm(reference, axis=1).max())
+        panels.append(
+            figures.vector_field(
+                points,
+                fields,
+                longest=longest,
+                scale=2.6 * plate.half / ARROWS / longest,
+                trajectories=[plate.flatten(demo.states)],
+                trajectories_are="held out",
+                title=case.title,
+                labels=_axis_labels(case),
+                height=480,
+            )
+        )
+    against = (
+        "The pink line is the demonstration that was held out; arrows should follow it."
+        if real
+        else "Thin black arrows are the true policy; the pink line is the demonstration that was held out."
+    )
+    return html.picture(
+        "fields",
+        panels,
+        f"Learnt velocities, projected onto the plate and seen from above it. {against} Away from it "
+        "nobody recorded anything, and all of them guess. Arrows are not to the scale of the axes, and those that are "
+        f"longer than the longest {'observed' if real else 'true'} one on the pink line are cut to it.",
+        keys=(*(() if real else ("truth",)), *figures.METHODS, "held out"),
+    )
+
+
+def _velocities(cases: list[Case]) -> str:
+    panels = []
+    for case in cases:
+        demo = case.demonstration
+        onto = null_space_projection(case.normal[None, :])
+        series = {name: project(onto, case.split.policies[name](demo.states)) for name in figures.METHODS}
+        times = demo.times if demo.times is not None else np.arange(len(demo), dtype=np.float64)
+        names = [f"v<sub>{axis}</sub> (m/s)" for axis in "xyz"]
+        panels.append(figures.over_time(times, series | {"observed": demo.actions}, names, title=case.title))
+    return html.picture(
+        "velocities",
+        panels,
+        "Velocity in world coordinates. Black is what was observed, coloured what each method predicts at the observed "
+        "positions once its prediction is projected onto the plate (N π̃).",
+        keys=("observed", *figures.METHODS),
+    )
+
+
+def _rollouts(splits: list[Split]) -> str:
+    panels, left = [], []
+    for split in splits:
+        surface = split.held_out[0]
+        case = Case(split, surface, surface.demonstrations[0], surface.normals[0]["plane"])
+        plate = case.plate
+        reach = 2.0 * plate.half
+        lines = {"observed": plate.flatten(case.demonstration.states)}
+        for name, run in split.rollouts.items():
+            path = plate.flatten(run.states)
+            outside = np.flatnonzero(np.abs(path).max(axis=1) > reach)
+            if len(outside):
+                left.append(f"{figures.LABELS[name]} after {_seconds(run, outside[0])} on {escape(case.title)}")
+            lines[name] = path[: outside[0] + 1] if len(outside) else path
+        panels.append(figures.paths(lines, reach=reach, title=case.title, labels=_axis_labels(case), height=480))
+    longest = next(iter(splits[0].rollouts.values()))
+    escaped = f" These left the picture: {'; '.join(left)}." if left else ""
+    return html.picture(
+        "rollouts",
+        panels,
+        f"Each learnt policy, started where the demonstration starts (dot) and followed for {_seconds(longest, -1)} "
+        "under the plate’s constraint, seen from above the plate. "
+        f"A policy that drifts off or falls into the middle would not wipe.{escaped}",
+        keys=("observed", *figures.METHODS),
+    )
+
+
+def _seconds(movement: Demonstration, at: int) -> str:
+    return f"step {at}" if movement.times is None else f"{round(movement.times[at], 1):g} s"
+
+
+def _spectra(splits: list[Split], settings: Any) -> str:
+    panels, counts, directions = [], [], 0
+    for split in splits:
+        found = split.policies["inconsistency"].solution_
+        if found.eigenvalues is None:
+            continue
+        names = ", ".join(surface.name for surface in split.held_out)
+        panels.append(figures.spectra(found.eigenvalues, title=f"without {names}" if len(splits) > 1 else ""))
+        counts.append(str(len(found.eigenvalues)))
+        directions = found.directions
+    return html.picture(
+        "spectra",
+        panels,
+        f"Each receptive field ({', '.join(counts)} of them) has a linear model with {directions} weights; lines show "
+        "how strongly the inconsistency pins down each direction of these weights, relative to its strongest. "
+        "Directions far down on the right are barely determined: inconsistency alone fills them with noise, while the "
+        f"hybrid here (softness {settings.softness:g}, threshold {settings.threshold:g}) hands each direction over to "
+        "direct learning by degrees, the weaker the more.",
+        keys=("each field", "median"),
+        colours={"each field": figures.COLOURS["inconsistency"], "median": figures.COLOURS["truth"]},
+    )
+
+
+def _axis_labels(case: Case) -> tuple[str, str]:
+    first, second = (_direction(axis) for axis in case.plate.axes.T)
+    return f"in the plate, along {first} (m)", f"in the plate, along {second} (m)"
+
+
+def _direction(axis: Array) -> str:
+    """Which world axis a direction is nearest to."""
+    at = int(np.abs(axis).argmax())
+    return f"{'−' if axis[at] < 0 else ''}{'xyz'[at]}"

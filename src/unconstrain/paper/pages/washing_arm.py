@@ -1,0 +1,152 @@
+"""The arm that wipes with the learnt policy: pictures, force, path and what was measured."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from ...base.errors import UnconstrainError
+from ...pages import figures, html
+from ..experiments.trials import Result
+from ..experiments.washing import WITHOUT_PHYSICS, Reproduction
+from ..simulation import BACKENDS, Wipe
+from ..simulation.pictures import animation, film, strip
+from ..systems.arm import LWR3
+
+__all__ = ["on_the_arm"]
+
+WITHOUT_GRAPHICS = (
+    "The scene cannot be rendered on this machine, so the arm is drawn as lines. On Debian, "
+    f"<code>apt-get install {BACKENDS['egl']} libegl-mesa0</code> or <code>apt-get install {BACKENDS['osmesa']}</code> "
+    "gives the real picture; <code>unconstrain doctor</code> tells what is missing."
+)
+
+STATEMENT = (
+    "The hybrid policy gives a velocity at every position; projected onto the plate it becomes joint velocities, "
+    "together with standing upright on the plate and an admittance that holds the pressing force; what that leaves "
+    "free returns the arm to a resting posture. Torques move the arm, and a spring in the sponge meets the plate. "
+    "Farther than {reach:g} cm from where anybody demonstrated, the arm goes back: where recordings only show a steady "
+    "cycle, they cannot tell that it attracts."
+)
+
+
+def on_the_arm(result: Result) -> list[str]:
+    """Everything about the reproduction; a sentence where there is no physics engine."""
+    settings: Any = result.settings
+    done: list[Reproduction] = result.details["reproductions"]
+    if not done:
+        return [html.paragraph(escape(WITHOUT_PHYSICS))]
+    parts = [html.paragraph(STATEMENT.format(reach=100.0 * settings.reach))]
+    wiped = [one for one in done if one.wipe is not None]
+    if wiped:
+        shown = next((one for one in wiped if not one.seen), wiped[0])
+        parts += [_pictures(shown), _tracks(wiped)]
+    return [*parts, _measures(result.tables["reproduction"])]
+
+
+def _pictures(shown: Reproduction) -> str:
+    wipe = shown.wipe
+    assert wipe is not None
+    name = f"plate {escape(shown.plate.name)}, which nobody {'wiped' if shown.demonstration is None else 'learnt from'}"
+    try:
+        moving = html.image(
+            "animation", animation(film(wipe)), "gif", f"The arm wipes a plate tilted {shown.plate.name}",
+            f"The arm on {name}, as fast as it is. The line is the path of the sponge.",
+        )  # fmt: skip
+        if shown.demonstration is None:
+            return moving
+        return moving + html.image(
+            "strip", strip(shown.demonstration, wipe), "png", "A hand wipes a plate; below, the arm wipes it",
+            "One turn of the demonstration on this plate (above, positions as the camera saw them), and one of the "
+            "reproduction (below), like figure 6 of the paper. The demonstration was not learnt from.",
+        )  # fmt: skip
+    except UnconstrainError:
+        return html.image(
+            "arm", _lines(wipe), "png", f"The arm wipes a plate tilted {shown.plate.name}, as lines",
+            f"The arm on {name}, at four moments of its last turn. {WITHOUT_GRAPHICS}",
+        )  # fmt: skip
+
+
+def _lines(wipe: Wipe) -> bytes:
+    length = round(1.0 / (wipe.measures()["frequency"] * (wipe.times[1] - wipe.times[0])))
+    last = slice(max(0, len(wipe.times) - length), None)
+    rows = np.linspace(max(0, len(wipe.times) - length), len(wipe.times) - 1, 4).astype(int)
+    _, joints = LWR3.frames(wipe.postures[rows])
+    track = wipe.positions[last] + wipe.plate.centre
+    plate = figures.Quad.around(track, wipe.plate.rotation[:, 2], margin=1.5)
+    return figures.arm_on_plate(np.moveaxis(joints, -1, 0), track, plate)
+
+
+def _tracks(wiped: list[Reproduction]) -> str:
+    panels = []
+    for one in wiped:
+        wipe = one.wipe
+        assert wipe is not None
+        plate = figures.Quad.around(wipe.positions, wipe.plate.rotation[:, 2], margin=1.6)
+        lines = {} if one.demonstration is None else {"observed": plate.flatten(one.demonstration.states)}
+        lines["hybrid"] = plate.flatten(wipe.positions)
+        title = f"{one.plate.name} ({'seen' if one.seen else 'unseen'})"
+        labels = ("in the plate (m)", "in the plate (m)")
+        panels.append(figures.paths(lines, reach=plate.half, title=title, labels=labels, height=400))
+        series = {"hybrid": np.column_stack([wipe.forces])}
+        force = figures.over_time(wipe.times, series, ["force (N)"], title="normal force", row_height=310)
+        panels.append(force.update_yaxes(rangemode="tozero"))
+    return html.picture(
+        "arm-paths",
+        panels,
+        "The sponge on each plate, seen from above it, with the hand’s strokes in black where there are any; beside it "
+        "the normal force between sponge and plate. Zero would be lost contact.",
+        keys=("observed", "hybrid"),
+        labels={"hybrid": "arm", "observed": "hand"},
+        least=380,
+    )
+
+
+def _measures(rows: list[dict[str, Any]]) -> str:
+    header = ["plate", "learnt from", "turns", "contact", "force (N)", "frequency (Hz)", "demonstrated (Hz)"]
+    header += ["radius (cm)", "demonstrated (cm)", "drift (mm)", "path error (mm)", "largest torque"]
+    header += ["× real time"]
+    several = len({row["trial"] for row in rows}) > 1
+    body = []
+    for surface in dict.fromkeys(row["surface"] for row in rows):
+        of_plate = [row for row in rows if row["surface"] == surface]
+        done = [row for row in of_plate if not row["failed"]]
+        name = escape(surface) + (f"<br>{len(of_plate)} runs" if several else "")
+        if not done:
+            body.append([name, "yes" if of_plate[0]["seen"] else "no", *["–"] * 11])
+            continue
+        body.append([name, "yes" if of_plate[0]["seen"] else "no", *_cells(done)])
+    note = (
+        "Largest torque: as a share of what its joint can. Radius: rms distance from the middle. Drift: from the "
+        "middle of the first turn to that of the last. Path error: rms distance from where the policy itself would "
+        "have been. "
+    )
+    note += "Means over the runs, and in brackets the worst." if several else ""
+    failed = "".join(f"<br>Not wiped: {escape(row['failed'])}" for row in rows if row["failed"])
+    return html.table(header, body, left=2, note=note + failed)
+
+
+def _cells(rows: list[dict[str, Any]]) -> list[str]:
+    def mean(key: str) -> float:
+        return float(np.mean([row[key] for row in rows]))
+
+    def cell(key: str, scale: float, worst: Any) -> str:
+        values = [scale * row[key] for row in rows]
+        bracket = f" ({html.number(worst(values))})" if len(rows) > 1 else ""
+        return html.number(float(np.mean(values))) + bracket
+
+    return [
+        html.number(mean("cycles")),
+        f"{cell('contact_share', 100.0, min)} %",
+        f"{html.number(mean('force_mean'))} ± {html.number(mean('force_sd'), 2)}",
+        html.number(mean("frequency")),
+        html.number(mean("frequency_demonstrated")),
+        html.number(100.0 * mean("spread_m")),
+        html.number(100.0 * mean("spread_demonstrated_m")),
+        cell("drift_m", 1000.0, max),
+        cell("path_error_m", 1000.0, max),
+        f"{cell('torque_share', 100.0, max)} %",
+        cell("speed", 1.0, min),
+    ]

@@ -1,0 +1,173 @@
+"""What was recorded, what was demonstrated, and what was true behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import Array, as_matrix, as_vector
+from ..base.errors import InvalidDataError
+
+__all__ = ["Demonstration", "Recording", "Stack", "Truth", "stack"]
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Columns of numbers as a file holds them, before anyone says what they mean.
+
+    Parameters
+    ----------
+    columns : tuple of str
+        A name for each column.
+    values : ndarray, shape (T, c)
+        May hold NaN where the file has an empty cell.
+    times : ndarray, shape (T,), optional
+        Seconds.
+    name : str
+        Which demonstration this is, for messages and groups.
+    """
+
+    columns: tuple[str, ...]
+    values: Array
+    times: Array | None = None
+    name: str = ""
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def select(self, names: Sequence[str]) -> Array:
+        """Pick columns by name, shape (T, len(names)).
+
+        Raises
+        ------
+        InvalidDataError
+            If a column does not exist; the message lists those that do.
+        """
+        missing = [name for name in names if name not in self.columns]
+        if missing:
+            raise InvalidDataError(
+                f"'{self.name}' has no column {', '.join(map(repr, missing))}; it has {', '.join(self.columns)}."
+            )
+        return self.values[:, [self.columns.index(name) for name in names]]
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What a simulated demonstrator knows and a learner must not see.
+
+    Parameters
+    ----------
+    policy : ndarray, shape (T, d)
+        The unconstrained policy at each state.
+    projections : ndarray, shape (T, d, d)
+        The projection N that the constraint applied, so that ``u = N π``.
+    """
+
+    policy: Array
+    projections: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Demonstration:
+    """One recorded movement.
+
+    Parameters
+    ----------
+    states : array_like, shape (T, n)
+    actions : array_like, shape (T, d)
+    times : array_like, shape (T,), optional
+        Seconds, increasing.
+    truth : Truth, optional
+        Where the movement was simulated.
+    name : str
+        Used in messages and reports.
+
+    Raises
+    ------
+    InvalidDataError
+        If a table is ragged, empty or not finite, or the lengths differ.
+    """
+
+    states: Array
+    actions: Array
+    times: Array | None = None
+    truth: Truth | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        of = f" of '{self.name}'" if self.name else ""
+        object.__setattr__(self, "states", as_matrix(self.states, f"states{of}"))
+        object.__setattr__(self, "actions", as_matrix(self.actions, f"actions{of}"))
+        if len(self.states) != len(self.actions):
+            raise InvalidDataError(
+                f"demonstration{of}: got {len(self.states)} states and {len(self.actions)} actions, "
+                "expected one action for each state."
+            )
+        if self.times is not None:
+            object.__setattr__(self, "times", as_vector(self.times, f"times{of}", len(self.states)))
+        if self.truth is not None:
+            self._check_truth(of)
+
+    def __len__(self) -> int:
+        return len(self.states)
+
+    def __getitem__(self, rows: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Demonstration:
+        """Take some of the samples, with their times and truth."""
+        return replace(
+            self,
+            states=self.states[rows],
+            actions=self.actions[rows],
+            times=None if self.times is None else self.times[rows],
+            truth=None if self.truth is None else Truth(self.truth.policy[rows], self.truth.projections[rows]),
+        )
+
+    def _check_truth(self, of: str) -> None:
+        assert self.truth is not None
+        steps, d = self.actions.shape
+        for what, array, shape in (
+            ("policy", self.truth.policy, (steps, d)),
+            ("projections", self.truth.projections, (steps, d, d)),
+        ):
+            if np.shape(array) != shape:
+                raise InvalidDataError(f"truth{of}: got {what} of shape {np.shape(array)}, expected {shape}.")
+
+
+class Stack(NamedTuple):
+    """Demonstrations laid end to end: what estimators take.
+
+    ``states`` (N, n), ``actions`` (N, d), and ``groups`` (N,), the index of
+    the demonstration that each sample came from.
+    """
+
+    states: Array
+    actions: Array
+    groups: NDArray[np.intp]
+
+
+def stack(demonstrations: Demonstration | Sequence[Demonstration]) -> Stack:
+    """Lay demonstrations end to end.
+
+    Raises
+    ------
+    InvalidDataError
+        If there is none, or they differ in the number of columns.
+    """
+    demos = [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
+    if not demos:
+        raise InvalidDataError("got no demonstration, expected at least one.")
+    shape = demos[0].states.shape[1], demos[0].actions.shape[1]
+    for index, demo in enumerate(demos):
+        if (demo.states.shape[1], demo.actions.shape[1]) != shape:
+            raise InvalidDataError(
+                f"demonstration {index} ('{demo.name}') has {demo.states.shape[1]} state and "
+                f"{demo.actions.shape[1]} action columns, expected {shape[0]} and {shape[1]} as in the first."
+            )
+    return Stack(
+        np.concatenate([demo.states for demo in demos]),
+        np.concatenate([demo.actions for demo in demos]),
+        np.repeat(np.arange(len(demos)), [len(demo) for demo in demos]),
+    )

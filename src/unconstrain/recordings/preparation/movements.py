@@ -1,0 +1,393 @@
+"""Movements from time stamps and positions: gaps, uniform sampling, velocities.
+
+Nothing here smooths or interpolates across a gap: a recording is cut there, its
+pieces are treated one by one, and only then laid end to end again.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from ...base.arrays import Array, as_matrix, as_vector, check_at_least
+from ...base.errors import InvalidDataError, SettingError
+from ..demonstration import Demonstration, Recording
+from .recipes import Recipe, complete_recipe
+
+__all__ = ["Gap", "PreparationWarning", "differentiate", "find_gaps", "prepare", "resample", "stamps", "trim"]
+
+GAP_INTERVALS = 5.0
+"""An interval of this many median ones is a gap, where nothing else is said."""
+
+IRREGULAR = 0.01
+"""Intervals that differ from the median by more than this share are no uniform sampling."""
+
+MOST_SAMPLES = 1e8
+"""More than this is no rate but a mistake, and would fill the memory."""
+
+
+class PreparationWarning(UserWarning):
+    """Something about a recording that was mended on the way, and that its owner should know."""
+
+
+class Gap(NamedTuple):
+    """Where samples are missing: stamp of the last one before, and seconds to the next."""
+
+    start: float
+    length: float
+
+
+class _Piece(NamedTuple):
+    """A stretch without gaps; ``actions`` is None until they are known."""
+
+    times: Array
+    states: Array
+    actions: Array | None
+
+
+def prepare(recordings: Recording | Sequence[Recording], recipe: Recipe | None = None) -> list[Demonstration]:
+    """Turn recordings into demonstrations.
+
+    Parameters
+    ----------
+    recordings : Recording or sequence of Recording
+    recipe : Recipe, optional
+        What it leaves open about the columns is guessed from the first recording.
+
+    Returns
+    -------
+    list of Demonstration
+        One for each recording, in the same order.
+
+    Warns
+    -----
+    PreparationWarning
+        For gaps, for irregular stamps that had to be resampled before they could
+        be differentiated, for stamps that occur twice (the first row is kept),
+        and for pieces between gaps that are too short for the smoothing window.
+
+    Raises
+    ------
+    InvalidDataError
+        If a selected cell is empty or not finite, stamps run backwards, or nothing is left.
+    SettingError
+        If the columns do not tell what is what, or times are needed and missing.
+    """
+    every = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    if not every:
+        raise InvalidDataError("got no recording, expected at least one.")
+    whole = complete_recipe(recipe or Recipe(), every[0])
+    demonstrations = []
+    for recording in every:
+        demonstration, notes = _prepare(recording, whole)
+        for note in notes:
+            warnings.warn(f"'{recording.name}': {note}", PreparationWarning, stacklevel=2)
+        demonstrations.append(demonstration)
+    return demonstrations
+
+
+def differentiate(
+    times: Array, positions: Array, method: str = "savgol", window_s: float = 0.25, order: int = 3
+) -> Array:
+    """Velocities of positions.
+
+    Parameters
+    ----------
+    times : array_like, shape (T,)
+        Seconds, increasing; uniform for ``"savgol"``.
+    positions : array_like, shape (T, n)
+        No gaps.
+    method : {"savgol", "central"}
+        Savitzky-Golay: the slope of a polynomial of degree ``order`` fitted to a window of
+        ``window_s`` seconds, at least the samples that the polynomial needs; or
+        central differences of second order, for stamps at any distance.
+    window_s : float
+    order : int
+
+    Returns
+    -------
+    ndarray, shape (T, n)
+        In units of the positions per second.
+
+    Raises
+    ------
+    InvalidDataError
+        If stamps do not increase, are not uniform (``"savgol"``), or too few.
+    SettingError
+        If the method does not exist or the window is not positive.
+    """
+    positions = as_matrix(positions, "positions")
+    times = as_vector(times, "times", len(positions))
+    recipe = Recipe(differentiate=method, window_s=window_s, order=order)
+    intervals = np.diff(times)
+    if (intervals <= 0).any():
+        row = int(np.argmax(intervals <= 0)) + 1
+        raise InvalidDataError(
+            f"times: got {times[row]} after {times[row - 1]} at row {row}, expected them to increase."
+        )
+    needed = _samples_needed(recipe, _typical(times))
+    if len(times) < needed:
+        raise InvalidDataError(
+            f"positions: got {len(times)} samples, expected at least {needed} to differentiate them."
+        )
+    if method == "savgol" and _is_irregular(intervals):
+        raise InvalidDataError(
+            "times: got irregular stamps, expected uniform ones. Use resample() before, or 'central'."
+        )
+    return _velocities(times, positions, recipe, needed)
+
+
+def resample(times: Array, values: Array, rate: float) -> tuple[Array, Array]:
+    """Linear interpolation at a uniform rate, from the first stamp to the last.
+
+    Parameters
+    ----------
+    times : ndarray, shape (T,)
+        Seconds, increasing.
+    values : ndarray, shape (T, k)
+    rate : float
+        Samples per second.
+
+    Returns
+    -------
+    times : ndarray, shape (S,)
+    values : ndarray, shape (S, k)
+        The same as given where the stamps already are at this rate.
+
+    Raises
+    ------
+    InvalidDataError
+        If there are no samples, or not as many stamps as values.
+    SettingError
+        If the rate is not positive, or makes more samples than any memory holds.
+    """
+    values = as_matrix(values, "values")
+    times = as_vector(times, "times", len(values))
+    check_at_least("rate", rate, 0, strict=True)
+    # A hair more than the duration: rounding must not lose the last sample.
+    duration = (times[-1] - times[0]) * rate + 1e-6
+    if duration > MOST_SAMPLES:
+        raise SettingError(
+            f"rate: got {rate:.6g} Hz for {times[-1] - times[0]:.6g} s, that is {duration:.3g} samples. Take less."
+        )
+    steps = int(duration) + 1
+    grid = times[0] + np.arange(steps) / rate
+    if steps == len(times) and np.allclose(grid, times, rtol=0, atol=1e-6 / rate):
+        return times, values
+    return grid, np.column_stack([np.interp(grid, times, column) for column in values.T])
+
+
+def trim(
+    demonstration: Demonstration, start_s: float = 0.0, end_s: float = 0.0, still: float | None = None
+) -> Demonstration:
+    """Leave out the start and the end.
+
+    Parameters
+    ----------
+    demonstration : Demonstration
+    start_s, end_s : float
+        Seconds to leave out.
+    still : float, optional
+        Then leave out what is slower than this before the first and after the last faster action.
+
+    Raises
+    ------
+    InvalidDataError
+        If nothing is left.
+    SettingError
+        If seconds are given and the demonstration has no times.
+    """
+    keep = np.ones(len(demonstration), dtype=bool)
+    if start_s or end_s:
+        if demonstration.times is None:
+            raise SettingError(f"'{demonstration.name}' has no times to trim by: give a time column, or a rate.")
+        since = demonstration.times - demonstration.times[0]
+        keep = (since >= start_s - 1e-9) & (since <= since[-1] - end_s + 1e-9)
+    if still is not None:
+        keep &= np.linalg.norm(demonstration.actions, axis=1) >= still
+    rows = np.flatnonzero(keep)
+    if not rows.size:
+        raise InvalidDataError(
+            f"'{demonstration.name}': nothing is left after trimming {start_s} s at the start, {end_s} s at the end"
+            f"{'' if still is None else f' and all that is slower than {still}'}. Trim less."
+        )
+    return demonstration[rows[0] : rows[-1] + 1]
+
+
+def find_gaps(times: Array, max_gap_s: float | None = None) -> tuple[Gap, ...]:
+    """Intervals between stamps that are longer than they should be.
+
+    Parameters
+    ----------
+    times : ndarray, shape (T,)
+        Seconds.
+    max_gap_s : float, optional
+        Five median intervals by default.
+    """
+    intervals = np.diff(times)
+    rows = np.flatnonzero(intervals > _longest(times, max_gap_s))
+    return tuple(Gap(float(times[row]), float(intervals[row])) for row in rows)
+
+
+def stamps(recording: Recording, recipe: Recipe) -> Array | None:
+    """Times of a recording; from the rate of the recipe where the recording has none."""
+    if recording.times is None and recipe.rate is not None:
+        return np.arange(len(recording)) / recipe.rate
+    return recording.times
+
+
+def _prepare(recording: Recording, recipe: Recipe) -> tuple[Demonstration, list[str]]:
+    if not len(recording):
+        raise InvalidDataError(f"'{recording.name}' has no samples, expected at least one.")
+    states = _finite(recording, recipe.states or ())
+    actions = None if recipe.actions is None else _finite(recording, recipe.actions)
+    times = stamps(recording, recipe)
+    notes: list[str] = []
+    if times is not None:
+        piece, notes = _without_repeats(_Piece(times, states, actions), recording.name)
+        (times, states, actions), more = _mend(piece, recipe, recording.name)
+        notes += more
+    if actions is None:
+        raise SettingError(
+            f"'{recording.name}' has no times, which are needed to differentiate: "
+            "name the time column (--time), or give its rate in samples per second (--rate)."
+        )
+    demonstration = Demonstration(states, actions, times, name=recording.name)
+    if recipe.trim is not None or recipe.still is not None:
+        demonstration = trim(demonstration, *(recipe.trim or (0.0, 0.0)), still=recipe.still)
+    if recipe.centre:
+        demonstration = replace(demonstration, states=demonstration.states - demonstration.states.mean(axis=0))
+    return demonstration, notes
+
+
+def _finite(recording: Recording, names: Sequence[str]) -> Array:
+    values = recording.select(names)
+    bad = np.argwhere(~np.isfinite(values))
+    if len(bad):
+        row, column = bad[0]
+        raise InvalidDataError(
+            f"'{recording.name}', row {row}, column {names[column]!r}: found {values[row, column]} ({len(bad)} such "
+            "cells in the selected columns), expected finite numbers. Remove or repair these rows first."
+        )
+    return values
+
+
+def _without_repeats(piece: _Piece, name: str) -> tuple[_Piece, list[str]]:
+    times = as_vector(piece.times, f"times of '{name}'", len(piece.states))
+    intervals = np.diff(times)
+    if (intervals < 0).any():
+        row = int(np.argmax(intervals < 0)) + 1
+        raise InvalidDataError(
+            f"'{name}', row {row}: got time {times[row]:.6g} s after {times[row - 1]:.6g} s, expected later ones. "
+            "Sort the rows, or split the file where a new recording begins."
+        )
+    fresh = np.append(True, intervals > 0)
+    if fresh.all():
+        return piece._replace(times=times), []
+    return _Piece(times[fresh], piece.states[fresh], None if piece.actions is None else piece.actions[fresh]), [
+        f"{(~fresh).sum()} rows repeat the time stamp of the row before and were left out."
+    ]
+
+
+def _mend(whole: _Piece, recipe: Recipe, name: str) -> tuple[_Piece, list[str]]:
+    """Split at the gaps, differentiate and resample the pieces, and join them."""
+    gaps = find_gaps(whole.times, recipe.max_gap_s)
+    notes = [_about_gaps(gaps)] if gaps else []
+    pieces = _split(whole, recipe)
+    if recipe.differentiate is not None:
+        interval = _typical(whole.times)
+        if recipe.differentiate == "savgol" and any(_is_irregular(np.diff(piece.times), interval) for piece in pieces):
+            if recipe.rate is None or abs(recipe.rate * interval - 1.0) > 0.01:  # else it is what was asked for
+                notes.append(
+                    f"time stamps are irregular, so it was resampled to its median rate of {1 / interval:.4g} Hz."
+                )
+            pieces = [_resampled(piece, 1 / interval) for piece in pieces]
+        needed = _samples_needed(recipe, interval)
+        pieces, more = _long_enough(pieces, needed, name)
+        notes += more
+        pieces = [piece._replace(actions=_velocities(piece.times, piece.states, recipe, needed)) for piece in pieces]
+    if recipe.rate is not None:
+        pieces = [_resampled(piece, recipe.rate) for piece in pieces]
+    return _joined(pieces), notes
+
+
+def _long_enough(pieces: list[_Piece], needed: int, name: str) -> tuple[list[_Piece], list[str]]:
+    kept = [piece for piece in pieces if len(piece.times) >= needed]
+    if not kept:
+        raise InvalidDataError(
+            f"'{name}': got at most {max(len(piece.times) for piece in pieces)} samples in a row, expected at least "
+            f"{needed} to differentiate them. Record longer, or give a shorter smoothing window."
+        )
+    lost = len(pieces) - len(kept)
+    note = f"{lost} of {len(pieces)} pieces between gaps have fewer than {needed} samples and were left out."
+    return kept, [note] if lost else []
+
+
+def _about_gaps(gaps: Sequence[Gap]) -> str:
+    longest = max(gaps, key=lambda gap: gap.length)
+    return (
+        f"{len(gaps)} gap{'s' * (len(gaps) > 1)} in the time stamps, the longest {longest.length:.3g} s "
+        f"after {longest.start:.6g} s; nothing is smoothed or interpolated across."
+    )
+
+
+def _split(piece: _Piece, recipe: Recipe) -> list[_Piece]:
+    cuts = np.flatnonzero(np.diff(piece.times) > _longest(piece.times, recipe.max_gap_s)) + 1
+    bounds = [0, *cuts.tolist(), len(piece.times)]
+    return [_rows(piece, slice(start, stop)) for start, stop in pairwise(bounds)]
+
+
+def _rows(piece: _Piece, rows: slice) -> _Piece:
+    return _Piece(piece.times[rows], piece.states[rows], None if piece.actions is None else piece.actions[rows])
+
+
+def _resampled(piece: _Piece, rate: float) -> _Piece:
+    times, states = resample(piece.times, piece.states, rate)
+    return _Piece(times, states, None if piece.actions is None else resample(piece.times, piece.actions, rate)[1])
+
+
+def _velocities(times: Array, positions: Array, recipe: Recipe, samples: int) -> Array:
+    if recipe.differentiate == "central":
+        return np.asarray(np.gradient(positions, times, axis=0, edge_order=2))
+    from scipy.signal import savgol_filter  # takes half a second to import
+
+    interval = float(np.mean(np.diff(times)))
+    return np.asarray(savgol_filter(positions, samples, recipe.order, deriv=1, delta=interval, axis=0))
+
+
+def _joined(pieces: Sequence[_Piece]) -> _Piece:
+    times, states, actions = zip(*pieces, strict=True)
+    return _Piece(
+        np.concatenate(times), np.concatenate(states), None if actions[0] is None else np.concatenate(actions)
+    )
+
+
+def _typical(times: Array) -> float:
+    """Median interval between stamps, NaN if there is none."""
+    intervals = np.diff(times)
+    forward = intervals[intervals > 0]
+    return float(np.median(forward)) if forward.size else float("nan")
+
+
+def _longest(times: Array, max_gap_s: float | None) -> float:
+    return GAP_INTERVALS * _typical(times) if max_gap_s is None else max_gap_s
+
+
+def _is_irregular(intervals: Array, typical: float | None = None) -> bool:
+    if not intervals.size:
+        return False
+    expected = float(np.median(intervals)) if typical is None else typical
+    return bool((np.abs(intervals - expected) > IRREGULAR * expected).any())
+
+
+def _samples_needed(recipe: Recipe, interval: float) -> int:
+    """Length of the window: odd, and enough for the polynomial; three for central differences."""
+    if recipe.differentiate == "central":
+        return 3
+    wished = 0 if np.isnan(interval) else round(min(recipe.window_s / interval, MOST_SAMPLES))
+    return max(wished, recipe.order + 1) | 1

@@ -1,0 +1,104 @@
+"""What is in a recording, before anything is done to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.errors import SettingError
+from ..demonstration import Recording
+from .movements import Gap, find_gaps, stamps
+from .recipes import Recipe, complete_recipe
+
+__all__ = ["Survey", "survey"]
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What a look at a recording finds.
+
+    Parameters
+    ----------
+    name : str
+    columns : tuple of str
+    samples : int
+    duration_s : float, optional
+        From the first stamp to the last; None without times, as all that follows from them.
+    rate_hz : float, optional
+        One over the median interval.
+    jitter : float, optional
+        Standard deviation of the intervals that are no gaps, as a share of the median one.
+    gaps : tuple of Gap
+        Where samples are missing.
+    non_increasing : tuple of int
+        Rows whose stamp is not later than that of the row before, from 0.
+    missing : mapping of str to int
+        How many cells of a column are empty or not finite, for the columns that have such.
+    zero_actions : int, optional
+        Samples whose action is zero; None where the actions are not columns.
+    """
+
+    name: str
+    columns: tuple[str, ...]
+    samples: int
+    duration_s: float | None
+    rate_hz: float | None
+    jitter: float | None
+    gaps: tuple[Gap, ...]
+    non_increasing: tuple[int, ...]
+    missing: Mapping[str, int]
+    zero_actions: int | None
+
+
+def survey(recording: Recording, recipe: Recipe | None = None) -> Survey:
+    """Look at a recording without changing or refusing anything.
+
+    Parameters
+    ----------
+    recording : Recording
+    recipe : Recipe, optional
+        Says which columns are actions, the rate where there are no times, and
+        from where on an interval is a gap. What it leaves open is guessed where possible.
+
+    Returns
+    -------
+    Survey
+    """
+    asked = recipe or Recipe()
+    times = stamps(recording, asked)
+    known = np.empty(0) if times is None else times[np.isfinite(times)]
+    gaps = find_gaps(known, asked.max_gap_s)
+    steady = _steady_intervals(known, gaps)
+    typical = float(np.median(steady)) if steady.size else None
+    bad_cells = (~np.isfinite(recording.values)).sum(axis=0)
+    return Survey(
+        name=recording.name,
+        columns=recording.columns,
+        samples=len(recording),
+        duration_s=float(known[-1] - known[0]) if known.size else None,
+        rate_hz=1 / typical if typical else None,
+        jitter=float(steady.std() / typical) if typical else None,
+        gaps=gaps,
+        non_increasing=() if times is None else tuple((np.flatnonzero(~(np.diff(times) > 0)) + 1).tolist()),
+        missing={name: int(count) for name, count in zip(recording.columns, bad_cells, strict=True) if count},
+        zero_actions=_zero_actions(recording, asked),
+    )
+
+
+def _steady_intervals(times: Array, gaps: tuple[Gap, ...]) -> Array:
+    intervals = np.diff(times)
+    shortest_gap = min((gap.length for gap in gaps), default=np.inf)
+    return intervals[(intervals > 0) & (intervals < shortest_gap)]
+
+
+def _zero_actions(recording: Recording, recipe: Recipe) -> int | None:
+    try:
+        actions = complete_recipe(recipe, recording).actions
+    except SettingError:
+        return None
+    if actions is None or not set(actions) <= set(recording.columns):
+        return None
+    return int((recording.select(actions) == 0).all(axis=1).sum())

@@ -1,0 +1,160 @@
+"""From files to batches to learn from, with no more in memory than a block of rows or one file."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..base.arrays import BLOCK_ROWS, Array, check_at_least
+from .batches import Batch
+from .demonstration import Demonstration, Recording
+from .preparation import Recipe, complete_recipe, prepare
+from .readers import expand, read_blocks
+
+__all__ = ["HELD_BYTES", "Stream"]
+
+HELD_BYTES = 2**25
+"""Demonstrations that take no more than this in all are kept after the first walk, so that files are read once."""
+
+
+class Stream:
+    """Files as batches, for :meth:`~unconstrain.ParametricPolicy.fit_batches`; can be walked through many times.
+
+    One file is in memory at a time; of Parquet and HDF5 files a block of
+    rows, where the recipe treats each row by itself (actions are columns,
+    nothing is resampled, trimmed or centred). What is small is kept.
+
+    Parameters
+    ----------
+    paths : path or iterable of paths
+        As :func:`~unconstrain.read` takes them.
+    recipe : Recipe, optional
+        What it leaves open about the columns is guessed from the first recording.
+    group, time : str, optional
+        As :func:`~unconstrain.read` takes them.
+    speed_power : float
+        Samples count by this power of their speed; see
+        :meth:`~unconstrain.ParametricPolicy.fit_demonstrations`.
+    """
+
+    def __init__(
+        self,
+        paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+        recipe: Recipe | None = None,
+        *,
+        group: str | None = None,
+        time: str | None = None,
+        speed_power: float = 0.0,
+    ) -> None:
+        check_at_least("speed_power", speed_power, 0.0)
+        self.paths = expand(paths)
+        self.group = group
+        self.time = time
+        self.speed_power = speed_power
+        self._asked = recipe or Recipe()
+        self._first_file = 0
+        self._held: list[tuple[str, Demonstration]] | None = None
+        self._walked = False
+
+    @cached_property
+    def first(self) -> Recording:
+        """The first recording, or the first block of it."""
+        return next(read_blocks(self.paths[0], group=self.group, time=self.time))
+
+    @cached_property
+    def recipe(self) -> Recipe:
+        """The recipe, completed by a look at the first recording."""
+        asked = self._asked
+        if asked.states and (asked.actions or asked.differentiate):
+            return asked
+        return complete_recipe(self._asked, self.first)
+
+    @cached_property
+    def unit(self) -> float:
+        """Speeds are taken relative to the largest of the first block."""
+        actions = prepare(self.first, self.recipe)[0].actions if self.speed_power else np.zeros((1, 1))
+        return float(np.linalg.norm(actions, axis=1).max()) or 1.0
+
+    def __iter__(self) -> Iterator[Batch]:
+        """Batches of at least :data:`~unconstrain.base.arrays.BLOCK_ROWS` samples, but for the last."""
+        waiting: list[tuple[str, Demonstration]] = []
+        for named in self.named_demonstrations():
+            waiting.append(named)
+            if sum(len(demo) for _, demo in waiting) >= BLOCK_ROWS:
+                yield self._batch(waiting)
+                waiting = []
+        if waiting:
+            yield self._batch(waiting)
+
+    def named_demonstrations(self) -> Iterator[tuple[str, Demonstration]]:
+        """Demonstrations, or blocks of rows of them, each with a name that no other demonstration has."""
+        if self._held is not None:
+            yield from self._held
+            return
+        held: list[tuple[str, Demonstration]] = []
+        size = 0
+        for named in self._read():
+            size += sum(table.nbytes for table in (named[1].states, named[1].actions))
+            if size <= HELD_BYTES:
+                held.append(named)
+            else:
+                held.clear()
+            yield named
+        self._walked = True
+        if size <= HELD_BYTES:
+            self._held = held
+
+    def beginning(self) -> list[Demonstration]:
+        """Demonstrations, as many from the first on as :data:`HELD_BYTES` hold: what a page can show."""
+        shown: list[Demonstration] = []
+        size = 0
+        for _, demonstration in self.named_demonstrations():
+            size += demonstration.states.nbytes + demonstration.actions.nbytes
+            if shown and size > HELD_BYTES:
+                break
+            shown.append(demonstration)
+        return shown
+
+    def parts(self) -> list[Stream]:
+        """One stream for each file, which together say the same; they can be sent to other processes."""
+        streams = []
+        for number, path in enumerate(self.paths):
+            part = Stream(path, self.recipe, group=self.group, time=self.time, speed_power=self.speed_power)
+            part.__dict__["unit"] = self.unit
+            part._first_file = self._first_file + number
+            streams.append(part)
+        return streams
+
+    def _read(self) -> Iterator[tuple[str, Demonstration]]:
+        by_rows = self.recipe.is_row_by_row
+        for number, path in enumerate(self.paths, start=self._first_file):
+            for recording in read_blocks(path, group=self.group, time=self.time, whole=not by_rows):
+                with warnings.catch_warnings():
+                    if self._walked:  # it was said on the first walk
+                        warnings.simplefilter("ignore", UserWarning)
+                    [demonstration] = prepare(recording, self.recipe)
+                yield f"{number}/{recording.name}", replace(demonstration, times=None)
+
+    def _batch(self, named: list[tuple[str, Demonstration]]) -> Batch:
+        actions = np.concatenate([demo.actions for _, demo in named])
+        return Batch(
+            np.concatenate([demo.states for _, demo in named]),
+            actions,
+            self._counts(actions),
+            np.repeat([name for name, _ in named], [len(demo) for _, demo in named]),
+        )
+
+    def _counts(self, actions: Array) -> Array | None:
+        if self.speed_power == 0.0:
+            return None
+        counts: Array = (np.linalg.norm(actions, axis=1) / self.unit) ** self.speed_power
+        return counts
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_held": None}

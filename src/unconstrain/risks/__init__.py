@@ -1,0 +1,38 @@
+"""The mathematics: projections, moments, objectives as quadratics, and their minima in order of importance."""
+
+from .moments import Moments, Sums, gather, total
+from .objectives import inconsistency, standard_risk, unvec, vec
+from .projection import action_projection, null_space_projection, project, unit_actions
+from .quadratic import (
+    NOISE,
+    SECONDARY_NOISE,
+    Path,
+    Quadratic,
+    eigensystem,
+    lexicographic_path,
+    minimum,
+    softened_minima,
+)
+
+__all__ = [
+    "NOISE",
+    "SECONDARY_NOISE",
+    "Moments",
+    "Path",
+    "Quadratic",
+    "Sums",
+    "action_projection",
+    "eigensystem",
+    "gather",
+    "inconsistency",
+    "lexicographic_path",
+    "minimum",
+    "null_space_projection",
+    "project",
+    "softened_minima",
+    "standard_risk",
+    "total",
+    "unit_actions",
+    "unvec",
+    "vec",
+]

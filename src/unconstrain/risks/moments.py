@@ -1,0 +1,321 @@
+"""The sums that every learner needs, and the only code that sees N samples.
+
+All risks of the method are one quadratic with three metrics. For any
+orthogonal projection P with ``P u = u``,
+
+    Σ w ‖u − P π̃(x)‖² = Σ w uᵀu − 2 Σ w uᵀπ̃ + Σ w π̃ᵀ P π̃,
+
+so the standard risk (P = I, eq. 5) and the inconsistency (P = ûûᵀ, eq. 4)
+share the constant and the linear term, and with ``π̃(x) = W φ(x)`` five sums
+say everything about a data set.
+
+A zero action has no direction: it counts in weight, gram (and, adding
+nothing, in energy and cross), but not in ``consistent``. This is the one place
+where that is decided. What is zero is for the caller to say (``at_rest``):
+the direction of rounding would claim that the policy is zero along it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields
+from functools import cache, reduce
+from itertools import combinations, combinations_with_replacement
+from operator import add, sub
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import Array, beside, is_foreign, namespace, on_host
+from .projection import unit_actions
+
+__all__ = ["Moments", "Sums", "gather", "gather_blocks", "total"]
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """Weighted sums over samples, for M models at once.
+
+    They add (batches, machines), subtract (leave a fold out) and scale
+    (forgetting).
+
+    Parameters
+    ----------
+    weight : ndarray, shape (M,)
+        ``Σ w``.
+    energy : ndarray, shape (M,)
+        ``Σ w uᵀu``, the E₀ of eqs 4 and 11.
+    cross : ndarray, shape (M, d, p)
+        ``Σ w u φᵀ``; by columns it is the g of eq. 7 and the m of eq. 11.
+    gram : ndarray, shape (M, p, p)
+        ``Σ w φφᵀ``, so that the M of eq. 11 is ``gram ⊗ I``.
+    consistent : ndarray, shape (M, d p, d p)
+        ``Σ w (φφᵀ ⊗ ûûᵀ)``, the H of eqs 7 and 15.
+    """
+
+    weight: Array
+    energy: Array
+    cross: Array
+    gram: Array
+    consistent: Array
+
+    @classmethod
+    def zero(cls, models: int, actions: int, features: int) -> Moments:
+        """Moments of no sample at all."""
+        weights = actions * features
+        return cls(
+            np.zeros(models),
+            np.zeros(models),
+            np.zeros((models, actions, features)),
+            np.zeros((models, features, features)),
+            np.zeros((models, weights, weights)),
+        )
+
+    def __add__(self, other: Moments) -> Moments:
+        """Moments of both data sets together."""
+        return Moments(*(mine + theirs for mine, theirs in zip(self.sums, other.sums, strict=True)))
+
+    def __sub__(self, other: Moments) -> Moments:
+        """Moments without a part that is in them."""
+        return Moments(*(mine - theirs for mine, theirs in zip(self.sums, other.sums, strict=True)))
+
+    def __mul__(self, factor: float) -> Moments:
+        """Moments with every sample's weight multiplied."""
+        return Moments(*(factor * mine for mine in self.sums))
+
+    __rmul__ = __mul__
+
+    @property
+    def sums(self) -> tuple[Array, ...]:
+        """The five sums, in the order of the fields."""
+        return tuple(getattr(self, field.name) for field in fields(self))
+
+    def in_features(self, change: Array) -> Moments:
+        """Moments of other features that are linear in these, ``φ' = T_m φ``.
+
+        Parameters
+        ----------
+        change : ndarray, shape (M, p', p)
+            T for each model.
+
+        Returns
+        -------
+        Moments
+        """
+        models, d, p = self.cross.shape
+        new = change.shape[1]
+        back = change.mT
+        blocks = self.consistent.reshape(models, p, d, p, d).transpose(0, 2, 4, 1, 3)  # (M, d, d, p, p)
+        moved = change[:, None, None] @ blocks @ back[:, None, None]
+        return Moments(
+            self.weight,
+            self.energy,
+            self.cross @ back,
+            change @ self.gram @ back,
+            moved.transpose(0, 3, 1, 4, 2).reshape(models, new * d, new * d),
+        )
+
+    def on_host(self) -> Moments:
+        """The same as NumPy arrays."""
+        return Moments(*map(on_host, self.sums))
+
+
+def total(parts: Iterable[Moments]) -> Moments:
+    """Sum of several moments."""
+    return reduce(add, parts)
+
+
+def gather(features: Array, actions: Array, weights: Array | None = None, at_rest: float = 0.0) -> Moments:
+    """Sum over samples. The matrix V = φ ⊗ û of all samples (N × d p) never exists.
+
+    Parameters
+    ----------
+    features : ndarray, shape (N, p)
+        These and the following may be arrays of any library that follows the
+        array API standard; so are the sums then. Summed in float64.
+    actions : ndarray, shape (N, d)
+    weights : ndarray, shape (N, M), optional
+        How much each sample counts in each model, not negative; ones for a
+        single model if None.
+    at_rest : float
+        Actions of at most this length have no direction.
+
+    Returns
+    -------
+    Moments
+    """
+    counts = namespace(features).ones_like(features[:, :1]) if weights is None else weights
+    block = features, actions, counts
+    return gather_blocks([block], counts.shape[1], actions.shape[1], features.shape[1], at_rest)
+
+
+def gather_blocks(
+    blocks: Iterable[tuple[Array, Array, Array]], models: int, actions: int, features: int, at_rest: float = 0.0
+) -> Moments:
+    """Sum over blocks of samples, each (features, actions, weights) as in :func:`gather`."""
+    sums = Sums(models, actions, features, at_rest)
+    for block in blocks:
+        for rows in sums.pieces(block[0]):
+            sums.add(*(part[rows, :] for part in block))
+    return sums.moments
+
+
+class Sums:
+    """Moments in the making: samples are added block by block, and Hessians are put together at the end.
+
+    ``û_k û_m`` and 1 are called metrics here: a Hessian consists of one
+    product ``Σ w û_k û_m φφᵀ`` for each k ≤ m, and the Gram matrix is that of 1.
+
+    Parameters
+    ----------
+    models, actions, features : int
+        M, d and p; together the attribute ``shape``.
+    at_rest : float
+        Actions of at most this length have no direction.
+    """
+
+    def __init__(self, models: int, actions: int, features: int, at_rest: float = 0.0) -> None:
+        _keep_what_is_freed()
+        self.shape, self._at_rest = (models, actions, features), at_rest
+        self._sums: list[Array] = []
+
+    def pieces(self, table: Array, start: int = 0, stop: int | None = None) -> Iterator[slice]:
+        """Rows of a table, or of some of it, to add at a time, so that what is made of them stays in cache."""
+        models, d, p = self.shape
+        columns = p if models == 1 else d * d * p * p // 4
+        numbers, most = (_FOREIGN_BLOCK, 2**20) if is_foreign(table) else (_BLOCK, 8192)
+        rows = min(max(512, numbers // columns), most)
+        samples = (table.shape[0] if stop is None else stop) - start
+        number = -(-samples // rows)
+        return (slice(start + samples * i // number, start + samples * (i + 1) // number) for i in range(number))
+
+    def add(self, features: Array, actions: Array, weights: Array) -> None:
+        """Add some samples, of shapes as in :func:`gather`."""
+        xp = namespace(features)
+        phi, u, w = (xp.asarray(part, dtype=xp.float64) for part in (features, actions, weights))
+        u = xp.stack([u[:, k] for k in range(u.shape[1])]).T  # columns in one piece: there are few, and long
+        directions, lengths = unit_actions(u)
+        moving = lengths > self._at_rest
+        further = [xp.sum(w, axis=0), w.T @ lengths**2]
+        if self.shape[0] == 1:
+            further += [(w * u).T @ phi, *_products_of_one(xp, phi, directions, moving, w)]
+        else:
+            directions = xp.where(moving[:, None], directions, 0.0)
+            further += [w.T @ _each_with_each(xp, u, phi), w.T @ _each_with_each(xp, *_metrics(xp, phi, directions))]
+        if not self._sums:
+            self._sums = further
+        else:
+            for number, sums in enumerate(further):
+                self._sums[number] += sums
+
+    @property
+    def moments(self) -> Moments:
+        """What was added, summed."""
+        models, d, p = self.shape
+        if not self._sums:
+            return Moments.zero(models, d, p)
+        xp = namespace(self._sums[0])
+        # The first three as copies: what is added later must not change them.
+        weight, energy, cross = (xp.asarray(each, copy=True) for each in self._sums[:3])
+        products = self._sums[3:]
+        if models == 1:
+            full = xp.stack(_by_metric(products, d))[None, ...]  # (1, metrics, p, p)
+        else:
+            halves = xp.reshape(products[0], (models, -1, p * (p + 1) // 2))
+            full = xp.take(halves, beside(_places(p).ravel(), weight), axis=2)
+            full = xp.reshape(full, (models, -1, p, p))
+        hessian = xp.take(full, beside(1 + _places(d).ravel(), weight), axis=1)
+        hessian = xp.permute_dims(xp.reshape(hessian, (models, d, d, p, p)), (0, 3, 1, 4, 2))
+        return Moments(
+            weight,
+            energy,
+            xp.reshape(cross, (models, d, p)),
+            xp.asarray(full[:, 0, :, :], copy=True),
+            xp.reshape(hessian, (models, p * d, p * d)),
+        )
+
+
+_BLOCK = 2**20
+"""Numbers in the largest temporary: more do not stay in cache, fewer give BLAS too little to do at once."""
+
+_FOREIGN_BLOCK = 2**25
+"""The same where arrays are of another library, and may be on a device that wants much to do at once."""
+
+
+@cache
+def _keep_what_is_freed() -> None:
+    """Have the C library reuse memory for the next block, up to some 60 MB, rather than hand it back in between.
+
+    Faulting it in again took up to half of the time. The GNU library keeps twice the largest array that was freed, of
+    those up to 32 MB; this one is never touched. To other libraries it says nothing.
+    """
+    np.empty(31 * 2**20, dtype=np.uint8)
+
+
+def _products_of_one(
+    xp: Any, features: Array, directions: Array, moving: NDArray[np.bool_], weights: Array
+) -> list[Array]:
+    """Products from which those of each metric follow (:func:`_by_metric`), for one model, each (p, p).
+
+    With ``F_k = diag(√w û_k) φ`` they are ``Σ w φφᵀ``, ``F_kᵀF_k`` for each
+    k, and ``(F_k + F_m)ᵀ(F_k + F_m)`` for each k < m: all of a matrix with its
+    own transpose, which BLAS does at half the price. One ``F_kᵀF_k``
+    follows from the others, since ``Σ û_k² = 1``.
+    """
+    root = xp.sqrt(weights)
+    pointed = directions * root
+    resting: Array | float = 0.0
+    if not xp.all(moving):
+        still, moves = xp.nonzero(~moving)[0], xp.nonzero(moving)[0]
+        resting = _gram(xp.take(features, still, axis=0) * xp.take(root, still, axis=0))
+        features, root, pointed = (xp.take(part, moves, axis=0) for part in (features, root, pointed))
+    whole = _gram(features if xp.all(root == 1.0) else features * root)
+    largest = int(xp.argmax(xp.sum(pointed**2, axis=0)))  # subtracting for a small one would leave rounding
+    d = pointed.shape[1]
+    own = {k: _gram(features * pointed[:, k, None]) for k in range(d) if k != largest}
+    own[largest] = reduce(sub, own.values(), whole) if d > 1 else whole + 0.0
+    both = [_gram(features * (pointed[:, k] + pointed[:, m])[:, None]) for k, m in combinations(range(d), 2)]
+    return [whole + resting, *(own[k] for k in range(d)), *both]
+
+
+def _by_metric(products: list[Array], d: int) -> list[Array]:
+    """``Σ w φφᵀ`` for the metrics 1 and û_k û_m (k ≤ m)."""
+    # ``(F_k + F_m)ᵀ(F_k + F_m) = F_kᵀF_k + F_mᵀF_m + 2 F_kᵀF_m``, since F_kᵀF_m is symmetric.
+    own = products[1 : d + 1]
+    both = dict(zip(combinations(range(d), 2), products[d + 1 :], strict=True))
+    pairs = combinations_with_replacement(range(d), 2)
+    return [products[0], *(own[k] if k == m else 0.5 * (both[k, m] - own[k] - own[m]) for k, m in pairs)]
+
+
+def _gram(table: Array) -> Array:
+    return table.T @ table
+
+
+def _metrics(xp: Any, features: Array, directions: Array) -> tuple[Array, Array]:
+    """Metrics of each sample, 1 first, and half of its φφᵀ: (N, metrics) and (N, p (p + 1) / 2)."""
+    half, other = _halves(xp, directions), _halves(xp, features)
+    return xp.concat([xp.ones_like(half[:, :1]), half], axis=1), other
+
+
+def _halves(xp: Any, table: Array) -> Array:
+    """Products of the columns, each pair once."""
+    first, second = (beside(index, table) for index in np.triu_indices(table.shape[1]))
+    halves: Array = xp.take(table, first, axis=1) * xp.take(table, second, axis=1)
+    return halves
+
+
+def _each_with_each(xp: Any, first: Array, second: Array) -> Array:
+    """Products of each column of one table with each of another, row by row."""
+    products: Array = xp.reshape(
+        first[:, :, None] * second[:, None, :], (first.shape[0], first.shape[1] * second.shape[1])
+    )
+    return products
+
+
+def _places(size: int) -> NDArray[np.intp]:
+    """Where each entry of a symmetric matrix is among its pairs k ≤ m, row by row."""
+    places = np.zeros((size, size), dtype=np.intp)
+    row, column = np.triu_indices(size)
+    places[row, column] = places[column, row] = np.arange(len(row))
+    return places

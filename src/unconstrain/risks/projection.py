@@ -1,0 +1,122 @@
+"""Orthogonal projections: what a constraint leaves, and what an action shows.
+
+Every projection here is symmetric and idempotent, ``P = Pᵀ = P²``.
+"""
+
+from __future__ import annotations
+
+from functools import reduce
+from operator import add
+
+import numpy as np
+
+from ..base.arrays import Array, namespace
+from ..base.errors import InvalidDataError
+
+__all__ = ["RANK_TOLERANCE", "ROW_TOLERANCE", "action_projection", "null_space_projection", "project", "unit_actions"]
+
+RANK_TOLERANCE = 1e-9
+"""Singular values below this share of the largest count as zero."""
+
+ROW_TOLERANCE = 1e-12
+"""Rows shorter than this share of the longest are rounding, as in a Jacobian at a singular posture."""
+
+
+def null_space_projection(constraint_matrix: Array, tolerance: float = RANK_TOLERANCE) -> Array:
+    """Projection onto the null space of constraints, ``N = I − A⁺A`` (eq. 3).
+
+    Parameters
+    ----------
+    constraint_matrix : ndarray, shape (..., k, d)
+        One constraint in each row; rows may be zero or dependent.
+    tolerance : float
+        Of the rows scaled to unit length, singular values below ``tolerance``
+        times the largest count as zero, so that a nearly dependent row
+        constrains nothing new.
+
+    Returns
+    -------
+    ndarray, shape (..., d, d)
+        The projections, exactly symmetric.
+
+    Raises
+    ------
+    InvalidDataError
+        If it is not a matrix, or holds NaN or infinity.
+    """
+    constraint_matrix = np.asarray(constraint_matrix, dtype=np.float64)
+    if constraint_matrix.ndim < 2:
+        raise InvalidDataError(
+            f"constraint matrix: got an array of shape {constraint_matrix.shape}, expected (..., k, d), "
+            "one constraint in each row."
+        )
+    if not np.isfinite(constraint_matrix).all():
+        raise InvalidDataError("constraint matrix: found NaN or infinity, expected finite numbers.")
+    d = constraint_matrix.shape[-1]
+    # A u = 0 says the same whatever the length of a row, so none counts less than another unless it is rounding.
+    directions, lengths = unit_actions(constraint_matrix)
+    directions[lengths <= ROW_TOLERANCE * lengths.max(axis=-1, initial=0.0, keepdims=True)] = 0.0
+    # By rows of Vᵀ rather than by A⁺: the rank decision is explicit and N is symmetric by construction.
+    _, singular, rows = np.linalg.svd(directions, full_matrices=False)
+    active = singular > tolerance * singular.max(axis=-1, initial=0.0, keepdims=True)
+    rows = rows * active[..., None]
+    free = np.eye(d) - np.swapaxes(rows, -1, -2) @ rows
+    # Where nothing is left free, rounding must not look like a direction.
+    return np.where((active.sum(axis=-1) == d)[..., None, None], 0.0, free)
+
+
+def unit_actions(actions: Array) -> tuple[Array, Array]:
+    """Directions and lengths of actions, ``û`` and ``r`` of eq. 4.
+
+    Parameters
+    ----------
+    actions : ndarray, shape (..., d)
+
+    Returns
+    -------
+    directions : ndarray, shape (..., d)
+        Unit vectors; zero where the action is zero, since that has no direction.
+    lengths : ndarray, shape (...)
+    """
+    # Column by column: there are few, and reducing along a short last axis is slow.
+    xp = namespace(actions)
+    actions = xp.asarray(actions)
+    columns = range(actions.shape[-1])
+    # Scaled by the largest entry first: lengths of 1e-200 must not square to zero.
+    size, nothing = xp.abs(actions), xp.zeros_like(actions[..., :1])[..., 0]
+    scale = reduce(xp.maximum, (size[..., k] for k in columns), nothing)
+    scaled = actions / xp.where(scale > 0, scale, 1.0)[..., None]
+    lengths = xp.sqrt(reduce(add, (scaled[..., k] ** 2 for k in columns), nothing))
+    scaled /= xp.where(lengths > 0, lengths, 1.0)[..., None]
+    return scaled, lengths * scale
+
+
+def action_projection(actions: Array) -> Array:
+    """Projection onto each action's own direction, ``P = û ûᵀ`` (section III-A).
+
+    Parameters
+    ----------
+    actions : ndarray, shape (..., d)
+
+    Returns
+    -------
+    ndarray, shape (..., d, d)
+        Zero where the action is zero.
+    """
+    directions, _ = unit_actions(actions)
+    return directions[..., :, None] * directions[..., None, :]
+
+
+def project(projections: Array, vectors: Array) -> Array:
+    """Apply one projection to each vector.
+
+    Parameters
+    ----------
+    projections : ndarray, shape (..., d, d)
+    vectors : ndarray, shape (..., d)
+
+    Returns
+    -------
+    ndarray, shape (..., d)
+    """
+    return np.einsum("...ij,...j->...i", projections, vectors)

@@ -1,0 +1,300 @@
+"""Quadratic objectives, and solving them in order of importance.
+
+Everything here has a leading axis of M independent problems.
+
+The derivation of :func:`lexicographic_path`, for one problem. Let
+``H = V Λ Vᵀ`` with ascending eigenvalues, and let V₂ be the first k columns
+of V: the directions that count as undetermined. Eqs 7–13 ask for the
+minimum of the second objective over all w that agree with ``Λ⁻¹ Vᵀ g`` along
+the other columns.
+
+With ``Vᵀ M V = L Lᵀ`` (Cholesky) the columns of ``A = V L⁻ᵀ`` are the
+eigenvectors, made orthonormal in the metric of the second objective one after
+the other, the smallest eigenvalue first. L is lower triangular, so
+
+- the first k columns of A span what those of V span, for *every* k, and
+- of ``w = A s`` the entries of s from k on depend on the columns of V from k
+  on alone: they are those of ``γ = Lᵀ Λ⁻¹ Vᵀ g`` (eq. 7), whatever k is.
+
+In these coordinates the second objective is ``‖s‖² − 2 sᵀβ`` with
+``β = Aᵀ m = L⁻¹ Vᵀ m``. It falls apart into its entries; the free ones, below
+k, are those of β (eq. 12). So the solution at split k is
+
+    s = (β[:k], γ[k:])                                                (13)
+
+and the solutions at all splits are sums from the left of ``A diag(β)`` and
+from the right of ``A diag(γ)``: one factorisation, and P numbers for each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.blas import dtrsm
+
+from ..base.arrays import Array, is_foreign, namespace
+
+__all__ = [
+    "NOISE",
+    "SECONDARY_NOISE",
+    "Path",
+    "Quadratic",
+    "eigensystem",
+    "lexicographic_path",
+    "minimum",
+    "softened_minima",
+]
+
+NOISE = 1e-10
+"""Eigenvalues of the first objective below this share of the largest are rounding."""
+
+SECONDARY_NOISE = 1e-12
+"""The same for the second objective."""
+
+UNDERFLOW = 1e-290
+"""A Hessian whose largest eigenvalue is below this is zero: its smaller ones have lost their digits."""
+
+
+@dataclass(frozen=True, eq=False)
+class Quadratic:
+    """M functions ``f(w) = constant − 2 linearᵀw + wᵀ hessian w``.
+
+    Parameters
+    ----------
+    hessian : ndarray, shape (M, P, P)
+        Symmetric, positive semidefinite; half the matrix of second derivatives.
+    linear : ndarray, shape (M, P)
+    constant : ndarray, shape (M,)
+    gram : ndarray, shape (M, p, p), optional
+        Where the Hessian is ``gram ⊗ I``, and products with it need not multiply its zeros.
+    """
+
+    hessian: Array
+    linear: Array
+    constant: Array
+    gram: Array | None = None
+
+    def __call__(self, weights: Array) -> Array:
+        """Evaluate at ``weights``, shape (M, P) or, for K candidates each, (M, P, K).
+
+        Returns
+        -------
+        ndarray, shape (M,) or (M, K)
+            Not below zero: what rounding leaves there is cut off.
+        """
+        xp = namespace(weights)
+        many = weights if weights.ndim == 3 else weights[..., None]
+        with np.errstate(over="ignore", invalid="ignore"):  # overflow is for the caller to see, as inf
+            bent = self.hessian @ many
+            bent -= 2.0 * self.linear[..., None]
+            bent *= many
+            values = self.constant[:, None] + xp.sum(bent, axis=1)
+        values = xp.where(xp.isfinite(values), xp.clip(values, 0.0, None), xp.inf)
+        return values if weights.ndim == 3 else values[:, 0]
+
+    def __add__(self, other: Quadratic) -> Quadratic:
+        """Add, problem by problem."""
+        return Quadratic(self.hessian + other.hessian, self.linear + other.linear, self.constant + other.constant)
+
+    def __mul__(self, factor: float) -> Quadratic:
+        """Scale by a positive number."""
+        return Quadratic(factor * self.hessian, factor * self.linear, factor * self.constant)
+
+    __rmul__ = __mul__
+
+    def times(self, vectors: Array) -> Array:
+        """``hessian @ vectors`` for columns of shape (M, P, K)."""
+        if self.gram is None:
+            return self.hessian @ vectors
+        xp = namespace(vectors)
+        models, size = self.gram.shape[:2]
+        product: Array = xp.reshape(self.gram @ xp.reshape(vectors, (models, size, -1)), vectors.shape)
+        return product
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The minimum for every split of the eigenvectors.
+
+    Parameters
+    ----------
+    eigenvalues : ndarray, shape (M, P)
+        Of the first objective's Hessian, ascending.
+    lowest : ndarray of int, shape (M,)
+        Splits below this one would divide by rounding noise; there the path
+        repeats the solution at this one.
+    basis : ndarray, shape (M, P, P)
+        The A of the derivation above.
+    undetermined, determined : ndarray, shape (M, P)
+        Its β and γ.
+    """
+
+    eigenvalues: Array
+    lowest: NDArray[np.intp]
+    basis: Array
+    undetermined: Array
+    determined: Array
+
+    @cached_property
+    def weights(self) -> Array:
+        """Weights at every split, shape (M, P, P + 1).
+
+        ``weights[m, :, k]`` solves problem m when its k smallest eigenvalues
+        count as undetermined.
+        """
+        xp = namespace(self.basis)
+        left = _running(self.basis * self.undetermined[:, None, :])
+        right = xp.flip(_running(xp.flip(self.basis * self.determined[:, None, :], axis=-1)), axis=-1)
+        weights: Array = left + right
+        if not xp.any(self.lowest > 0):
+            return weights
+        splits = xp.arange(weights.shape[-1], device=weights.device)
+        lowest = xp.asarray(self.lowest)[:, None, None]
+        return xp.where(splits < lowest, xp.take_along_axis(weights, lowest, axis=2), weights)
+
+    def at(self, splits: NDArray[np.intp]) -> Array:
+        """Weights at one split for each problem, shape (M, P)."""
+        xp = namespace(self.basis)
+        kept = xp.where(splits > self.lowest, splits, self.lowest)[:, None]
+        left = xp.arange(self.basis.shape[-1], device=self.basis.device) < kept
+        weights: Array = (self.basis @ xp.where(left, self.undetermined, self.determined)[..., None])[..., 0]
+        return weights
+
+    def threshold(self, splits: NDArray[np.intp]) -> Array:
+        """The λ_t of eq. 7 at a split, as a share of the largest eigenvalue, shape (M,).
+
+        The largest eigenvalue that counts as undetermined, or 0 if none does.
+        """
+        xp = namespace(self.eigenvalues)
+        below = xp.take_along_axis(self.eigenvalues, xp.clip(splits - 1, 0, None)[:, None], axis=1)[:, 0]
+        largest = self.eigenvalues[:, -1]
+        shares: Array = xp.where((splits > 0) & (largest > 0), below / xp.where(largest > 0, largest, 1.0), 0.0)
+        return shares
+
+    def split(self, threshold: float) -> NDArray[np.intp]:
+        """How many eigenvalues do not exceed ``threshold`` times the largest, shape (M,)."""
+        xp = namespace(self.eigenvalues)
+        count = xp.sum(xp.astype(self.eigenvalues <= threshold * self.eigenvalues[:, -1:], xp.int64), axis=1)
+        splits: NDArray[np.intp] = xp.where(count > self.lowest, count, self.lowest)
+        return splits
+
+
+def lexicographic_path(first: Quadratic, second: Quadratic | None = None) -> Path:
+    """Minimise ``first``, then ``second`` in the directions that it leaves undetermined.
+
+    Exact for all P + 1 splits at the price of one factorisation (see above).
+
+    Parameters
+    ----------
+    first : Quadratic
+        Its eigenvectors are split (eq. 7).
+    second : Quadratic, optional
+        Minimised over the rest (eqs 8–13). Without it the undetermined
+        directions stay zero: the truncated pseudo-inverse.
+
+    Returns
+    -------
+    Path
+    """
+    xp = namespace(first.hessian)
+    eigenvalues, vectors = eigensystem(first.hessian)
+    largest = eigenvalues[:, -1:]
+    noise = (eigenvalues <= NOISE * largest) | (largest <= UNDERFLOW)
+    lowest = xp.sum(xp.astype(noise, xp.int64), axis=1)
+    determined = xp.where(noise, 0.0, _across(vectors, first.linear) / xp.where(noise, 1.0, eigenvalues))
+    if second is None:
+        return Path(eigenvalues, lowest, vectors, xp.zeros_like(determined), determined)
+    lower = _factor(second, vectors)
+    basis = _solve_lower(lower, vectors.mT).mT
+    return Path(eigenvalues, lowest, basis, _across(basis, second.linear), _across(lower, determined))
+
+
+def minimum(objective: Quadratic) -> Array:
+    """Minimise one objective alone, shape (M, P); of least norm where it is not unique."""
+    xp = namespace(objective.linear)
+    axes = xp.eye(objective.linear.shape[1], dtype=xp.float64, device=objective.linear.device)
+    axes = xp.broadcast_to(axes, objective.hessian.shape)
+    basis = _solve_lower(_factor(objective, axes), axes).mT
+    weights: Array = (basis @ _across(basis, objective.linear)[..., None])[..., 0]
+    return weights
+
+
+def softened_minima(first: Quadratic, second: Quadratic, softnesses: Sequence[float]) -> Array:
+    """Minimise ``first + s second`` for each s, at the price of one factorisation, shape (M, P, K).
+
+    With ``second.hessian = L Lᵀ``, ``L⁻¹ first.hessian L⁻ᵀ = Q Λ Qᵀ`` and the
+    basis ``A = L⁻ᵀ Q`` every minimum is ``A (Λ + s)⁻¹ Aᵀ (linear₁ + s linear₂)``.
+    """
+    axes = np.broadcast_to(np.eye(first.linear.shape[1]), first.hessian.shape)
+    whitening = _solve_lower(_factor(second, axes), axes).mT
+    eigenvalues, vectors = eigensystem(whitening.mT @ first.hessian @ whitening)
+    basis, shares = whitening @ vectors, np.asarray(softnesses)
+    linear = _across(basis, first.linear)[..., None] + shares * _across(basis, second.linear)[..., None]
+    minima: Array = basis @ (linear / (np.maximum(eigenvalues, 0.0)[..., None] + shares))
+    return minima
+
+
+def eigensystem(hessian: Array) -> tuple[Array, Array]:
+    """Eigenvalues (M, P), ascending, and eigenvectors (M, P, P) of symmetric matrices.
+
+    Scaled to one, and without what is too small to matter: LAPACK gives up
+    on some matrices whose entries span hundreds of orders of magnitude.
+    """
+    xp = namespace(hessian)
+    size = xp.max(xp.abs(hessian), axis=(-2, -1), keepdims=True)
+    unit = xp.where(size > UNDERFLOW, size, 1.0)
+    scaled = hessian / unit
+    eigenvalues, vectors = xp.linalg.eigh(xp.where(xp.abs(scaled) > 1e-60, scaled, 0.0))
+    return eigenvalues * unit[..., 0], vectors
+
+
+def _factor(objective: Quadratic, vectors: Array) -> Array:
+    """Cholesky factor of ``Vᵀ M V`` with M the Hessian, shape (M, P, P).
+
+    Where M is singular, its null directions are given the weight of its
+    largest eigenvalue first. The linear term has no part in them, so they
+    stay zero, which is the solution of least norm. An M that is nothing but
+    underflow, as of a field that no sample is near, counts as zero.
+    """
+    xp = namespace(objective.hessian)
+    try:
+        lower: Array = xp.linalg.cholesky(vectors.mT @ objective.times(vectors))
+        pivots = xp.linalg.diagonal(lower) ** 2
+        if xp.all(xp.min(pivots, axis=-1) > SECONDARY_NOISE * xp.max(pivots, axis=-1)):
+            return lower
+    except (np.linalg.LinAlgError, RuntimeError):  # PyTorch's is a RuntimeError
+        pass
+    eigenvalues, axes = eigensystem(objective.hessian)
+    largest = eigenvalues[:, -1:]
+    floored = xp.where(eigenvalues > SECONDARY_NOISE * largest, eigenvalues, largest)
+    floored = xp.where(largest > UNDERFLOW, floored, 1.0)
+    rotated = axes.mT @ vectors
+    replaced: Array = xp.linalg.cholesky(rotated.mT @ (floored[..., None] * rotated))
+    return replaced
+
+
+def _across(vectors: Array, vector: Array) -> Array:
+    """``Vᵀ g`` for each problem, shape (M, P)."""
+    across: Array = (vectors.mT @ vector[..., None])[..., 0]
+    return across
+
+
+def _running(columns: Array) -> Array:
+    """Sums of the first 0 to P columns, shape (M, P, P + 1)."""
+    xp = namespace(columns)
+    return xp.cumulative_sum(columns, axis=-1, include_initial=True)
+
+
+def _solve_lower(lower: Array, right: Array) -> Array:
+    """Solve ``L y = r`` for each problem."""
+    if is_foreign(lower):  # the standard knows no triangular matrices
+        solved: Array = namespace(lower).linalg.solve(lower, right)
+        return solved
+    return np.stack(
+        # BLAS has columns first: Lᵀ and rᵀ as they lie, and r on the right.
+        [dtrsm(1.0, factor.T, side.T, side=1, lower=0) for factor, side in zip(lower, right, strict=True)]
+    ).mT
