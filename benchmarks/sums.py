@@ -13,7 +13,7 @@ from unconstrain.base.arrays import Array, namespace
 from unconstrain.risks.moments import Moments, Sums
 from unconstrain.risks.objectives import inconsistency, standard_risk
 from unconstrain.risks.quadratic import lexicographic_path
-from unconstrain.training.validation import FoldedMoments
+from unconstrain.training import FoldedMoments
 
 SAMPLES = 100_000
 GRIDS = (5, 10, 20)
@@ -82,7 +82,7 @@ def at_one_threshold(H: Array, g: Array, M: Array, m: Array) -> Array:
 
 def path_against_one(policy: uc.ParametricPolicy) -> float:
     """All thresholds and their held-out scores, against one, on the same moments."""
-    training, held_out = policy._folds.rounds()[0]
+    training, held_out = policy.training_.gathered.rounds()[0]
     first, second = inconsistency(training), standard_risk(training)
     score = inconsistency(held_out) + LEARNER.alpha * standard_risk(held_out)
 

@@ -1,10 +1,11 @@
 """Data to learn from, drawn from a seed, with the truth that made it."""
 
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
 
-from unconstrain.learners import robust
+from unconstrain import training
 
 
 class Samples(NamedTuple):
@@ -52,7 +53,8 @@ def samples_of(data, groups=None, features=None, models=1):
     rng = np.random.default_rng(0)
     share = rng.uniform(0.1, 1.0, (count, models))
     named = data.groups if groups is None else groups
-    return robust.Samples(
+    return training.Samples(
+        data.states,
         phi,
         data.actions,
         np.ones(count),
@@ -62,4 +64,10 @@ def samples_of(data, groups=None, features=None, models=1):
         np.unique(named, return_inverse=True)[1],
         np.tile(np.eye(phi.shape[1]), (models, 1, 1)),
         np.zeros((models, phi.shape[1], phi.shape[1])),
+        np.arange(count),
     )
+
+
+def seen(folds):
+    """What a learner that needs sums alone looks at."""
+    return SimpleNamespace(folds=folds)

@@ -46,7 +46,7 @@ def workers():
 
 
 def same(one, other):
-    for mine, theirs in zip(one._folds.parts, other._folds.parts, strict=True):
+    for mine, theirs in zip(one.training_.gathered.parts, other.training_.gathered.parts, strict=True):
         for a, b in zip(mine.sums, theirs.sums, strict=True):
             assert_allclose(a, b, rtol=1e-11, atol=1e-11 * max(1.0, np.abs(b).max()))
     assert_array_equal(one.solution_.determined, other.solution_.determined)

@@ -14,7 +14,6 @@ from test_cli import call, refused, run, write
 from test_report import References, browser, opened  # noqa: F401 - a fixture
 from unconstrain.base.errors import InvalidDataError, SettingError
 from unconstrain.evaluation.diagnosis import Diagnosis, diagnose, sentences
-from unconstrain.learners.robust import covariances
 from unconstrain.pages import diagnosis, fit
 
 TURN = np.array([[-0.3, 1.0], [-1.0, -0.3]])
@@ -65,7 +64,7 @@ class TestCovariances:
         policy = uc.ParametricPolicy() if kind == "one model" else uc.LocallyLinearPolicy(variance=0.3)
         policy.set_params(learner=uc.Robust()).fit_demonstrations(demos)
         states = np.random.default_rng(1).uniform(-2, 2, (20, 2))
-        found = covariances(policy.solution_.undetermined, *policy._in_models(states))
+        found = policy.covariances(states)
         assert_allclose(np.sqrt(np.einsum("naa->na", found)), policy.uncertainty(states).undetermined, rtol=1e-9)
         assert np.linalg.eigvalsh(found).min() >= -1e-12 * found.max()
         assert_allclose(found, found.swapaxes(1, 2), atol=1e-12 * found.max())
@@ -73,10 +72,9 @@ class TestCovariances:
     def test_of_one_model_they_are_features_times_covariance_times_features(self):
         policy = uc.ParametricPolicy(learner=uc.Robust()).fit_demonstrations(movements())
         state = np.array([[0.3, -0.2]])
-        features, _, _ = policy._in_models(state)
-        jacobian = np.kron(features, np.eye(2))  # weights are laid out by columns
-        [found] = covariances(policy.solution_.undetermined, *policy._in_models(state))
-        assert_allclose(found, jacobian @ policy.solution_.undetermined[0] @ jacobian.T, rtol=1e-8)
+        jacobian = np.kron(policy.features_(state), np.eye(2))  # weights are laid out by columns
+        [found] = policy.covariances(state)
+        assert_allclose(found, jacobian @ policy.solution_.belief.undetermined[0] @ jacobian.T, rtol=1e-8)
 
 
 class TestWhatIsFound:

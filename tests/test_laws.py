@@ -13,7 +13,7 @@ from samples import draw, rotation
 from unconstrain.risks.moments import Moments, gather
 from unconstrain.risks.objectives import inconsistency, standard_risk
 from unconstrain.risks.quadratic import lexicographic_path
-from unconstrain.training.validation import FoldedMoments
+from unconstrain.training import FoldedMoments
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -79,14 +79,14 @@ def test_taking_a_fold_away_is_fitting_without_it(policy, data):
     rest = clone(policy).fit(data.states[~out], data.actions[~out]).moments_
     assert_same_moments(whole - fold, rest)
     subtracted, refitted = (
-        policy.learner.solve(FoldedMoments((moments,), range(1))) for moments in (whole - fold, rest)
+        policy.learner.learn(seen(FoldedMoments((moments,), range(1)))) for moments in (whole - fold, rest)
     )
     assert_same(subtracted.weights, refitted.weights, 1e-4)
 
 
 def test_validation_trains_on_all_folds_but_the_one_held_out(policy_of, data):
     policy = placed(policy_of(uc.Direct()), data).set_params(validation=uc.Folds(3, by="demonstration"))
-    rounds = clone(policy).fit(data.states, data.actions, groups=data.groups)._folds.rounds()
+    rounds = clone(policy).fit(data.states, data.actions, groups=data.groups).training_.gathered.rounds()
     assert len(rounds) == 3
     for fold, (training, held_out) in enumerate(rounds):
         out = data.groups % 3 == fold

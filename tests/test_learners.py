@@ -5,12 +5,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import naive
-from samples import draw
+from samples import draw, seen
 from unconstrain import Direct, Hybrid, Inconsistency
 from unconstrain.base.errors import SettingError
-from unconstrain.learners.plain import Solution
+from unconstrain.learners import Solution
 from unconstrain.risks.moments import Moments, gather
-from unconstrain.training.validation import FoldedMoments
+from unconstrain.training import FoldedMoments
 
 AVERAGES = {
     "arithmetic": lambda each, weight: sum(w * e for e, w in zip(each, weight, strict=True)) / sum(weight),
@@ -56,7 +56,7 @@ def scores_by_loops(data, rows, counts, alpha, solve, averaging):
 def test_hybrid_chooses_the_split_that_scores_best_on_held_out_folds(averaging, alpha, models):
     data = draw(noise=0.3, seed=3)
     folds, rows, counts = folded(data, models=models)
-    solution = Hybrid(alpha=alpha, averaging=averaging).solve(folds)
+    solution = Hybrid(alpha=alpha, averaging=averaging).learn(seen(folds))
     for m in range(models):
         scores = scores_by_loops(data, rows, counts[:, m], alpha, naive.hybrid, averaging)
         assert_allclose(solution.scores[m], scores, rtol=1e-8)
@@ -73,7 +73,7 @@ def test_hybrid_chooses_the_split_that_scores_best_on_held_out_folds(averaging, 
 def test_inconsistency_chooses_by_itself_on_held_out_folds(averaging):
     data = draw(noise=0.5, seed=4)
     folds, rows, counts = folded(data)
-    solution = Inconsistency(threshold=None, averaging=averaging).solve(folds)
+    solution = Inconsistency(threshold=None, averaging=averaging).learn(seen(folds))
     scores = scores_by_loops(data, rows, counts[:, 0], 0.0, lambda H, g, M, m, k: naive.truncated(H, g, k), averaging)
     assert_allclose(solution.scores[0], scores, rtol=1e-8)
     assert solution.determined == [6 - scores.argmin()]
@@ -82,7 +82,7 @@ def test_inconsistency_chooses_by_itself_on_held_out_folds(averaging):
 def test_among_equal_scores_most_is_left_to_the_standard_risk():
     data = draw(samples=40)
     part = gather(features_of(data.states), np.zeros((40, 2)))
-    solution = Hybrid().solve(FoldedMoments((part, part), range(2)))
+    solution = Hybrid().learn(seen(FoldedMoments((part, part), range(2))))
     assert_array_equal(solution.determined, [0])
     assert_array_equal(solution.weights, np.zeros((1, 2, 3)))
 
@@ -92,7 +92,9 @@ def test_a_direction_that_no_held_out_sample_sees_is_left_to_the_standard_risk()
     seen = gather(np.tile([[1.0, 0.0]], (2, 1)), axes)
     unseen = gather(np.tile([[0.0, 1.0]], (2, 1)), axes)
     for averaging in AVERAGES:
-        solution = Hybrid(alpha=0.0, averaging=averaging).solve(FoldedMoments((seen, 4 * seen + unseen), range(1)))
+        solution = Hybrid(alpha=0.0, averaging=averaging).learn(
+            seen(FoldedMoments((seen, 4 * seen + unseen), range(1)))
+        )
         assert solution.scores[0, 0] == solution.scores[0, 1] == solution.scores[0, 2] < solution.scores[0, 3]
         assert_array_equal(solution.determined, [2])
         # Consistent with both actions where that was judged, and their mean where it was not.
@@ -102,15 +104,15 @@ def test_a_direction_that_no_held_out_sample_sees_is_left_to_the_standard_risk()
 def test_of_a_perfect_fit_no_fold_scores_below_its_rounding():
     data = draw(noise=0.0, policy=lambda x: x @ np.array([[1.0, 2.0], [3.0, -1.0]]))
     folds, _, _ = folded(data)
-    scores = Hybrid(alpha=0.0).solve(folds).scores[0]
+    scores = Hybrid(alpha=0.0).learn(seen(folds)).scores[0]
     assert scores.min() == pytest.approx(1e-9 * folds.whole.energy[0] / folds.whole.weight[0], rel=1e-3)
 
 
 def test_with_nothing_to_hold_out_the_data_judges_itself():
     data = draw(noise=0.3)
     moments = gather(features_of(data.states), data.actions)
-    judged = Hybrid(alpha=1.0).solve(FoldedMoments((moments,), range(1)))
-    compared = Hybrid(alpha=1.0).solve(FoldedMoments((0.5 * moments, 0.5 * moments), range(2)))
+    judged = Hybrid(alpha=1.0).learn(seen(FoldedMoments((moments,), range(1))))
+    compared = Hybrid(alpha=1.0).learn(seen(FoldedMoments((0.5 * moments, 0.5 * moments), range(2))))
     assert_allclose(judged.weights, compared.weights)
     assert_allclose(judged.scores, compared.scores)
 
@@ -128,14 +130,14 @@ def test_softness_adds_the_standard_risk_to_the_first_objective(softness):
         aims += list(np.sqrt(softness) * u)
     expected = naive.as_matrix(np.linalg.lstsq(np.array(rows), np.array(aims))[0], 2)
     moments = gather(features, data.actions)
-    solution = Hybrid(softness=softness, threshold=0.0).solve(FoldedMoments((moments,), range(1)))
+    solution = Hybrid(softness=softness, threshold=0.0).learn(seen(FoldedMoments((moments,), range(1))))
     assert_allclose(solution.weights[0], expected, atol=1e-9)
 
 
 def test_endless_softness_is_direct():
     data = draw(noise=0.3)
     folds, _, _ = folded(data)
-    soft, direct = Hybrid(softness=1e9, threshold=0.0).solve(folds), Direct().solve(folds)
+    soft, direct = Hybrid(softness=1e9, threshold=0.0).learn(seen(folds)), Direct().learn(seen(folds))
     assert_allclose(soft.weights, direct.weights, rtol=1e-6)
 
 
@@ -143,7 +145,7 @@ def test_direct_says_how_many_directions_its_data_determined():
     rng = np.random.default_rng(0)
     for samples, rank in ((1, 1), (2, 2), (9, 3)):
         moments = gather(rng.standard_normal((samples, 3)), rng.standard_normal((samples, 2)))
-        solution = Direct().solve(FoldedMoments((moments,), range(1)))
+        solution = Direct().learn(seen(FoldedMoments((moments,), range(1))))
         assert solution.determined == [2 * rank]
         assert solution.directions == 6
         assert solution.determined_share == pytest.approx(rank / 3)
@@ -155,7 +157,7 @@ def test_inconsistency_says_how_many_directions_its_data_determined():
     rng = np.random.default_rng(0)
     for samples in (1, 4, 9):
         moments = gather(rng.standard_normal((samples, 3)), rng.standard_normal((samples, 2)))
-        assert Inconsistency().solve(FoldedMoments((moments,), range(1))).determined == [min(samples, 6)]
+        assert Inconsistency().learn(seen(FoldedMoments((moments,), range(1)))).determined == [min(samples, 6)]
 
 
 def test_the_determined_share_is_over_all_models():
@@ -168,7 +170,7 @@ def test_a_field_that_no_sample_is_near_has_zero_weights_and_disturbs_no_other(l
     folds, rows, counts = folded(data)
     weights = np.column_stack([counts, np.zeros_like(counts), 1e-300 * counts, 1e-320 * counts])
     parts = tuple(gather(features_of(data.states[r]), data.actions[r], weights[r]) for r in rows)
-    alone, among = learner.solve(folds), learner.solve(FoldedMoments(parts, range(4)))
+    alone, among = learner.learn(seen(folds)), learner.learn(seen(FoldedMoments(parts, range(4))))
     assert_allclose(among.weights[0], alone.weights[0], rtol=1e-6, atol=1e-9)
     assert_array_equal(among.weights[1], 0)
     assert np.isfinite(among.weights).all()
@@ -180,22 +182,22 @@ def test_a_fold_that_a_field_does_not_see_does_not_judge_it(learner):
     weights = np.column_stack([counts, np.where(rows[1][:, None], 0.0, counts)])
     parts = tuple(gather(features_of(data.states[r]), data.actions[r], weights[r]) for r in rows)
     without = FoldedMoments(tuple(folds.parts[k] for k in (0, 2, 3)), range(3))
-    found = learner.solve(FoldedMoments(parts, range(4)))
-    assert_allclose(found.weights[1], learner.solve(without).weights[0], rtol=1e-6, atol=1e-9)
+    found = learner.learn(seen(FoldedMoments(parts, range(4))))
+    assert_allclose(found.weights[1], learner.learn(seen(without)).weights[0], rtol=1e-6, atol=1e-9)
 
 
 def test_more_weights_than_samples_leave_most_undetermined(learner):
     rng = np.random.default_rng(1)
     features, actions = rng.standard_normal((4, 9)), rng.standard_normal((4, 2))
     folds = FoldedMoments(tuple(gather(features[k : k + 1], actions[k : k + 1]) for k in range(4)), range(4))
-    solution = learner.solve(folds)
+    solution = learner.learn(seen(folds))
     assert np.isfinite(solution.weights).all()
     assert solution.determined[0] <= 8
     assert np.abs(solution.weights).max() < 100
 
 
 def test_no_sample_at_all_gives_a_policy_that_stands_still(learner):
-    solution = learner.solve(FoldedMoments((Moments.zero(2, 2, 3),) * 2, range(2)))
+    solution = learner.learn(seen(FoldedMoments((Moments.zero(2, 2, 3),) * 2, range(2))))
     assert_array_equal(solution.weights, np.zeros((2, 2, 3)))
     assert_array_equal(solution.determined, [0, 0])
 

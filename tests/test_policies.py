@@ -20,7 +20,7 @@ import unconstrain as uc
 from samples import draw
 from unconstrain.base.errors import InvalidDataError, SettingError, UnconstrainError
 from unconstrain.paper.systems.limit_cycle import LimitCycle
-from unconstrain.policies import PLACING_SAMPLES
+from unconstrain.training import PLACING_SAMPLES
 
 POLICIES = [uc.ParametricPolicy, uc.LocallyLinearPolicy]
 LEARNERS = [uc.Direct(), uc.Inconsistency(), uc.Inconsistency(None), uc.Hybrid(), uc.Hybrid(softness=0.1, threshold=0)]
@@ -361,4 +361,4 @@ def test_a_first_batch_that_does_not_move_leaves_folds_for_the_next():
     data = draw(noise=0.2)
     policy = uc.ParametricPolicy(uc.Affine()).partial_fit(np.ones((1, data.states.shape[1])), data.actions[:1])
     policy.partial_fit(data.states, data.actions)
-    assert sum(part.weight.any() for part in policy._folds.parts) > 5
+    assert sum(part.weight.any() for part in policy.training_.gathered.parts) > 5

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import minimize
 
 import naive
+from unconstrain.learners.thresholds import judged
 from unconstrain.risks.quadratic import Quadratic, lexicographic_path, minimum
 
 
@@ -48,10 +49,11 @@ def test_what_rounding_leaves_below_zero_is_cut_off():
     assert quadratic(np.ones((1, 1))) == [0.0]
 
 
-def test_a_value_that_overflows_is_infinite_and_never_nan():
+def test_a_value_that_overflows_is_judged_worse_than_all():
     quadratic = Quadratic(np.array([[[1.0, -1.0], [-1.0, 1.0]]]), np.ones((1, 2)), np.ones(1))
     candidates = np.array([[[1e200, np.inf, 0.0], [-1e200, np.inf, 0.0]]])
-    assert_array_equal(quadratic(candidates), [[np.inf, np.inf, 1.0]])
+    assert_array_equal(np.isfinite(quadratic(candidates)), [[False, False, True]])
+    assert_array_equal(judged(quadratic, candidates), [[np.inf, np.inf, 1.0]])
 
 
 def test_the_minimum_is_that_of_least_squares():

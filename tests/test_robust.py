@@ -9,7 +9,9 @@ from sklearn.base import clone
 
 import unconstrain as uc
 from samples import draw, rotation, samples_of, spiral
-from unconstrain.learners.robust import RobustSolution, consistent
+from unconstrain.learners import Belief
+from unconstrain.learners.hybrid import chosen_softness
+from unconstrain.learners.robust import consistent
 from unconstrain.paper.experiments import regimes
 from unconstrain.risks.objectives import inconsistency, standard_risk
 
@@ -210,7 +212,7 @@ def test_what_was_learnt_survives_a_file(tmp_path, sampler, policy_of):
     policy = policy_of(sampler).fit(data.states, data.actions, groups=data.groups)
     uc.save(policy, tmp_path / "p.npz")
     again = uc.load(tmp_path / "p.npz")
-    assert isinstance(again.solution_, RobustSolution)
+    assert isinstance(again.solution_.belief, Belief)
     assert again.learner == sampler
     assert_array_equal(again.predict(data.states), policy.predict(data.states))
     assert_array_equal(again.uncertainty(data.states), policy.uncertainty(data.states))
@@ -313,7 +315,7 @@ def test_a_demonstration_at_rest_does_not_choose_the_softness():
         states[:300], actions[:300], groups=groups[:300]
     )
     both = clone(moving).fit(states, actions, groups=groups)
-    assert both.learner.chosen_softness(both._folds) <= 10 * moving.learner.chosen_softness(moving._folds)
+    assert chosen_softness(both.training_.folds) <= 10 * chosen_softness(moving.training_.folds)
 
 
 def test_a_common_factor_of_small_weights_changes_nothing(sampler):

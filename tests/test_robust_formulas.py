@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import naive
 import unconstrain as uc
 from samples import draw, samples_of
-from unconstrain.learners.plain import SOFTNESSES, within_errors
+from unconstrain.learners.hybrid import SOFTNESSES, chosen_softness
 from unconstrain.learners.robust.consistent import _not_refuted
 from unconstrain.learners.robust.likelihood import clearly_more
 from unconstrain.learners.robust.noise import corrected, correlation_time, noise_by_differences
@@ -19,6 +19,7 @@ from unconstrain.learners.robust.posterior import Posterior
 from unconstrain.learners.robust.segments import change_points, constrained_error, found_segments, projection_of
 from unconstrain.learners.robust.smoothness import Smoothness
 from unconstrain.learners.robust.sphere import SPREADS, beliefs, distances
+from unconstrain.learners.thresholds import within_errors
 from unconstrain.risks.moments import gather
 from unconstrain.risks.objectives import vec
 from unconstrain.risks.quadratic import Quadratic, minimum, softened_minima
@@ -186,7 +187,7 @@ def test_alpha_auto_is_a_softness():
     policy = uc.ParametricPolicy(uc.Affine(), uc.Hybrid(alpha="auto")).fit(
         data.states, data.actions, groups=data.groups
     )
-    softness = uc.Hybrid(alpha="auto").chosen_softness(policy._folds)
+    softness = chosen_softness(policy.training_.folds)
     assert softness in SOFTNESSES
     same = policy.with_learner(uc.Hybrid(softness=softness, threshold=0.0))
     assert_array_equal(policy.predict(data.states), same.predict(data.states))

@@ -14,10 +14,10 @@ import unconstrain as uc
 from conftest import POLICIES
 from samples import draw
 from unconstrain.base.errors import InvalidDataError, MissingExtraError, ReadError, SettingError
-from unconstrain.recordings import batches, streams
-from unconstrain.recordings.batches import Batch, FirstLook
+from unconstrain.recordings import Batch, streams
 from unconstrain.recordings.preparation import Recipe
 from unconstrain.recordings.readers import hdf5, parquet, read_blocks
+from unconstrain.training import FirstLook, first_look
 
 DATA = draw(samples=400, groups=7)
 
@@ -25,7 +25,7 @@ DATA = draw(samples=400, groups=7)
 def same(one, other, tolerance=1e-9):
     """Whether two policies learnt the same: places, folds, sums and answers."""
     assert_array_equal(one.solution_.determined, other.solution_.determined)
-    for mine, theirs in zip(one._folds.parts, other._folds.parts, strict=True):
+    for mine, theirs in zip(one.training_.gathered.parts, other.training_.gathered.parts, strict=True):
         for a, b in zip(mine.sums, theirs.sums, strict=True):
             assert_allclose(a, b, rtol=1e-11, atol=1e-11 * max(1.0, np.abs(b).max()))
     assert_allclose(one(DATA.states), other(DATA.states), atol=tolerance)
@@ -111,7 +111,7 @@ def test_first_looks_add_and_order_moves_no_sample(at_most, cuts, seed):
     order = np.random.default_rng(seed).permutation(400)
     parts = np.split(order, sorted(set(cuts)))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(batches, "PLACING_SAMPLES", at_most)
+        patch.setattr(first_look, "PLACING_SAMPLES", at_most)
         whole = FirstLook.at(Batch(DATA.states, DATA.actions))
         total = FirstLook.total(FirstLook.at(Batch(DATA.states[rows], DATA.actions[rows])) for rows in parts)
     assert len(whole.states) == min(at_most, 400)
@@ -123,7 +123,7 @@ def test_first_looks_add_and_order_moves_no_sample(at_most, cuts, seed):
 
 
 def test_what_is_chosen_is_spread_over_all_samples(monkeypatch):
-    monkeypatch.setattr(batches, "PLACING_SAMPLES", 500)
+    monkeypatch.setattr(first_look, "PLACING_SAMPLES", 500)
     states = np.arange(10_000.0)[:, None]
     chosen = FirstLook.at(Batch(states, states)).states[:, 0]
     assert_allclose(np.histogram(chosen, 5, (0, 10_000))[0], 100, atol=40)

@@ -9,13 +9,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 from samples import draw
 from unconstrain import Folds, HeldOut, Hybrid, ParametricPolicy
 from unconstrain.base.errors import SettingError
-from unconstrain.recordings.batches import Batch, FirstLook
+from unconstrain.recordings import Batch
 from unconstrain.risks.moments import gather
-from unconstrain.training.validation import FoldedMoments, Splitter
+from unconstrain.training import FirstLook, FoldedMoments, Split
 
 
 def splitter(validation, states, groups=None, weights=None):
-    return Splitter(validation, FirstLook.at(Batch(states, states, weights, groups)))
+    return Split.begin(validation, FirstLook.at(Batch(states, states, weights, groups)))
 
 
 def spread(samples=2000, seed=0, n=2):

@@ -1,6 +1,5 @@
 """The public names and where they live: what a type checker sees, and what is imported on first use."""
 
-from . import cluster as cluster
 from . import constraints as constraints
 from . import storage as storage
 from .base import errors as errors
@@ -52,5 +51,6 @@ from .storage import load as load
 from .storage import save as save
 from .training import Folds as Folds
 from .training import HeldOut as HeldOut
+from .training import cluster as cluster
 
 __version__: str

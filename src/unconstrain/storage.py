@@ -14,24 +14,23 @@ import os
 import tempfile
 import zipfile
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from . import policies
 from .base.errors import ModelFileError
-from .learners import plain as learners
-from .learners import robust
-from .models import features, receptive_fields
-from .policies import Policy
-from .risks import moments
-from .training import validation
+from .learners import Belief, Direct, Hybrid, Inconsistency, Likelihood, NoiseCorrected, Robust, Segments, Solution
+from .models import Affine, Everywhere, KMeansRBF, Model, NormalisedRBF, ReceptiveFields
+from .policies import LocallyLinearPolicy, ParametricPolicy, Policy
+from .risks import Moments
+from .training import FoldedMoments, Folds, HeldOut, Split, Training
 
 __all__ = ["VERSION", "load", "load_notes", "register", "save"]
 
-VERSION = 1
+VERSION = 2
 """Of the file format. Older files stay readable; newer ones are refused."""
 
 _FORMAT = "unconstrain-policy"
@@ -40,26 +39,10 @@ _HEADER = "header"
 _KNOWN: dict[str, type] = {
     kind.__name__: kind
     for kind in (
-        features.Affine,
-        features.NormalisedRBF,
-        features.KMeansRBF,
-        learners.Direct,
-        learners.Hybrid,
-        learners.Inconsistency,
-        learners.Solution,
-        moments.Moments,
-        robust.Likelihood,
-        robust.NoiseCorrected,
-        robust.Robust,
-        robust.RobustSolution,
-        robust.Segments,
-        policies.LocallyLinearPolicy,
-        policies.ParametricPolicy,
-        receptive_fields.ReceptiveFields,
-        validation.FoldedMoments,
-        validation.Folds,
-        validation.HeldOut,
-        validation.Splitter,
+        *(Affine, Everywhere, KMeansRBF, Model, NormalisedRBF, ReceptiveFields),
+        *(Belief, Direct, Hybrid, Inconsistency, Likelihood, NoiseCorrected, Robust, Segments, Solution),
+        *(FoldedMoments, Folds, HeldOut, Moments, Split, Training),
+        *(LocallyLinearPolicy, ParametricPolicy),
     )
 }
 
@@ -86,7 +69,9 @@ def save(policy: Policy, path: str | os.PathLike[str], notes: Mapping[str, Any] 
     Parameters
     ----------
     policy : Policy
-        Fitted or not. Its moments go along, so that it can learn on.
+        Fitted or not. Its moments go along, so that it can learn on from sums. Samples do not: what was fitted by a
+        learner that looks at them, such as :class:`~unconstrain.Robust`, predicts as before, and to learn more has to
+        be fitted anew, or copied or pickled in place of saved.
     path : str or path-like
         Usually ends in ``.npz``. An existing file is replaced in one step.
     notes : mapping, optional
@@ -99,7 +84,7 @@ def save(policy: Policy, path: str | os.PathLike[str], notes: Mapping[str, Any] 
         place cannot be written to.
     """
     arrays: dict[str, np.ndarray[Any, Any]] = {}
-    content = {"policy": _pack(policy, arrays), "notes": _plain(notes or {})}
+    content = {"policy": _pack(_without_samples(policy), arrays), "notes": _plain(notes or {})}
     header = {"format": _FORMAT, "version": VERSION, "content": content}
     header["digest"] = _digest(header, arrays)
     target = Path(path)
@@ -121,7 +106,8 @@ def load(path: str | os.PathLike[str]) -> Policy:
     """
     header, arrays = _read(path)
     try:
-        policy = _unpack(header["content"]["policy"], arrays)
+        content = header["content"]["policy"]
+        policy = _unpack(_from_version_1(content) if header["version"] == 1 else content, arrays)
     except ModelFileError as error:
         raise ModelFileError(f"{path}: {error}") from error
     # Whoever tampers with a file and mends its digest can make any constructor fail, in any way.
@@ -139,6 +125,47 @@ def load_notes(path: str | os.PathLike[str]) -> dict[str, Any]:
         return dict(header["content"]["notes"])
     except (KeyError, TypeError, ValueError) as error:
         raise ModelFileError(f"{path}: the notes in it are not complete ({_said(error)}).") from error
+
+
+def _without_samples(policy: Policy) -> Policy:
+    if not hasattr(policy, "training_"):
+        return policy
+    slim = copy(policy)
+    slim.training_ = policy.training_.without_samples()
+    return slim
+
+
+def _from_version_1(value: Any) -> Any:
+    """The content of a file of format version 1 as version 2 says the same."""
+    if isinstance(value, list):
+        return [_from_version_1(item) for item in value]
+    if not isinstance(value, dict):
+        return value
+    if "class" not in value:
+        return {name: _from_version_1(item) for name, item in value.items()}
+    kind, parts = value["class"], {name: _from_version_1(part) for name, part in value["parts"].items()}
+    if kind == "Splitter":
+        return {"class": "Split", "parts": {name.removeprefix("_"): part for name, part in parts.items()}}
+    if kind == "RobustSolution":
+        told = {name: parts.pop(name) for name in _BELIEF_1 if name in parts}
+        return {"class": "Solution", "parts": parts | {"belief": {"class": "Belief", "parts": told}}}
+    if "_folds" in parts and "solution_" in parts:
+        model = {"features": parts.pop("features_"), "fields": parts.pop("fields_", _EVERYWHERE)}
+        parts["training_"] = {
+            "class": "Training",
+            "parts": {
+                "model": {"class": "Model", "parts": model},
+                "actions": parts["n_outputs_"],
+                "split": parts.pop("_splitter"),
+                "at_rest": parts.pop("_at_rest"),
+                "gathered": parts.pop("_folds"),
+            },
+        }
+    return {"class": kind, "parts": parts}
+
+
+_BELIEF_1 = tuple(one.name for one in fields(Belief))
+_EVERYWHERE = {"class": "Everywhere", "parts": {}}
 
 
 def _plain(notes: Mapping[str, Any]) -> dict[str, Any]:

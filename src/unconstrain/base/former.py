@@ -14,7 +14,8 @@ __all__ = ["install"]
 _NOW = {
     "arrays": "base.arrays",
     "batches": "recordings.batches",
-    "closed_form": "models.closed_form",
+    "closed_form": "models.formula",
+    "cluster": "training.cluster",
     "containment": "motion.containment",
     "datasets": "paper.datasets",
     "demonstration": "recordings.demonstration",
@@ -38,7 +39,7 @@ _NOW = {
     "streams": "recordings.streams",
     "systems": "paper.systems",
     "threads": "base.threads",
-    "validation": "training.validation",
+    "validation": "training",
 }
 
 

@@ -142,13 +142,13 @@ def fit(
     """
     from .. import storage
     from ..recordings import expand
-    from ..training import validation
+    from ..training import Folds
 
     paths = expand(files)
     check_writable((output, report), paths)
     learner = learner or default_learner(paths, scheduler, alpha, softness, speed_power)
     check_speed_power(learner, speed_power)
-    chosen = {"learner": learner_of(learner, alpha, softness), "validation": validation.Folds(folds, hold_out)}
+    chosen = {"learner": learner_of(learner, alpha, softness), "validation": Folds(folds, hold_out)}
     fitted = policy_of(model, variance, centres, **chosen)
     stream = stream_of(paths, speed_power, **reading)
     learn(fitted, stream, scheduler)

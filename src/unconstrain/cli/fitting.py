@@ -114,8 +114,7 @@ def learn(policy: Policy, stream: Stream, scheduler: str | None) -> None:
     if scheduler is None:
         policy.fit_batches(stream)
         return
-    from .. import cluster
+    from ..training import cluster
 
-    cluster.check_learner(policy)
     with cluster.connected(scheduler) as client:
         cluster.fit_batches(policy, stream.parts(), client=client)

@@ -18,7 +18,7 @@ from ..base.errors import UnconstrainError
 if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
     from collections.abc import Iterator
 
-    from ..learners import RobustSolution
+    from ..learners import Solution
     from ..paper.experiments.trials import Progress, Result
     from ..policies import Policy
     from ..recordings import Stream
@@ -96,8 +96,6 @@ def say_fit(policy: Policy, stream: Stream | None, learner: str) -> None:
 
     Without a stream nothing is said that would need to look at the samples again.
     """
-    from ..learners import RobustSolution
-
     solution = policy.solution_
     models = f", {len(solution.weights)} local models" if len(solution.weights) > 1 else ""
     training = 0.0
@@ -106,7 +104,7 @@ def say_fit(policy: Policy, stream: Stream | None, learner: str) -> None:
         click.echo(f"{names} demonstrations, {samples} samples{models}.")
     elif models:
         click.echo(f"{models.removeprefix(', ')}.")
-    if isinstance(solution, RobustSolution):
+    if solution.belief is not None:
         click.echo(_said_of_samples(solution))
     elif learner != "direct":
         rest = "; the rest follows the standard risk." if learner == "hybrid" and solution.determined_share < 1 else "."
@@ -132,7 +130,7 @@ def say_fit(policy: Policy, stream: Stream | None, learner: str) -> None:
         )
 
 
-def _said_of_samples(solution: RobustSolution) -> str:
+def _said_of_samples(solution: Solution) -> str:
     """Which way a robust learner went, and what it thinks of the samples."""
     ways = {
         "likelihood": "by likelihood: samples look free, or constrained at random",

@@ -3,10 +3,8 @@
 All are made from a :class:`~unconstrain.ClosedForm`; a new target is one more function of it.
 """
 
-from __future__ import annotations
-
-from .c99 import c_source
-from .onnx_graph import onnx_model
+from .c99 import c_source, export_c
+from .onnx_graph import export_onnx, onnx_model
 from .stepping import Step, stepper, stepper_on
 
-__all__ = ["Step", "c_source", "onnx_model", "stepper", "stepper_on"]
+__all__ = ["Step", "c_source", "export_c", "export_onnx", "onnx_model", "stepper", "stepper_on"]

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
+from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
 import numpy as np
 
@@ -15,6 +18,19 @@ __all__ = ["TOLERANCE", "c_source"]
 
 TOLERANCE = 1e-9
 """The self-test allows this share of the largest action: mathematics libraries differ in the last digit of ``exp``."""
+
+
+SELF_TESTS = 16
+"""States inside the data, and as many far outside, that the self-test of an exported file looks at."""
+
+FAR = 100.0
+"""How far outside, as a multiple of the policy's reach."""
+
+
+def export_c(form: ClosedForm, policy: Callable[[Array], Array], path: str | os.PathLike[str], name: str) -> None:
+    """Write :func:`c_source` to a file, with a self-test that compares it with the policy."""
+    states = _probes(form)
+    Path(path).write_text(c_source(form, name, states, policy(states)), encoding="ascii")
 
 
 def c_source(form: ClosedForm, name: str, states: Array, actions: Array) -> str:
@@ -59,6 +75,13 @@ def c_source(form: ClosedForm, name: str, states: Array, actions: Array) -> str:
     }
     body = _AFFINE if form.exponents is None else _BLENDED_MAPS if form.is_affine else _BLENDED_CONSTANTS
     return re.sub(r"@(\w+)@", lambda found: fill[found[1]], _HEAD + body + _SELF_TEST)
+
+
+def _probes(form: ClosedForm) -> Array:
+    """States for a self-test, inside and far outside, the same for the same policy."""
+    drawn = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * SELF_TESTS, len(form.origin)))
+    drawn[SELF_TESTS:] *= FAR
+    return form.origin + form.reach * drawn
 
 
 def _braced(values: Array) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,11 @@ OPSET = 17
 """Of the standard operators; runtimes of 2022 know it."""
 
 IR_VERSION = 8
+
+
+def export_onnx(form: ClosedForm, path: str | os.PathLike[str]) -> None:
+    """Write :func:`onnx_model` to a file."""
+    Path(path).write_bytes(onnx_model(form))
 
 
 def onnx_model(form: ClosedForm) -> bytes:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.errors import InvalidDataError, SettingError
-from ..learners import HIDDEN, RobustSolution, covariances, noise_by_differences
+from ..base.errors import InvalidDataError
+from ..learners import HIDDEN, Solution, noise_by_differences
 from ..models import choose_variance, cover
 from ..policies import Policy
 from ..recordings import Demonstration, stack, unique_names
@@ -156,9 +156,7 @@ def diagnose(policy: Policy, demonstrations: Sequence[Demonstration]) -> Diagnos
     """
     solution, demos = policy.solution_, list(demonstrations)
     states, actions, groups = stack(demos)
-    spread = policy.uncertainty(states)  # says what to do where the learner cannot tell
-    if not isinstance(solution, RobustSolution):  # pragma: no cover - uncertainty has refused
-        raise SettingError(f"learner: got a {type(solution).__name__}, expected one of a robust learner.")
+    spread, belief = policy.uncertainty(states), solution.believed  # says what to do where the learner cannot tell
     typical = _typical(actions, solution)
     undetermined, from_noise = (
         np.linalg.norm(one, axis=1) / typical for one in (spread.undetermined, spread.from_noise)
@@ -168,8 +166,8 @@ def diagnose(policy: Policy, demonstrations: Sequence[Demonstration]) -> Diagnos
     free = solution.free if len(solution.free) == len(states) else None
     return Diagnosis(
         method=solution.method,
-        compared={name: exp(gap) for name, gap in solution.compared.items()},
-        refuted=solution.refuted,
+        compared={name: exp(gap) for name, gap in belief.compared.items()},
+        refuted=belief.refuted,
         noise=solution.noise,
         noise_share=float(np.sqrt(d)) * solution.noise / typical,
         jitter=float(np.sqrt(noise_by_differences(actions, groups))),
@@ -186,7 +184,7 @@ def diagnose(policy: Policy, demonstrations: Sequence[Demonstration]) -> Diagnos
     )
 
 
-def _typical(actions: Array, solution: RobustSolution) -> float:
+def _typical(actions: Array, solution: Solution) -> float:
     """Root mean square length of the actions; refuses what has nothing to diagnose."""
     typical = float(np.sqrt((actions**2).sum(axis=1).mean()))
     if actions.shape[1] == 1:
@@ -196,7 +194,7 @@ def _typical(actions: Array, solution: RobustSolution) -> float:
         )
     if typical == 0.0:
         raise InvalidDataError("all actions are zero, expected some motion: nothing can be said about a policy.")
-    if np.isnan(solution.held_out_score):
+    if np.isnan(solution.believed.held_out_score):
         raise InvalidDataError(
             "too little could be held out, expected at least two different samples or demonstrations in motion."
         )
@@ -233,8 +231,7 @@ def _regions(
 
 def _least_known(policy: Policy, states: Array) -> tuple[Array, Array]:
     """Direction of the actions (K, d) of which least is known, towards the prediction, and the spread along it (K,)."""
-    assert isinstance(policy.solution_, RobustSolution)
-    values, vectors = np.linalg.eigh(covariances(policy.solution_.undetermined, *policy._in_models(states)))
+    values, vectors = np.linalg.eigh(policy.covariances(states))
     directions = vectors[:, :, -1]
     ahead = (directions * policy(states)).sum(axis=1) >= 0
     return np.where(ahead[:, None], directions, -directions), np.sqrt(np.maximum(values[:, -1], 0.0))

@@ -1,23 +1,17 @@
-"""From what was observed to a solution."""
+"""From what was observed to a solution: the paper's learners, and the robust ones."""
 
-from .plain import Direct, Hybrid, Inconsistency, Learner, Solution
-from .robust import (
-    Likelihood,
-    NoiseCorrected,
-    Robust,
-    RobustSolution,
-    SampleLearner,
-    Samples,
-    Segments,
-    Uncertainty,
-    covariances,
-    uncertainty,
-)
-from .robust.learner import HIDDEN
-from .robust.noise import noise_by_differences
+from . import robust
+from .direct import Direct
+from .hybrid import Hybrid
+from .inconsistency import Inconsistency
+from .learner import Learner
+from .named import named
+from .robust import HIDDEN, Likelihood, NoiseCorrected, Robust, Segments, Uncertainty, noise_by_differences
+from .solution import Belief, Solution
 
 __all__ = [
     "HIDDEN",
+    "Belief",
     "Direct",
     "Hybrid",
     "Inconsistency",
@@ -25,14 +19,10 @@ __all__ = [
     "Likelihood",
     "NoiseCorrected",
     "Robust",
-    "RobustSolution",
-    "SampleLearner",
-    "Samples",
     "Segments",
     "Solution",
     "Uncertainty",
-    "covariances",
+    "named",
     "noise_by_differences",
     "robust",
-    "uncertainty",
 ]

@@ -1,18 +1,20 @@
-"""What a policy is made of: features, receptive fields, and the fitted policy as one formula."""
+"""What a policy is made of: features, receptive fields, and the policy as one formula."""
 
-from .closed_form import ClosedForm, exponents
 from .features import Affine, FeatureMap, KMeansRBF, NormalisedRBF, Placeable
-from .receptive_fields import ReceptiveFields, choose_variance, cover
+from .formula import ClosedForm
+from .model import Model
+from .receptive_fields import Everywhere, ReceptiveFields, choose_variance, cover
 
 __all__ = [
     "Affine",
     "ClosedForm",
+    "Everywhere",
     "FeatureMap",
     "KMeansRBF",
+    "Model",
     "NormalisedRBF",
     "Placeable",
     "ReceptiveFields",
     "choose_variance",
     "cover",
-    "exponents",
 ]

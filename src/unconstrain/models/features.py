@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from ..base.arrays import SMALLEST_VARIANCE, Array, as_matrix, beside, check_at_least, namespace
 from ..base.errors import InvalidDataError, SettingError
-from .closed_form import ClosedForm, exponents
+from .formula import ClosedForm, exponents
 
 __all__ = ["Affine", "FeatureMap", "KMeansRBF", "NormalisedRBF", "Placeable", "gaussian", "shares", "squared_distances"]
 

@@ -1,4 +1,4 @@
-"""Gaussian receptive fields and where to put them (section III-D)."""
+"""Where each model of a policy counts: Gaussian receptive fields (section III-D), or everywhere."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.arrays import SMALLEST_VARIANCE, Array, as_matrix, check_at_least, namespace
+from ..base.arrays import SMALLEST_VARIANCE, Array, as_matrix, beside, check_at_least, is_foreign, namespace
 from ..base.errors import SettingError
-from .features import gaussian, shares, squared_distances
+from .features import Affine, FeatureMap, gaussian, shares, squared_distances
+from .formula import ClosedForm, exponents
 
 __all__ = ["MOST_FIELDS", "ReceptiveFields", "choose_variance", "cover"]
 
@@ -46,6 +47,56 @@ class ReceptiveFields:
         """Weight in the nearest field, from 1 at a centre to 0 far from all, shape (N,)."""
         distances = squared_distances(states, self.centres)
         return gaussian(namespace(distances).min(distances, axis=1), self.variance)
+
+    def blend(self, features: Array, weights: Array, states: Array) -> Array:
+        """Predictions of models with these weights (M, d, p), averaged by their shares, shape (N, d)."""
+        each = namespace(states).tensordot(features, beside(weights, states), axes=((1,), (2,)))  # (N, M, d)
+        if is_foreign(each):
+            return (self.shares(states)[:, None, :] @ each)[:, 0, :]
+        return np.einsum("nm,nmd->nd", self.shares(states), each)  # NumPy is slow at many small products
+
+    def centring(self, features: FeatureMap) -> Array:
+        """``T_m`` (M, p, p) that centres affine features on each field: ``T_m φ(c_m) = (0, 1)``.
+
+        Sums over common features are one product for all fields; centring each field afterwards is exact.
+        """
+        offsets = -features(self.centres)[:, :-1]
+        models, n = offsets.shape
+        centring = np.tile(np.eye(n + 1), (models, 1, 1))
+        centring[:, :n, n] = offsets
+        return centring
+
+    def formula(self, features: FeatureMap, weights: Array) -> ClosedForm | None:
+        """Affine models with these weights (M, d, n + 1), blended, as one formula."""
+        if not isinstance(features, Affine):
+            return None
+        origin, scale = np.asarray(features.centre), features.scale
+        maps = np.concatenate([weights[..., :-1] / scale, weights[..., -1:]], axis=2)
+        reach = np.abs(self.centres - origin).max(axis=0) + np.sqrt(self.variance)
+        return ClosedForm(origin, maps, exponents(self.centres, self.variance, origin), reach)
+
+
+@dataclass(frozen=True)
+class Everywhere:
+    """One field that is 1 at every state: the policy is a single model."""
+
+    def weights(self, states: Array) -> Array:
+        """How much each sample counts, ones of shape (N, 1)."""
+        return namespace(states).ones_like(states[:, :1])
+
+    shares = weights
+
+    def blend(self, features: Array, weights: Array, states: Array) -> Array:
+        """Predictions of the one model with weights (1, d, p), shape (N, d)."""
+        return features @ beside(weights[0].T, states)
+
+    def centring(self, features: FeatureMap) -> None:
+        """Features of a single model stay as they are."""
+
+    def formula(self, features: FeatureMap, weights: Array) -> ClosedForm | None:
+        """The formula of the features with weights (1, d, p), where they offer one."""
+        closed = getattr(features, "closed_form", None)
+        return None if closed is None else closed(weights[0])
 
 
 def cover(states: Array, variance: float, at_least: float = 0.7) -> ReceptiveFields:

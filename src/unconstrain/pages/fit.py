@@ -11,7 +11,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.errors import InvalidDataError, SettingError
 from ..evaluation import ncpe, ninconsistency, nupe
-from ..learners import Hybrid, RobustSolution
+from ..learners import named
 from ..policies import Policy
 from ..recordings import Demonstration, stack
 from ..risks import action_projection, project
@@ -49,7 +49,7 @@ def policy_page(policy: Policy, demonstrations: Sequence[Demonstration], title: 
         If plotly is not installed.
     """
     demos = list(demonstrations)
-    learner = policy.learner if policy.learner is not None else Hybrid()
+    learner = named(policy.learner)
     parts = [
         _summary(policy, demos),
         html.section("The demonstrations", _movements(policy, demos)),
@@ -57,7 +57,7 @@ def policy_page(policy: Policy, demonstrations: Sequence[Demonstration], title: 
         html.section("Errors and support", _errors(policy, demos)),
         html.section("What the data determined", _determined(policy)),
     ]
-    if isinstance(policy.solution_, RobustSolution):
+    if policy.solution_.belief is not None:
         parts.append(html.section("What is not known", unknown(policy, demos)))
     if is_dataclass(learner):
         parts.append(html.settings_table(learner))

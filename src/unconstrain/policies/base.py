@@ -1,18 +1,19 @@
-"""What all policies share: sums from a stream, a learner, prediction."""
+"""What both policies share: learning from samples as they come, predicting, leaving for a robot."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
-from copy import deepcopy
-from dataclasses import replace
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from copy import copy, deepcopy
+from dataclasses import dataclass
 from functools import partial
-from itertools import chain, pairwise
-from typing import Any, Self
+from itertools import chain
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from sklearn.base import BaseEstimator, RegressorMixin, clone
+from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from ..base.arrays import (
@@ -21,6 +22,7 @@ from ..base.arrays import (
     as_groups,
     as_matrix,
     as_table,
+    as_vector,
     as_weights,
     beside,
     check_at_least,
@@ -30,36 +32,43 @@ from ..base.arrays import (
     slices,
 )
 from ..base.errors import InvalidDataError, SettingError
-from ..base.threads import Workers, workers
-from ..learners import Hybrid, Learner, RobustSolution, SampleLearner, Solution
-from ..recordings import Batch, Demonstration, FirstLook, Groups, stack
-from ..risks import Moments, Sums, inconsistency, unit_actions, vec
-from ..training import FoldedMoments, Folds, Splitter, Validation
-from .deployable import Deployable
-from .looking import Looking
-
-__all__ = ["Policy"]
-
-AT_REST = 1e-12
-"""Actions shorter than this share of the largest at first look are rounding around rest."""
+from ..deployment import Step, export_c, export_onnx, stepper, stepper_on
+from ..learners import Learner, Solution, Uncertainty, named
+from ..models import ClosedForm, FeatureMap, Model
+from ..recordings import Batch, Demonstration, Groups, stack, times_of
+from ..risks import Moments, inconsistency, unit_actions, vec
+from ..training import FirstLook, Folds, Split, Training, Validation
 
 _ROWS = 4096
 """Rows that are predicted together, so that what is made of them stays in cache."""
 
-_SPREAD = 200
-"""Weights from which on folds are summed in threads: with fewer, steps are short and threads mostly wait."""
+_FITTED = ("training_", "solution_", "n_features_in_", "feature_names_in_", "n_outputs_", "_flat", "_waiting")
 
 
-class Policy(Deployable, Looking, RegressorMixin, BaseEstimator):
-    """What both policies share: fitting from a stream, predicting, stepping, changing the learner."""
+class Policy(RegressorMixin, BaseEstimator, ABC):
+    """A policy that learns: a :class:`~unconstrain.models.Model`, what was seen, and the solution found.
 
-    learner: Learner | SampleLearner | None
+    Attributes
+    ----------
+    training_ : Training
+        Model, folds and sums of all samples so far, and the samples where the learner needs them.
+    solution_ : Solution
+        Weights (M, d, p), and what the data determined.
+    """
+
+    learner: Learner | str | None
     validation: Validation | None
+    training_: Training
+    solution_: Solution
+    n_features_in_: int
+    n_outputs_: int
     _flat: bool
 
     @abstractmethod
-    def _place(self, look: FirstLook) -> None:
+    def place(self, look: FirstLook) -> Model:
         """Fix features and fields on what was seen at first look."""
+
+    # Learning: each works on a draft, which takes this policy's place when all has gone well.
 
     def fit(
         self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, groups: Groups | None = None
@@ -82,15 +91,19 @@ class Policy(Deployable, Looking, RegressorMixin, BaseEstimator):
         Returns
         -------
         self
+            As it was, if anything fails.
 
         Raises
         ------
         InvalidDataError
             If the arrays are ragged, empty, of different lengths or not finite.
         """
-        self._forget()
-        batch = self._checked(X, y, sample_weight, groups, reset=True)
-        return self._begin(FirstLook.at(batch), more=False)._learn([batch])
+        return self._fit(X, y, sample_weight, groups)
+
+    def _fit(self, *batch: Any) -> Self:
+        draft = self._draft(*_FITTED)
+        checked = draft._checked(*batch, reset=True)
+        return self._become(draft._began(FirstLook.at(checked), more=False)._learnt([checked]))
 
     def partial_fit(
         self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, groups: Groups | None = None
@@ -99,16 +112,23 @@ class Policy(Deployable, Looking, RegressorMixin, BaseEstimator):
 
         The first batch fixes features, fields, action dimensions, and the
         spread by which samples are dealt into folds; it should be typical.
-        Parameters, result and errors as in :meth:`fit`.
+        Batches of too few different states to tell are kept until there are
+        enough. Parameters, result and errors as in :meth:`fit`.
 
         The solution is found anew each time. Where only the last counts,
         :meth:`fit_batches` is faster.
         """
-        first = not hasattr(self, "_folds")
-        batch = self._checked(X, y, sample_weight, groups, reset=first)
-        if first:
-            self._begin(FirstLook.at(batch), more=True)
-        return self._learn([batch])
+        first = not hasattr(self, "solution_")
+        draft = self._draft()
+        batch = draft._checked(X, y, sample_weight, groups, reset=first)
+        waiting: tuple[Batch, ...] = getattr(self, "_waiting", ())
+        if not first and not waiting:
+            return self._become(draft._learnt([batch]))
+        seen = (*waiting, batch)
+        look = FirstLook.total(map(FirstLook.at, seen))
+        draft._began(look, more=True)._learnt(seen)
+        draft._waiting = () if look is None or look.is_typical else (*waiting, deepcopy(batch))
+        return self._become(draft)
 
     def fit_batches(self, batches: Iterable[Sequence[Any]]) -> Self:
         """Learn from more than fits into memory, batch by batch, solving once.
@@ -129,24 +149,60 @@ class Policy(Deployable, Looking, RegressorMixin, BaseEstimator):
         Returns
         -------
         self
+            As it was, if anything fails.
 
         Raises
         ------
         InvalidDataError
             As :meth:`fit` does, and if there is no batch.
         """
-        self._forget()
-        checked = self._each_checked(batches)
+        self._check_speed_power(getattr(batches, "speed_power", 0.0))
         if iter(batches) is not batches:
-            return self._begin(FirstLook.total(map(FirstLook.at, checked)), more=False)._learn(
-                self._checked(*batch, reset=False) for batch in batches
-            )
-        first = next(checked, None)
-        self._begin(None if first is None else FirstLook.at(first), more=True)
-        return self._learn(chain([first] if first is not None else [], checked))
+            return self._fit_parts([batches], lambda function, parts: function(*parts))
+        draft = self._draft(*_FITTED)
+        checked, first, look = draft._each_checked(batches), [], None
+        for batch in checked:
+            first.append(deepcopy(batch))  # the caller may use a buffer again
+            look = FirstLook.total([look, FirstLook.at(batch)])
+            if look is not None and look.is_typical:
+                break
+        return self._become(draft._began(look, more=True)._learnt(chain(first, checked)))
 
-    def _each_checked(self, batches: Iterable[Sequence[Any]]) -> Iterator[Batch]:
-        return (self._checked(*batch, reset=number == 0) for number, batch in enumerate(batches))
+    def fit_parts(self, parts: Sequence[Any], summed: Callable[..., Any]) -> Self:
+        """Learn from parts wherever they are; see :mod:`unconstrain.cluster`.
+
+        Parameters
+        ----------
+        parts : sequence
+            Each an iterable of batches as :meth:`fit_batches` takes them, or something that ``summed`` makes one of.
+        summed : callable
+            ``summed(function, parts)`` is the sum of the function at each part, in their order. The function, what it
+            returns, and so this policy can be pickled.
+
+        Raises
+        ------
+        InvalidDataError
+            As :meth:`fit` does, and if there is no part.
+        SettingError
+            If the learner needs the samples: only sums come back.
+        """
+        learner = named(self.learner)
+        if learner.needs_samples:
+            name = type(learner).__name__
+            raise SettingError(
+                f"learner: {name} needs the samples, and a cluster sends their sums alone. Take Hybrid()."
+            )
+        if not parts:
+            raise InvalidDataError("got no part to learn from, expected at least one.")
+        return self._fit_parts(parts, summed)
+
+    def _fit_parts(self, parts: Sequence[Any], summed: Callable[..., Any]) -> Self:
+        draft = self._draft(*_FITTED)
+        seen = summed(partial(_seen, draft), parts)
+        draft.__dict__.update(seen.noted)
+        draft._began(seen.look, more=False)
+        draft.training_ = summed(partial(_gathered, draft), parts)
+        return self._become(draft._solved())
 
     def fit_demonstrations(
         self, demonstrations: Demonstration | Sequence[Demonstration], speed_power: float = 0.0
@@ -164,35 +220,29 @@ class Policy(Deployable, Looking, RegressorMixin, BaseEstimator):
         Returns
         -------
         self
+            As it was, if anything fails.
         """
-        check_at_least("speed_power", speed_power, 0.0)
-        if speed_power and isinstance(self._learner(), SampleLearner):
-            raise SettingError("speed_power: learners that look at the samples weigh speed themselves, expected 0.")
-        states, actions, groups = stack(demonstrations)
+        self._check_speed_power(speed_power)
+        demos = [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
+        states, actions, groups = stack(demos)
         speed = np.linalg.norm(actions, axis=1)
-        if speed_power == 0.0 or not speed.any():
-            return self.fit(states, actions, groups=groups)
-        return self.fit(states, actions, (speed / speed.max()) ** speed_power, groups)
+        weights = (speed / speed.max()) ** speed_power if speed_power and speed.any() else None
+        return self._fit(states, actions, weights, groups, times_of(demos))
 
-    def held_out_score(self) -> float:
-        """:meth:`score` on each fold by what is learnt from the others, from the moments alone.
+    def with_learner(self, learner: Learner | str) -> Self:
+        """Return the same policy with another learner, from the same moments: no second pass over the data.
 
-        Of local models each is judged by itself in its own field. NaN where
-        there is nothing to hold out.
+        Raises
+        ------
+        SettingError
+            If the learner needs the samples, and they were not kept: this policy's own does not need them.
         """
         check_is_fitted(self, "solution_")
-        parts, filled, learner = self._folds.parts, self._folds.filled, self._learner()
-        if isinstance(self.solution_, RobustSolution):
-            return self.solution_.held_out_score
-        if isinstance(learner, SampleLearner):
-            return float("nan")
-        missed = moved = 0.0
-        for i in filled if len(filled) > 1 else ():
-            others = tuple(parts[j] for j in filled if j != i)
-            weights = self._solve(learner, FoldedMoments(others, range(len(others)))).weights
-            missed += float(inconsistency(parts[i])(vec(weights)).sum())
-            moved += float(parts[i].energy.sum())
-        return 1.0 - missed / moved if moved > 0 else float("nan")
+        other = copy(self)
+        other.learner = learner
+        return other._solved()
+
+    # What was learnt.
 
     def predict(self, X: ArrayLike) -> Array:
         """Predict the unconstrained policy.
@@ -208,9 +258,9 @@ class Policy(Deployable, Looking, RegressorMixin, BaseEstimator):
             Of the library and on the device of the states.
         """
         check_is_fitted(self, "solution_")
-        states = self._checked_states(X)
+        states, model, weights = self._checked_states(X), self.training_.model, self.solution_.weights
         blocks = slices(states, BLOCK_ROWS if is_foreign(states) else _ROWS)
-        actions: Array = namespace(states).concat([self._predict_block(states[rows, :]) for rows in blocks])
+        actions: Array = namespace(states).concat([model.predict(weights, states[rows, :]) for rows in blocks])
         return actions[:, 0] if self._flat else actions
 
     def __call__(self, states: ArrayLike) -> Array:
@@ -231,7 +281,7 @@ class Policy(Deployable, Looking, RegressorMixin, BaseEstimator):
         """
         check_is_fitted(self, "solution_")
         missed = moved = 0.0
-        for states, actions, weights, _ in self._checked(X, y, sample_weight, reset=False).blocks():
+        for states, actions, weights, *_ in self._checked(X, y, sample_weight, reset=False).blocks():
             directions, lengths = unit_actions(actions)
             xp = namespace(lengths)
             counts = xp.ones_like(lengths) if weights is None else beside(weights, lengths)
@@ -239,29 +289,201 @@ class Policy(Deployable, Looking, RegressorMixin, BaseEstimator):
             moved += float(counts @ lengths**2)
         return 1.0 - missed / moved if moved > 0 else 0.0
 
-    def with_learner(self, learner: Learner | SampleLearner) -> Self:
-        """Return the same policy with another learner, from the same moments: no second pass over the data.
+    def held_out_score(self) -> float:
+        """:meth:`score` on each fold by what is learnt from the others, from the moments alone.
+
+        Of local models each is judged by itself in its own field. NaN where
+        there is nothing to hold out.
+        """
+        check_is_fitted(self, "solution_")
+        learner, training = named(self.learner), self.training_
+        if self.solution_.belief is not None:
+            return self.solution_.belief.held_out_score
+        filled = training.gathered.filled
+        if learner.needs_samples or len(filled) < 2:
+            return float("nan")
+        missed = moved = 0.0
+        for i in filled:
+            part, rest = training.gathered.parts[i], training.of_folds([j for j in filled if j != i])
+            weights = vec(learner.learn(rest).over(training.model).weights)
+            missed += float(np.clip(inconsistency(part)(weights), 0.0, None).sum())
+            moved += float(part.energy.sum())
+        return 1.0 - missed / moved if moved > 0 else float("nan")
+
+    def uncertainty(self, X: ArrayLike) -> Uncertainty:
+        """How far the unconstrained policy may be from :meth:`predict`, and why.
+
+        Parameters
+        ----------
+        X : array_like, shape (N, n)
+            States.
+
+        Returns
+        -------
+        Uncertainty
+            Standard deviations of each action coordinate, (N, d): from noise, from what the data does not
+            determine, and in total.
 
         Raises
         ------
         SettingError
-            If the learner needs the samples, and they were not kept: this policy's own does not need them.
+            If the learner does not look at samples; :class:`~unconstrain.Robust` does.
         """
         check_is_fitted(self, "solution_")
-        other = clone(self).set_params(learner=learner)
-        other.__dict__ |= {name: value for name, value in self.__dict__.items() if name not in other.__dict__}
-        other._splitter = deepcopy(self._splitter)  # each keeps its own list of demonstrations from here on
-        other._conclude()
-        return other
+        return self.solution_.believed.uncertainty(self.training_.model, on_host(self._checked_states(X)))
+
+    def covariances(self, X: ArrayLike) -> Array:
+        """Covariance of the predicted actions due to what the data does not say, shape (N, d, d).
+
+        Its diagonal is the square of ``uncertainty(X).undetermined``. Raises as :meth:`uncertainty` does.
+        """
+        check_is_fitted(self, "solution_")
+        return self.solution_.believed.covariances(self.training_.model, on_host(self._checked_states(X)))
+
+    def support(self, states: ArrayLike) -> Array:
+        """How near to the data each state is, from 1 to 0 far from all of it, shape (N,).
+
+        Raises
+        ------
+        SettingError
+            If neither fields nor features have a place in state space.
+        """
+        check_is_fitted(self, "solution_")
+        return self.training_.model.support(self._checked_states(states))
+
+    @property
+    def features_(self) -> FeatureMap:
+        """The features in use."""
+        check_is_fitted(self, "solution_")
+        return self.training_.model.features
 
     @property
     def moments_(self) -> Moments:
         """Moments of all samples so far, over the features as they are summed."""
-        return self._folds.whole
+        check_is_fitted(self, "solution_")
+        return self.training_.gathered.whole
 
-    def _forget(self) -> None:
-        for fitted in ("_folds", "_splitter", "_kept", "n_features_in_", "solution_"):
-            self.__dict__.pop(fitted, None)
+    # On a robot.
+
+    def step(self, x: ArrayLike, out: Array | None = None) -> Array:
+        """Predict for one state, without overhead: for control loops.
+
+        The same as :meth:`predict` to rounding. It is prepared on the first
+        call after each fit. Any number of threads may call it at once, also
+        while one of them learns by :meth:`partial_fit`; each step is then by
+        the old or by the new solution, never by half of each.
+
+        Parameters
+        ----------
+        x : array_like, shape (n,)
+            Not checked: NaN gives NaN.
+        out : ndarray, shape (d,), optional
+            Written to and returned; without it the result is a new array.
+
+        Returns
+        -------
+        ndarray, shape (d,)
+
+        Raises
+        ------
+        InvalidDataError
+            If the state is not of shape (n,).
+        """
+        known = self.__dict__
+        prepared = known.get("_prepared")
+        if prepared is None or prepared.solution is not known.get("solution_"):
+            prepared = self._prepare_step(known)
+        return prepared.step(x, out)
+
+    def _prepare_step(self, known: dict[str, Any]) -> _Prepared:
+        check_is_fitted(self, "solution_")
+        # What another thread has learnt meanwhile is prepared at the next step: the solution is then another.
+        solution, model = known["solution_"], known["training_"].model
+        form = model.fields.formula(model.features, solution.weights)
+        step = stepper(form) if form else stepper_on(model.design, solution.weights[0], known["n_features_in_"])
+        prepared = known["_prepared"] = _Prepared(solution, step)
+        return prepared
+
+    def closed_form(self) -> ClosedForm:
+        """The policy as one formula: what is exported, and what other targets can be made from.
+
+        Raises
+        ------
+        SettingError
+            If the features are a callable that does not say its formula.
+        """
+        check_is_fitted(self, "solution_")
+        return self.training_.model.formula(self.solution_.weights)
+
+    def export_c(self, path: str | os.PathLike[str], name: str | None = None) -> None:
+        """Write the policy as one C99 file that needs only ``exp`` of the standard library.
+
+        It defines ``void NAME_step(const double state[n], double action[d])``
+        and, with ``NAME_SELF_TEST`` (in capitals) defined, a ``main`` that
+        compares itself with :meth:`predict`.
+
+        Parameters
+        ----------
+        path : str or path-like
+        name : str, optional
+            A C identifier; ``"policy"`` by default.
+
+        Raises
+        ------
+        SettingError
+            If the features cannot be exported (:meth:`closed_form`), or the name is none in C.
+        """
+        export_c(self.closed_form(), self, path, "policy" if name is None else name)
+
+    def export_onnx(self, path: str | os.PathLike[str]) -> None:
+        """Write the policy as an ONNX graph, ``states`` (N, n) to ``actions`` (N, d), in float64.
+
+        Raises
+        ------
+        MissingExtraError
+            If ``onnx`` is not installed; it comes with ``unconstrain[onnx]``.
+        SettingError
+            If the features cannot be exported (:meth:`closed_form`).
+        """
+        export_onnx(self.closed_form(), path)
+
+    # Inside.
+
+    def _draft(self, *without: str) -> Self:
+        """A copy to work on, without some of its attributes."""
+        draft = copy(self)
+        for name in without:
+            draft.__dict__.pop(name, None)
+        return draft
+
+    def _become(self, draft: Self) -> Self:
+        self.__dict__ = draft.__dict__  # at once: another thread sees the old policy or the new one
+        return self
+
+    def _began(self, look: FirstLook | None, *, more: bool) -> Self:
+        """Choose all that has to be chosen before the first sample is summed."""
+        if look is None:
+            raise InvalidDataError("got no sample that counts, expected at least one.")
+        validation = self.validation if self.validation is not None else Folds()
+        split, keep = Split.begin(validation, look, more), named(self.learner).needs_samples
+        self.training_ = Training.begin(look, self.place(look), split, keep=keep)
+        return self
+
+    def _learnt(self, batches: Iterable[Batch]) -> Self:
+        self.training_ = self.training_.with_batches(batches)
+        return self._solved()
+
+    def _solved(self) -> Self:
+        self.solution_ = named(self.learner).learn(self.training_).over(self.training_.model)
+        return self
+
+    def _check_speed_power(self, speed_power: float) -> None:
+        check_at_least("speed_power", speed_power, 0.0)
+        if speed_power and named(self.learner).needs_samples:
+            raise SettingError("speed_power: learners that look at the samples weigh speed themselves, expected 0.")
+
+    def _each_checked(self, batches: Iterable[Sequence[Any]], *, reset: bool = True) -> Iterator[Batch]:
+        return (self._checked(*batch, reset=reset and number == 0) for number, batch in enumerate(batches))
 
     def _checked(
         self,
@@ -269,6 +491,7 @@ class Policy(Deployable, Looking, RegressorMixin, BaseEstimator):
         y: ArrayLike,
         sample_weight: ArrayLike | None = None,
         groups: Groups | None = None,
+        times: ArrayLike | None = None,
         *,
         reset: bool,
     ) -> Batch:
@@ -291,7 +514,8 @@ class Policy(Deployable, Looking, RegressorMixin, BaseEstimator):
         weights = None if sample_weight is None else as_weights(sample_weight, samples)
         if weights is not None and not weights.any():
             raise InvalidDataError("sample_weight: all weights are zero, expected at least one that counts.")
-        return Batch(states, actions, weights, None if groups is None else as_groups(groups, samples))
+        names = None if groups is None else as_groups(groups, samples)
+        return Batch(states, actions, weights, names, None if times is None else as_vector(times, "times", samples))
 
     def _checked_states(self, X: ArrayLike, *, reset: bool = False, convert: bool = True) -> Array:
         if isinstance(X, list | tuple):
@@ -308,113 +532,40 @@ class Policy(Deployable, Looking, RegressorMixin, BaseEstimator):
             raise InvalidDataError(str(error)) from error
         return as_matrix(table, "states", convert=convert)
 
-    def _begin(self, look: FirstLook | None, *, more: bool) -> Self:
-        """Choose all that has to be chosen before the first sample is summed."""
-        if look is None:
-            raise InvalidDataError("got no sample that counts, expected at least one.")
-        validation = self.validation if self.validation is not None else Folds()
-        self._at_rest = AT_REST * look.fastest
-        self._splitter = Splitter(validation, look, more)
-        self._place(look)
-        self._folds = self._nothing()
-        self._kept = ()
-        return self
-
-    def _learn(self, batches: Iterable[Batch]) -> Self:
-        kept: tuple[Batch, ...] = ()
-        if isinstance(self._learner(), SampleLearner):
-            batches = tuple(map(deepcopy, batches))  # the caller may use a buffer again
-            kept = (*self._samples_so_far(), *batches)
-        summed = self._summed(batches)
-        self._folds = self._folds + summed if self._folds.filled else summed
-        self._kept = kept
-        self._conclude()
-        return self
-
-    def _nothing(self) -> FoldedMoments:
-        """Moments of no sample."""
-        typical = self._splitter.typical[None]
-        features, actions, in_models = self._block(typical, np.zeros((1, self.n_outputs_)), np.ones(1))
-        empty = Moments.zero(in_models.shape[1], actions.shape[1], features.shape[1])
-        validation = self._splitter.validation
-        return FoldedMoments((empty,) * validation.count, validation.held_out)
-
-    def _summed(self, batches: Iterable[Batch]) -> FoldedMoments:
-        like = self._nothing()
-        models, d, p = like.parts[0].cross.shape
-        sums = [Sums(models, d, p, self._at_rest) for _ in like.parts]
-        with workers() as threads:
-            for batch in batches:
-                for block in batch.blocks():
-                    self._add(block, sums, threads)
-        return FoldedMoments(tuple(each.moments.on_host() for each in sums), like.held_out)
-
-    def _add(self, batch: Batch, sums: Sequence[Sums], threads: Workers) -> None:
-        """Add samples to the sums of their folds."""
-        folds = self._splitter.assign(on_host(batch.states), batch.groups)
-        # Each fold in one piece; of small integers NumPy sorts by counting.
-        order = np.argsort(folds.astype(np.min_scalar_type(len(sums))), kind="stable")
-        starts = np.searchsorted(folds[order], np.arange(len(sums) + 1)).tolist()
-        states, actions, weights, _ = batch.at(order)
-        weights = beside(np.ones(len(order)) if weights is None else weights, states)
-
-        def add(fold: Sums, start: int, stop: int) -> None:
-            for rows in fold.pieces(states, start, stop):
-                fold.add(*self._block(states[rows, :], actions[rows, :], weights[rows]))
-
-        ends = zip(sums, pairwise(starts), strict=True)
-        calls = [partial(add, fold, start, stop) for fold, (start, stop) in ends if start < stop]
-        models, d, p = sums[0].shape
-        # Of tensors, what runs where is for their library to say.
-        worth = d * p >= _SPREAD and not is_foreign(states)
-        threads.run(calls, 0.5 * len(order) * models * (d * p) ** 2 if worth else 0.0)
-
-    def _block(self, states: Array, actions: Array, weights: Array) -> tuple[Array, Array, Array]:
-        """Features, actions, and how much each sample counts in each model."""
-        in_models = self._weights(states)
-        column = weights[:, None]
-        return self._features(states), actions, column if in_models is None else column * in_models
-
-    def _conclude(self) -> None:
-        learner, centring = self._learner(), self._centring()
-        if not isinstance(learner, SampleLearner):
-            self.solution_ = self._solve(learner, self._folds)
-            return
-        folds = self._folds if centring is None else self._folds.in_features(centring)
-        samples = self._samples()
-        # In the order of time, wherever demonstrations come interleaved; and weights such as 1/N are no weak data.
-        order = np.argsort(samples.groups, kind="stable")
-        factor = max(1.0, len(samples) / samples.counts.sum())
-        samples = replace(samples[order], counts=factor * samples.counts[order])
-        filled = tuple(factor * folds.parts[i] for i in folds.filled)
-        solution = learner.learn(samples, FoldedMoments(filled, range(len(filled))))
-        if isinstance(solution, RobustSolution):
-            solution = replace(solution, free=solution.free[np.argsort(order)])
-        self.solution_ = solution
-
-    def _solve(self, learner: Learner, folds: FoldedMoments) -> Solution:
-        """Find the weights of the features φ(x)."""
-        centring = self._centring()
-        if centring is None:
-            return learner.solve(folds)
-        solution = learner.solve(folds.in_features(centring))
-        return replace(solution, weights=solution.weights @ centring)
-
-    def _learner(self) -> Learner | SampleLearner:
-        return self.learner if self.learner is not None else Hybrid()
-
-    def _predict_block(self, states: Array) -> Array:
-        weights, models = self.solution_.weights, self._shares(states)
-        features = self._features(states)
-        if models is None:
-            return features @ beside(weights[0].T, states)
-        each = namespace(states).tensordot(features, beside(weights, states), axes=((1,), (2,)))  # (N, M, d)
-        if is_foreign(each):
-            return (models[:, None, :] @ each)[:, 0, :]
-        return np.einsum("nm,nmd->nd", models, each)  # NumPy is slow at many small products
-
     def __sklearn_tags__(self) -> Any:
         """Say that actions may have several columns."""
         tags = super().__sklearn_tags__()
         tags.target_tags.multi_output = True
         return tags
+
+    def __getstate__(self) -> Any:
+        state: Any = super().__getstate__()
+        return {name: value for name, value in state.items() if name != "_prepared"}  # buffers are made where needed
+
+
+class _Prepared(NamedTuple):
+    """The step of a solution."""
+
+    solution: Solution
+    step: Step
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """First look at a part, and what the policy noted when it checked it."""
+
+    look: FirstLook | None
+    noted: dict[str, Any]
+
+    def __add__(self, other: _Seen) -> _Seen:
+        return _Seen(FirstLook.total([self.look, other.look]), self.noted if self.look is not None else other.noted)
+
+
+def _seen(draft: Policy, part: Iterable[Sequence[Any]]) -> _Seen:
+    mine = copy(draft)
+    look = FirstLook.total(map(FirstLook.at, mine._each_checked(part)))
+    return _Seen(look, {name: value for name, value in vars(mine).items() if name not in vars(draft)})
+
+
+def _gathered(draft: Policy, part: Iterable[Sequence[Any]]) -> Training:
+    return draft.training_.with_batches(copy(draft)._each_checked(part, reset=False))

@@ -1,17 +1,15 @@
 """From files to demonstrations: readers, preparation, and batches of what does not fit into memory."""
 
-from .batches import PLACING_SAMPLES, Batch, FirstLook, Groups, in_order, mixed
-from .demonstration import Demonstration, Recording, Truth, stack
+from .batches import Batch, Groups
+from .demonstration import Demonstration, Recording, Truth, stack, times_of
 from .preparation import Recipe, complete_recipe, prepare, survey
 from .readers import expand, read, read_blocks
 from .readers.table import unique_names
 from .streams import Stream
 
 __all__ = [
-    "PLACING_SAMPLES",
     "Batch",
     "Demonstration",
-    "FirstLook",
     "Groups",
     "Recipe",
     "Recording",
@@ -19,8 +17,6 @@ __all__ = [
     "Truth",
     "complete_recipe",
     "expand",
-    "in_order",
-    "mixed",
     "preparation",
     "prepare",
     "read",
@@ -28,5 +24,6 @@ __all__ = [
     "readers",
     "stack",
     "survey",
+    "times_of",
     "unique_names",
 ]

@@ -1,53 +1,41 @@
-"""Samples as they arrive, and the little that has to be known of all before the first is summed.
-
-Nothing here holds more than a block of rows beside what it was given, so
-arrays may be mapped from files.
-"""
+"""Samples as they arrive. No more than a block of rows is held beside what was given: it may be mapped from files."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import BLOCK_ROWS, Array, beside, is_foreign, namespace, on_host, slices
-from ..base.errors import InvalidDataError
+from ..base.arrays import BLOCK_ROWS, Array, beside, is_foreign, namespace, slices
 
-__all__ = ["PLACING_SAMPLES", "Batch", "FirstLook", "Groups", "mixed"]
-
-PLACING_SAMPLES = 20_000
-"""Features and fields are placed on at most this many different states."""
+__all__ = ["Batch", "Groups"]
 
 Groups = Sequence[Hashable] | NDArray[np.generic]
 
 FOREIGN_BLOCK_ROWS = 2**20
 """Rows of an array of another library that are summed together: its device may want much to do at once."""
 
-_ALL = np.uint64(2**64 - 1)
-
 
 class Batch(NamedTuple):
-    """Samples that were checked: ``states`` (N, n), ``actions`` (N, d), ``weights`` (N,) and ``groups`` (N,) if given.
+    """Samples that were checked.
 
-    Of any real type; :meth:`blocks` gives float64. States and actions may be
-    arrays of another library.
+    ``states`` (N, n) and ``actions`` (N, d), of any real type (:meth:`blocks` gives float64) and of any array library;
+    sample ``weights`` (N,), ``groups`` (N,) and ``times`` (N,) in seconds, where given.
     """
 
     states: NDArray[Any]
     actions: NDArray[Any]
     weights: Array | None = None
     groups: NDArray[np.generic] | None = None
+    times: Array | None = None
 
     def blocks(self) -> Iterator[Batch]:
         """Go through it by some rows at a time, without those of no weight."""
         xp = namespace(self.states)
         for rows in slices(self.states, FOREIGN_BLOCK_ROWS if is_foreign(self.states) else BLOCK_ROWS):
-            weights = None if self.weights is None else self.weights[rows]
-            groups = None if self.groups is None else self.groups[rows]
-            part = Batch(self.states[rows, :], self.actions[rows, :], weights, groups)
+            part = Batch(*(None if one is None else one[rows, ...] for one in self))  # type: ignore[arg-type]
             if part.weights is not None and not part.weights.all():
                 part = part.at(np.flatnonzero(part.weights))  # a weight of zero is the same as not being there
             if part.states.shape[0]:
@@ -60,147 +48,3 @@ class Batch(NamedTuple):
             None if part is None else namespace(part).take(part, beside(rows, part), axis=0) for part in self
         ]
         return Batch(*parts)
-
-
-@dataclass(frozen=True, eq=False)
-class FirstLook:
-    """What features, fields and folds are chosen by. First looks add, in the order of the samples.
-
-    Parameters
-    ----------
-    weight : float
-        ``Σ w``.
-    mean, scatter : ndarray, shape (n,)
-        Weighted mean of the states, and ``Σ w (x − mean)²``.
-    size : ndarray, shape (n,)
-        Largest absolute value of each state.
-    actions : int
-        Dimension d of the actions.
-    fastest : float
-        Largest absolute value in the actions.
-    keys : ndarray of uint64, shape (K,)
-        Hashes of different states, ascending: the smallest of all, at most :data:`PLACING_SAMPLES`.
-        So the choice depends neither on the order of the samples nor on how they come in batches.
-    states : ndarray, shape (K, n)
-        Those states.
-    groups : dict, optional
-        Names of the demonstrations, in the order of first appearance.
-    """
-
-    weight: float
-    mean: Array
-    scatter: Array
-    size: Array
-    actions: int
-    fastest: float
-    keys: NDArray[np.uint64]
-    states: Array
-    groups: dict[Hashable, None] | None
-
-    @property
-    def different(self) -> Array:
-        """Its states in a fixed order: repetition and order of the samples must not move the features."""
-        return np.unique(self.states, axis=0)
-
-    @classmethod
-    def at(cls, batch: Batch) -> FirstLook | None:
-        """Look at a batch; None if it is empty but for samples of no weight."""
-        look: FirstLook | None = None
-        for block in batch.blocks():
-            full = look is not None and len(look.keys) == PLACING_SAMPLES
-            further = cls._at_block(block, look.keys[-1] if look is not None and full else _ALL)
-            look = further if look is None else look + further
-        return look
-
-    @classmethod
-    def _at_block(cls, block: Batch, largest_key: np.uint64) -> FirstLook:
-        states, actions, weights, groups = on_host(block.states), on_host(block.actions), block.weights, block.groups
-        counts = np.ones(len(states)) if weights is None else weights
-        weight = float(counts.sum())
-        columns, shares = np.ascontiguousarray(states.T), counts / weight  # sums along memory are fast
-        mean = (shares * columns).sum(axis=1)
-        keys = mixed((columns + 0.0).view(np.uint64), 0)
-        keys, first = _smallest(keys, largest_key)
-        return cls(
-            weight,
-            mean,
-            weight * (shares * (columns - mean[:, None]) ** 2).sum(axis=1),
-            np.abs(columns).max(axis=1),
-            actions.shape[1],
-            float(np.abs(actions).max()),
-            keys,
-            states[first],
-            None if groups is None else dict.fromkeys(in_order(groups)),
-        )
-
-    def __add__(self, other: FirstLook) -> FirstLook:
-        """Look at both, this one first.
-
-        Raises
-        ------
-        InvalidDataError
-            If they differ in the number of columns, or only one names its demonstrations.
-        """
-        for what, mine, theirs in (
-            ("states", len(self.mean), len(other.mean)),
-            ("actions", self.actions, other.actions),
-        ):
-            if mine != theirs:
-                raise InvalidDataError(f"{what}: got {theirs} columns, expected {mine} as before.")
-        if (self.groups is None) != (other.groups is None):
-            raise InvalidDataError("groups: got them for some batches only, expected them for all or for none.")
-        weight = self.weight + other.weight
-        gap, share = other.mean - self.mean, other.weight / weight
-        keys, first = np.unique(np.concatenate([self.keys, other.keys]), return_index=True)
-        first = first[:PLACING_SAMPLES]
-        return FirstLook(
-            weight,
-            self.mean + share * gap,
-            self.scatter + other.scatter + self.weight * share * gap**2,
-            np.maximum(self.size, other.size),
-            self.actions,
-            max(self.fastest, other.fastest),
-            keys[:PLACING_SAMPLES],
-            np.concatenate([self.states, other.states])[first],
-            None if self.groups is None else self.groups | (other.groups or {}),
-        )
-
-    @staticmethod
-    def total(looks: Iterable[FirstLook | None]) -> FirstLook | None:
-        """Sum of several, in their order; None if nothing was seen."""
-        whole: FirstLook | None = None
-        for look in looks:
-            whole = look if whole is None else whole if look is None else whole + look
-        return whole
-
-
-def _smallest(keys: NDArray[np.uint64], largest: np.uint64) -> tuple[NDArray[np.uint64], NDArray[np.intp]]:
-    """The smallest different keys, ascending, and where each is first; finding them is faster than sorting all."""
-    low = np.flatnonzero(keys <= largest)
-    few = low
-    if len(low) > 2 * PLACING_SAMPLES:
-        few = low[keys[low] <= np.partition(keys[low], PLACING_SAMPLES)[PLACING_SAMPLES]]
-    for places in (few, low):
-        different, first = np.unique(keys[places], return_index=True)
-        if len(different) >= PLACING_SAMPLES or len(places) == len(low):
-            break  # or else many of the few are equal
-    return different[:PLACING_SAMPLES], places[first[:PLACING_SAMPLES]]
-
-
-def in_order(names: Groups) -> list[Hashable]:
-    """Different names in the order of first appearance."""
-    different, first = np.unique(np.asarray(names), return_index=True)
-    ordered: list[Hashable] = different[np.argsort(first)].tolist()
-    return ordered
-
-
-def mixed(columns: NDArray[np.uint64], seed: int) -> NDArray[np.uint64]:
-    """A hash for each row of a table, given by columns (k, N): SplitMix64's finaliser, shape (N,)."""
-    hashes = np.full(columns.shape[1], seed % 2**32 + 1, dtype=np.uint64)
-    with np.errstate(over="ignore"):
-        for column in columns:
-            hashes = (hashes ^ column) * np.uint64(0x9E3779B97F4A7C15)
-            hashes = (hashes ^ (hashes >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-            hashes = (hashes ^ (hashes >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-            hashes ^= hashes >> np.uint64(31)
-    return hashes

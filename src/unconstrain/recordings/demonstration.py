@@ -171,3 +171,9 @@ def stack(demonstrations: Demonstration | Sequence[Demonstration]) -> Stack:
         np.concatenate([demo.actions for demo in demos]),
         np.repeat(np.arange(len(demos)), [len(demo) for demo in demos]),
     )
+
+
+def times_of(demonstrations: Sequence[Demonstration]) -> Array | None:
+    """Times of demonstrations laid end to end, shape (N,), seconds; None where one has none."""
+    times = [demo.times for demo in demonstrations if demo.times is not None]
+    return np.concatenate(times) if len(times) == len(demonstrations) else None

@@ -84,25 +84,31 @@ class Quadratic:
         Returns
         -------
         ndarray, shape (M,) or (M, K)
-            Not below zero: what rounding leaves there is cut off.
+            Below zero where the objective is, as those of noise-corrected moments may be, or by rounding; NaN and
+            infinity where numbers overflow.
         """
         xp = namespace(weights)
         many = weights if weights.ndim == 3 else weights[..., None]
-        with np.errstate(over="ignore", invalid="ignore"):  # overflow is for the caller to see, as inf
+        with np.errstate(over="ignore", invalid="ignore"):  # overflow is for the caller to see
             bent = self.hessian @ many
             bent -= 2.0 * self.linear[..., None]
             bent *= many
             values = self.constant[:, None] + xp.sum(bent, axis=1)
-        values = xp.where(xp.isfinite(values), xp.clip(values, 0.0, None), xp.inf)
         return values if weights.ndim == 3 else values[:, 0]
+
+    __array_ufunc__ = None  # an array times a quadratic is ours to compute
 
     def __add__(self, other: Quadratic) -> Quadratic:
         """Add, problem by problem."""
-        return Quadratic(self.hessian + other.hessian, self.linear + other.linear, self.constant + other.constant)
+        gram = None if self.gram is None or other.gram is None else self.gram + other.gram
+        return Quadratic(self.hessian + other.hessian, self.linear + other.linear, self.constant + other.constant, gram)
 
-    def __mul__(self, factor: float) -> Quadratic:
-        """Scale by a positive number."""
-        return Quadratic(factor * self.hessian, factor * self.linear, factor * self.constant)
+    def __mul__(self, factor: float | Array) -> Quadratic:
+        """Scale all problems by one number that is not negative, or each by its own, shape (M,)."""
+        xp = namespace(self.hessian)
+        each = xp.reshape(xp.asarray(factor, dtype=self.hessian.dtype, device=self.hessian.device), (-1, 1))
+        gram = None if self.gram is None else each[..., None] * self.gram
+        return Quadratic(each[..., None] * self.hessian, each * self.linear, each[:, 0] * self.constant, gram)
 
     __rmul__ = __mul__
 

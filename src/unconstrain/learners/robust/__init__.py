@@ -1,19 +1,16 @@
 """Beyond the paper: learners that look at the samples, hold under noise, and say when they cannot know."""
 
-from .learner import Likelihood, NoiseCorrected, Robust, Segments
-from .posterior import RobustSolution
-from .samples import SampleLearner, Samples
-from .uncertainty import Uncertainty, covariances, uncertainty
+from ..solution import Uncertainty
+from .learner import HIDDEN, Likelihood, NoiseCorrected, Robust, SampleLearner, Segments
+from .noise import noise_by_differences
 
 __all__ = [
+    "HIDDEN",
     "Likelihood",
     "NoiseCorrected",
     "Robust",
-    "RobustSolution",
     "SampleLearner",
-    "Samples",
     "Segments",
     "Uncertainty",
-    "covariances",
-    "uncertainty",
+    "noise_by_differences",
 ]

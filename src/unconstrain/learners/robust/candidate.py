@@ -25,9 +25,9 @@ class Candidate:
         Prediction of each sample by what is learnt from the other folds.
     variance : float
         Of the noise, per coordinate, misfit included.
-    smoothness : Smoothness, optional
-        Of the policy, where it is part of the prior.
-    most_consistent : ndarray, shape (N, d), optional
+    smoothness : Smoothness
+        Of the policy, as far as it is part of the prior.
+    most_consistent : ndarray, shape (N, d)
         As ``held_out``, but as held-out consistency alone would choose, and no prior.
     """
 
@@ -36,5 +36,5 @@ class Candidate:
     posterior: Posterior
     held_out: Array
     variance: float
-    smoothness: Smoothness | None = None
-    most_consistent: Array | None = None
+    smoothness: Smoothness
+    most_consistent: Array

@@ -23,12 +23,12 @@ from ...risks import (
     unvec,
     vec,
 )
-from ...training import FoldedMoments
-from ..plain import SOFTNESSES, Hybrid, within_errors
+from ...training import FoldedMoments, Samples
+from ..hybrid import SOFTNESSES, chosen_softness
+from ..thresholds import judged, within_errors
 from .candidate import Candidate
 from .noise import corrected, correlation_time, noise_by_differences
-from .posterior import Posterior, scaled, unit_information
-from .samples import Samples
+from .posterior import Posterior, unit_information
 from .segments import constrained_error
 from .smoothness import Smoothness
 from .sphere import distances
@@ -94,7 +94,7 @@ def _not_refuted(missed: Array, away: Array) -> int:
 def softened(samples: Samples, folds: FoldedMoments) -> Candidate:
     """:class:`~unconstrain.Hybrid` with ``alpha="auto"``."""
     whole, d = folds.whole, samples.actions.shape[1]
-    softness = Hybrid(alpha="auto").chosen_softness(folds)
+    softness = chosen_softness(folds)
 
     def posterior(moments: Moments) -> Posterior:
         return Posterior(inconsistency(moments), softness * standard_risk(moments))
@@ -107,9 +107,17 @@ def softened(samples: Samples, folds: FoldedMoments) -> Candidate:
         held_out[rows] = samples[rows].predict(posterior(rest).weights(d))
     radial = distances(samples.actions, samples.predict(weights)).radial
     sizes = np.maximum(whole.weight, np.finfo(float).tiny)
-    residual = np.maximum(inconsistency(whole)(vec(weights)), 1e-12 * whole.energy) / sizes
+    residual = np.maximum(judged(inconsistency(whole), vec(weights)), 1e-12 * whole.energy) / sizes
     repeats = _repeats(correlation_time(radial[:, None], samples.groups), samples)
-    return Candidate("hybrid", weights, _per(posterior(whole), repeats * residual), held_out, _mean(samples, radial**2))
+    return Candidate(
+        "hybrid",
+        weights,
+        _per(posterior(whole), repeats * residual),
+        held_out,
+        _mean(samples, radial**2),
+        Smoothness.of(samples),
+        held_out,
+    )
 
 
 def by_segments(samples: Samples, labels: NDArray[np.intp], noise: float) -> Candidate:
@@ -126,13 +134,13 @@ def by_segments(samples: Samples, labels: NDArray[np.intp], noise: float) -> Can
 
     def posterior(of: list[int], softness: Array) -> Posterior:
         error, risk = (reduce(add, (one[i] for i in of)) for one in (errors, risks))
-        return Posterior(error, scaled(risk, softness))
+        return Posterior(error, softness * risk)
 
     everything, softness = list(range(len(parts))), np.full(len(sizes), 1e-2)
     for _ in range(_STEPS):
         whole = posterior(everything, softness)
         weights = vec(whole.weights(d))
-        missed, taken = whole.evidence(weights), reduce(add, risks)(weights)
+        missed, taken = judged(whole.evidence, weights), judged(reduce(add, risks), weights)
         softness = np.clip(worth * missed / np.maximum(taken - missed, 1e-3 * taken + 1e-300), 1e-8, 1.0)
     found = posterior(everything, softness)
     held_out = np.empty_like(samples.actions)
@@ -143,7 +151,15 @@ def by_segments(samples: Samples, labels: NDArray[np.intp], noise: float) -> Can
     radial = distances(samples.actions, samples.predict(best)).radial
     residual = np.maximum(missed, 1e-12 * reduce(add, risks).constant) / np.maximum(sizes, 1e-300)
     time = correlation_time(radial[:, None], samples.groups)
-    return Candidate("segments", best, _per(found, time * residual), held_out, _mean(samples, radial**2))
+    return Candidate(
+        "segments",
+        best,
+        _per(found, time * residual),
+        held_out,
+        _mean(samples, radial**2),
+        Smoothness.of(samples),
+        held_out,
+    )
 
 
 class _Parts:
@@ -186,7 +202,7 @@ class _Corrected:
         self.consistent = _certain(inconsistency(moments), self.plain.hessian, variance, sizes)
 
     def posterior(self, softness: Array, smooth: Quadratic) -> Posterior:
-        return Posterior(self.consistent, scaled(self.risk, softness) + smooth)
+        return Posterior(self.consistent, softness * self.risk + smooth)
 
     def balanced(self, smoothness: Smoothness, time: float) -> tuple[Array, Smoothness, Array]:
         """Softness, smoothness, and the variance of an independent residual, (M,), found in a few steps.
@@ -198,8 +214,8 @@ class _Corrected:
         for _ in range(_STEPS):
             posterior = self.posterior(softness, smoothness.prior(unit))
             weights = posterior.weights(self.d)
-            along = self.consistent(vec(weights)) + self.expected
-            both = self.risk(vec(weights)) + self.expected
+            along = judged(self.consistent, vec(weights)) + self.expected
+            both = judged(self.risk, vec(weights)) + self.expected
             across = np.maximum((both - along) / max(self.d - 1, 1), 1e-3 * both)
             softness = np.clip(worth * along / np.where(across > 0, across, 1.0), 1e-8, 1.0)
             noise, residual = self.noise(weights), self.residual(weights)
@@ -216,7 +232,7 @@ class _Corrected:
 
     def residual(self, weights: Array) -> Array:
         """Mean square of ρ, shape (M,)."""
-        missed = self.consistent(vec(weights)) / np.maximum(self.sizes, 1e-300)
+        missed = judged(self.consistent, vec(weights)) / np.maximum(self.sizes, 1e-300)
         least = 1e-12 * np.abs(self.consistent.constant) / np.maximum(self.sizes, 1e-300)
         return np.maximum(missed + self.noise(weights), np.maximum(least, 1e-300))
 
@@ -258,7 +274,7 @@ def _repeats(time: float, samples: Samples) -> Array:
 def _per(posterior: Posterior, variance: Array) -> Posterior:
     """The same in units of a variance, shape (M,)."""
     by = 1.0 / np.maximum(variance, 1e-300)
-    return Posterior(scaled(posterior.evidence, by), scaled(posterior.prior, by))
+    return Posterior(by * posterior.evidence, by * posterior.prior)
 
 
 def _mean(samples: Samples, values: Array) -> float:

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Literal
+from abc import abstractmethod
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from ...base.arrays import Array, check_at_least
 from ...base.errors import SettingError
 from ...risks import Quadratic, inconsistency, unit_actions, vec
-from ...training import FoldedMoments
-from ..plain import Direct, Hybrid
+from ...training import Samples, Training
+from ..direct import Direct
+from ..hybrid import Hybrid
+from ..learner import Learner
+from ..solution import Belief, Solution
+from ..thresholds import judged
 from .candidate import Candidate
 from .consistent import by_segments, noise_corrected, softened
 from .likelihood import MISFIT, free_probability, maximise, settle
 from .noise import noise_by_differences
-from .posterior import Posterior, RobustSolution, scaled, unit_information
-from .samples import Samples
+from .posterior import Posterior, unit_information
 from .segments import found_segments
-
-__all__ = ["Likelihood", "NoiseCorrected", "Robust", "Segments"]
 
 NOISY = 0.015
 """Noise of more than this share of the actions' size is taken out of the sums."""
@@ -44,8 +46,27 @@ HIDDEN = 0.35
 """Noise of more than this share hides the sphere: free and constrained samples look the same."""
 
 
+class SampleLearner(Learner):
+    """Looks at the samples, not only at their moments, and has a belief beside the weights."""
+
+    needs_samples: ClassVar[bool] = True
+
+    def learn(self, training: Training) -> Solution:
+        """Learn from samples; where there is nothing to tell free from constrained, as the hybrid does."""
+        everything = training.samples
+        samples = everything.counted
+        if _trivial(samples):
+            return _plain(training, samples, everything)
+        chosen, more = self.candidate(samples, training)
+        return _solution(chosen, samples, everything, **more)
+
+    @abstractmethod
+    def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
+        """Learn from samples of some weight; also what the belief is to say of the choice."""
+
+
 @dataclass(frozen=True)
-class _Climbing:
+class _Climbing(SampleLearner):
     """What learners have that climb to the most probable policy."""
 
     steps: int = 60
@@ -56,11 +77,10 @@ class _Climbing:
         check_at_least("most", self.most, 1, whole=True)
 
     def _climbed(
-        self, samples: Samples, folds: FoldedMoments, corrected: Candidate, consistent: Candidate
+        self, samples: Samples, training: Training, corrected: Candidate, consistent: Candidate
     ) -> tuple[Candidate, Array]:
         """The most probable policy, from the consistent one and from what was observed."""
-        assert corrected.smoothness is not None
-        starts = [consistent.weights, Direct().solve(folds).weights]
+        starts = [consistent.weights, Direct().learn(training).weights]
         return maximise(samples, starts, corrected.smoothness, self.steps, self.most)
 
 
@@ -80,16 +100,14 @@ class Likelihood(_Climbing):
         Steps but the last look at no more samples than these, evenly thinned in time.
     """
 
-    def learn(self, samples: Samples, folds: FoldedMoments) -> RobustSolution:
-        """Learn from samples; ``folds`` are their moments."""
-        if _trivial(samples):
-            return _plain(samples, folds)
-        corrected, consistent = _consistent(samples, folds)
-        return _solution(samples, self._climbed(samples, folds, corrected, consistent)[0])
+    def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
+        """The most probable policy."""
+        corrected, consistent = _consistent(samples, training)
+        return self._climbed(samples, training, corrected, consistent)[0], {}
 
 
 @dataclass(frozen=True)
-class NoiseCorrected:
+class NoiseCorrected(SampleLearner):
     """Consistency first, on moments without the expected part of the noise; see :mod:`~.robust.noise`.
 
     Samples count by ‖u‖², and the standard risk beside the inconsistency by
@@ -108,15 +126,13 @@ class NoiseCorrected:
         if self.noise is not None:
             check_at_least("noise", self.noise, 0.0)
 
-    def learn(self, samples: Samples, folds: FoldedMoments) -> RobustSolution:
-        """Learn from samples; ``folds`` are their moments."""
-        if _trivial(samples):
-            return _plain(samples, folds)
-        return _solution(samples, noise_corrected(samples, self.noise))
+    def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
+        """The consistent policy."""
+        return noise_corrected(samples, self.noise), {}
 
 
 @dataclass(frozen=True)
-class Segments:
+class Segments(SampleLearner):
     """Learn where each constraint stays the same for a while; see :mod:`unconstrain.learners.robust.segments`.
 
     Needs the samples, not only their moments.
@@ -139,17 +155,15 @@ class Segments:
         if self.noise is not None:
             check_at_least("noise", self.noise, 0.0)
 
-    def learn(self, samples: Samples, folds: FoldedMoments) -> RobustSolution:
-        """Learn from samples; ``folds`` are their moments."""
-        if _trivial(samples):
-            return _plain(samples, folds)
+    def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
+        """The policy that is consistent with the projection of each segment."""
         most = noise_by_differences(samples.actions, samples.groups)
         noise = self.noise if self.noise is not None else float(np.sqrt(min(most, samples.energy)))
         by_group = self.labels == "groups"
         if by_group and samples.groups.max() == 0:
             raise SettingError("labels: 'groups' needs groups=, one name for each demonstration, at least two.")
         labels = samples.groups if by_group else found_segments(samples.actions, samples.groups, noise)
-        return _solution(samples, by_segments(samples, labels, noise))
+        return by_segments(samples, labels, noise), {}
 
 
 @dataclass(frozen=True)
@@ -172,14 +186,11 @@ class Robust(_Climbing):
         See :class:`Likelihood`.
     """
 
-    def learn(self, samples: Samples, folds: FoldedMoments) -> RobustSolution:
-        """Learn from samples; ``folds`` are their moments."""
-        if _trivial(samples):
-            return _plain(samples, folds)
-        corrected, consistent = _consistent(samples, folds)
-        likely, mixture = self._climbed(samples, folds, corrected, consistent)
+    def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
+        """The likelihood's or the consistent policy."""
+        corrected, consistent = _consistent(samples, training)
+        likely, mixture = self._climbed(samples, training, corrected, consistent)
         learnt = {one.name: one for one in (corrected, consistent, likely)}
-        assert corrected.most_consistent is not None
         gaps = {
             name: compared(samples, one.held_out, corrected.most_consistent, corrected.variance)
             for name, one in learnt.items()
@@ -187,16 +198,14 @@ class Robust(_Climbing):
         informed = 1.0 - float(mixture[-1])
         refuted = _refuted(*gaps[likely.name], WORSE ** min(1.0, 2.0 * informed))
         usable = informed > INFORMED and not refuted and not _more_than(HIDDEN, likely.variance, samples)
-        return _solution(
-            samples,
-            likely if usable else consistent,
-            compared={name: gap for name, (gap, _) in gaps.items()},
-            refuted=refuted,
-            candidates={name: one.weights @ samples.centring for name, one in learnt.items()},
-        )
+        return likely if usable else consistent, {
+            "compared": {name: gap for name, (gap, _) in gaps.items()},
+            "refuted": refuted,
+            "candidates": {name: one.weights for name, one in learnt.items()},
+        }
 
 
-def _consistent(samples: Samples, folds: FoldedMoments) -> tuple[Candidate, Candidate]:
+def _consistent(samples: Samples, training: Training) -> tuple[Candidate, Candidate]:
     """On noise-corrected moments; and what is to be had of consistency alone: the same where noise is what is missed.
 
     Where it is not, as if people do not always do the same, consistency is given up as far as held-out data lets it.
@@ -204,7 +213,7 @@ def _consistent(samples: Samples, folds: FoldedMoments) -> tuple[Candidate, Cand
     corrected = noise_corrected(samples)
     exact = 1.0 - _explained(samples, corrected.held_out) < CLEAR
     noisy = _more_than(NOISY, corrected.variance, samples)
-    return corrected, corrected if noisy or exact else softened(samples, folds)
+    return corrected, corrected if noisy or exact else softened(samples, training.filled)
 
 
 def _refuted(gap: float, error: float, factor: float) -> bool:
@@ -230,28 +239,28 @@ def compared(samples: Samples, one: Array, other: Array, variance: float) -> tup
     return float(np.median(gap)), float(gap.std(ddof=1) / np.sqrt(len(gap)))
 
 
-def _solution(samples: Samples, chosen: Candidate, **more: Any) -> RobustSolution:
-    policy = samples.predict(chosen.weights)
-    variance, mixture = settle(samples, policy)
-    free = free_probability(samples, policy, variance, mixture)
+def _solution(chosen: Candidate, samples: Samples, everything: Samples, **more: Any) -> Solution:
+    variance, mixture = settle(samples, samples.predict(chosen.weights))
+    free = free_probability(everything, everything.predict(chosen.weights), variance, mixture)
     models, d, p = chosen.weights.shape
     belief = _belief(samples, chosen.posterior.evidence)
     from_noise, undetermined = belief.spreads()
-    undetermined = undetermined + _moved(chosen, belief)
-    return RobustSolution(
-        chosen.weights @ samples.centring,
+    return Solution(
+        chosen.weights,
         belief.determined(),
         d * p,
         np.zeros(models),
         method=chosen.name,
-        noise=float(np.sqrt(variance)),
-        misfit=float(np.sqrt(_misfit(samples, variance))),
-        free_share=float(samples.counts @ free / samples.counts.sum()),
-        free=free,
-        from_noise=from_noise,
-        undetermined=undetermined,
-        held_out_score=_explained(samples, chosen.held_out),
-        **more,
+        belief=Belief(
+            noise=float(np.sqrt(variance)),
+            misfit=float(np.sqrt(_misfit(samples, variance))),
+            free_share=float(everything.counts @ free / everything.counts.sum()),
+            free=free[np.argsort(everything.places)],
+            from_noise=from_noise,
+            undetermined=undetermined + _moved(chosen, belief),
+            held_out_score=_explained(samples, chosen.held_out),
+            **more,
+        ),
     )
 
 
@@ -259,12 +268,12 @@ def _belief(samples: Samples, evidence: Quadratic) -> Posterior:
     """Evidence beside a prior that knows the policy's size, as if each model had seen one such sample a feature."""
     d, p = samples.actions.shape[1], samples.features.shape[1]
     vague = samples.risk(samples.actions, np.full(len(samples), d / max(samples.energy, 1e-300)))
-    return Posterior(evidence, scaled(vague, unit_information(p, samples.sizes)))
+    return Posterior(evidence, unit_information(p, samples.sizes) * vague)
 
 
 def _moved(chosen: Candidate, belief: Posterior) -> Array:
     """How far the weights would move under the weaker prior of the belief, as a covariance, shape (M, P, P)."""
-    prior = belief.prior if chosen.smoothness is None else belief.prior + chosen.smoothness.prior()
+    prior = belief.prior + chosen.smoothness.prior()
     apart = vec(chosen.weights) - vec(Posterior(belief.evidence, prior).weights(chosen.weights.shape[1]))
     return np.asarray(apart[:, :, None] * apart[:, None, :])
 
@@ -287,28 +296,23 @@ def _trivial(samples: Samples) -> bool:
     return samples.actions.shape[1] == 1 or samples.energy == 0.0 or samples.folds.max() == 0
 
 
-def _plain(samples: Samples, folds: FoldedMoments) -> RobustSolution:
+def _plain(training: Training, samples: Samples, everything: Samples) -> Solution:
     """What the hybrid makes of it."""
-    found = Hybrid().solve(folds)
+    found, whole = Hybrid().learn(training), training.filled.whole
     size, d = found.directions, samples.actions.shape[1]
-    missed = inconsistency(folds.whole)(vec(found.weights)) / np.maximum(samples.sizes - size, 1.0)
-    evidence = scaled(inconsistency(folds.whole), 1.0 / np.maximum(missed, MISFIT**2 * samples.energy + 1e-300))
-    belief = _belief(samples, evidence)
-    from_noise, undetermined = belief.spreads()
-    return RobustSolution(
-        found.weights @ samples.centring,
-        found.determined,
-        size,
-        found.threshold,
-        found.eigenvalues,
-        found.scores,
-        method="hybrid",
-        free=np.ones(len(samples)),
-        free_share=1.0,
-        noise=float(np.sqrt(missed.mean())),
-        misfit=MISFIT * float(np.sqrt(samples.energy / d)),
-        from_noise=from_noise,
-        undetermined=undetermined,
+    missed = judged(inconsistency(whole), vec(found.weights)) / np.maximum(samples.sizes - size, 1.0)
+    evidence = (1.0 / np.maximum(missed, MISFIT**2 * samples.energy + 1e-300)) * inconsistency(whole)
+    from_noise, undetermined = _belief(samples, evidence).spreads()
+    return replace(
+        found,
+        belief=Belief(
+            noise=float(np.sqrt(missed.mean())),
+            misfit=MISFIT * float(np.sqrt(samples.energy / d)),
+            free_share=1.0,
+            free=np.ones(len(everything)),
+            from_noise=from_noise,
+            undetermined=undetermined,
+        ),
     )
 
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from ...base.arrays import Array
 from ...risks import inconsistency
+from ...training import Samples
 from .candidate import Candidate
 from .noise import correlation_time, noise_by_differences
-from .posterior import Posterior, scaled, unit_information
-from .samples import Samples
+from .posterior import Posterior, unit_information
 from .smoothness import Smoothness
 from .sphere import SPREADS, Beliefs, Distances, beliefs, distances
 
@@ -67,7 +67,8 @@ def maximise(
     for fold in range(len(parts)):
         rest = _sum([part for i, part in enumerate(parts) if i != fold] or parts)
         held_out[samples.folds == fold] = samples[samples.folds == fold].predict(rest.weights(d))
-    return Candidate("likelihood", whole.weights(d), whole, held_out, best.variance, best.smoothness), best.mixture
+    found = Candidate("likelihood", whole.weights(d), whole, held_out, best.variance, best.smoothness, held_out)
+    return found, best.mixture
 
 
 def settle(samples: Samples, policy: Array, steps: int = 20) -> tuple[float, Array]:
@@ -192,7 +193,7 @@ class _Model:
         risk = some.risk(samples.actions[part], np.full(len(some), 1.0 / (spread * along)))
         counted = float(some.counts.sum() / samples.counts.sum())
         smooth = self.smoothness.prior(counted)
-        return Posterior(evidence, scaled(risk, worth) + smooth)
+        return Posterior(evidence, worth * risk + smooth)
 
     def _prior(self) -> tuple[float, Array]:
         """Mean square of what constraints took in each coordinate, and what the risk is worth beside it."""

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array
 from ...risks import SECONDARY_NOISE, Quadratic, eigensystem, minimum, unvec
-from ..plain import Solution
 
-__all__ = ["Posterior", "RobustSolution", "scaled", "unit_information"]
+__all__ = ["Posterior", "unit_information"]
 
 
 def unit_information(weights: int, sizes: Array) -> Array:
@@ -22,13 +21,6 @@ def unit_information(weights: int, sizes: Array) -> Array:
     nothing where it speaks.
     """
     return weights / np.maximum(sizes, 1.0)
-
-
-def scaled(objective: Quadratic, factors: Array) -> Quadratic:
-    """Each model's objective times its factor, shape (M,)."""
-    return Quadratic(
-        factors[:, None, None] * objective.hessian, factors[:, None] * objective.linear, factors * objective.constant
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,45 +64,3 @@ class Posterior:
         white = vectors * scale[:, None, :]
         share, _ = eigensystem(white.swapaxes(1, 2) @ self.evidence.hessian @ white)
         return np.asarray((share > 0.5).sum(axis=1), dtype=np.intp)
-
-
-@dataclass(frozen=True, eq=False)
-class RobustSolution(Solution):
-    """What a learner found that looks at the samples.
-
-    Parameters
-    ----------
-    method : str
-        Which of the candidates it is.
-    noise : float
-        Standard deviation of the noise on each action coordinate, misfit of the model included.
-    misfit : float
-        Standard deviation, per action coordinate, of what the model of the policy misses: the part of the residuals
-        that goes on smoothly in time, and 1.5 % of the actions' size, which no model is trusted to be below.
-    free_share : float
-        Estimated share of samples that nothing constrained.
-    free : ndarray, shape (N,)
-        Probability that each sample was free, in the order in which they were given.
-    from_noise, undetermined : ndarray, shape (M, d p, d p)
-        Covariance of the weights, due to noise in the data and due to what the data does not say.
-    held_out_score : float
-        Share of the observed motion that is explained where it is held out, as by ``Policy.score``.
-    compared : dict
-        Logarithm of each candidate's held-out inconsistency over that on noise-corrected moments.
-    refuted : bool
-        Whether that of the most probable policy was too far above.
-    candidates : dict
-        Weights (M, d, p) of everything that was learnt to choose from, by name.
-    """
-
-    method: str = ""
-    noise: float = 0.0
-    misfit: float = 0.0
-    free_share: float = 0.0
-    free: Array = field(default_factory=lambda: np.zeros(0))
-    from_noise: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
-    undetermined: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
-    held_out_score: float = float("nan")
-    compared: dict[str, float] = field(default_factory=dict)
-    refuted: bool = False
-    candidates: dict[str, Array] = field(default_factory=dict)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...base.arrays import Array
 from ...risks import Quadratic
-from .samples import Samples
+from ...training import Samples
 
 __all__ = ["change_points", "constrained_error", "found_segments", "projection_of"]
 

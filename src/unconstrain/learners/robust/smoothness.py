@@ -21,8 +21,9 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...risks import Quadratic, eigensystem, vec
-from .posterior import Posterior, scaled
-from .samples import Samples
+from ...training import Samples
+from ..thresholds import judged
+from .posterior import Posterior
 
 __all__ = ["Smoothness"]
 
@@ -65,7 +66,7 @@ class Smoothness:
 
     def prior(self, factors: Array | float = 1.0) -> Quadratic:
         """Twice the negative logarithm of the density, times a factor (M,)."""
-        return scaled(self.penalty, self.precision * factors)
+        return (self.precision * factors) * self.penalty
 
     def updated(self, weights: Array, posterior: Posterior, noise: Array | float, unit: Array | float = 1.0) -> Self:
         """With the λ that goes best with weights.
@@ -83,5 +84,5 @@ class Smoothness:
         if not self.rank.any():
             return self
         covariance = np.linalg.pinv(posterior.evidence.hessian + posterior.prior.hessian, hermitian=True)
-        rough = self.penalty(vec(weights)) + unit * np.einsum("mij,mji->m", covariance, self.penalty.hessian)
+        rough = judged(self.penalty, vec(weights)) + unit * np.einsum("mij,mji->m", covariance, self.penalty.hessian)
         return replace(self, precision=noise * self.rank / np.maximum(rough, self.least))

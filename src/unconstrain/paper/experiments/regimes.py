@@ -12,8 +12,8 @@ from ...base.arrays import Array
 from ...base.errors import SettingError
 from ...constraints import Constraint, JacobianRows, PolicyAligned, SwitchingLine
 from ...evaluation import ncpe, ninconsistency, nupe
-from ...learners import Direct, Hybrid, Inconsistency, Robust, RobustSolution
-from ...models import NormalisedRBF
+from ...learners import Direct, Hybrid, Inconsistency, Robust
+from ...models import Model, NormalisedRBF
 from ...motion import rollout
 from ...policies import LocallyLinearPolicy, ParametricPolicy, Policy
 from ...recordings import Demonstration, stack
@@ -141,7 +141,6 @@ def trial(
         }
         of_noise: dict[str, tuple[float, ...]] = {method: _errors(one, test) for method, one in learnt.items()}
         chosen, judged = policy.solution_, learnt["direct"]
-        assert isinstance(chosen, RobustSolution)
         for method in ("noise-corrected", "likelihood"):  # what the default learner chose from
             judged.solution_ = replace(chosen, weights=chosen.candidates[method])
             of_noise[method] = _errors(judged, test)
@@ -261,15 +260,13 @@ def _errors(policy: Policy, test: Sequence[Demonstration]) -> tuple[float, float
 
 def _knowledge(policy: Policy, training: Sequence[Demonstration], test: Sequence[Demonstration]) -> tuple[float, float]:
     """How well free samples are told from constrained ones, and how often intervals hold the truth; NaN if unknown."""
-    solution = policy.solution_
-    assert isinstance(solution, RobustSolution)
     free = np.concatenate([_is_free(demo) for demo in training])
     states = np.concatenate([demo.states for demo in test])
     truth = np.concatenate([demo.truth.policy for demo in test if demo.truth is not None])
     spread = policy.uncertainty(states)
     known = spread.undetermined < spread.from_noise
     held = np.abs(truth - policy(states)) <= 1.96 * spread.total
-    return area_under_curve(solution.free, free), float(held[known].mean()) if known.any() else np.nan
+    return area_under_curve(policy.solution_.free, free), float(held[known].mean()) if known.any() else np.nan
 
 
 def area_under_curve(scores: Array, labels: Array) -> float:
@@ -291,7 +288,7 @@ def _is_free(demo: Demonstration) -> Array:
 
 def _oracle(policy: Policy, test: Sequence[Demonstration], count: int) -> tuple[float, float, float]:
     """The best point of the paper's path, one threshold for all models, chosen by the truth."""
-    whole = _whole(policy)
+    whole = policy.training_.folds.whole
     path = lexicographic_path(inconsistency(whole), standard_risk(whole))
     return _best(policy, test, [path.at(path.split(threshold)) for threshold in (0.0, *np.logspace(-10, 0, count))])
 
@@ -302,15 +299,13 @@ def _knowing(
     """The constrained error minimised with the true projections, beside as much of the risk as the truth says."""
     N = np.concatenate([demo.truth.projections for demo in training if demo.truth is not None])
     states, actions, _ = stack(training)
-    features, centring, d = policy._features(states), policy._centring(), actions.shape[1]
-    in_models = policy._weights(states)
-    members = np.ones((len(states), 1)) if in_models is None else in_models
+    model, d = policy.training_.model, actions.shape[1]
+    features, members = model.design(states), model.fields.weights(states)
 
     def along(direction: Array) -> Moments:
         """Moments with what is observed along one direction, each sample as far as its constraint leaves it."""
         weights = np.einsum("a,nab,b->n", direction, N, direction)
-        moments = gather(features, np.ones((len(states), 1)), np.maximum(weights, 0.0)[:, None] * members)
-        return moments if centring is None else moments.in_features(centring)
+        return _centred(model, gather(features, np.ones((len(states), 1)), np.maximum(weights, 0.0)[:, None] * members))
 
     axes = np.eye(d)
     alone = [along(axis).gram for axis in axes]
@@ -321,28 +316,26 @@ def _knowing(
         for b in range(a):  # weights must not be negative, and eᵀ N e is not
             mixed = 0.5 * (along(axes[a] + axes[b]).gram - alone[a] - alone[b])
             hessian[:, :, a, :, b] = hessian[:, :, b, :, a] = mixed
-    whole, seen = _whole(policy), gather(features, np.einsum("nab,nb->na", N, actions), members)
-    linear = vec((seen if centring is None else seen.in_features(centring)).cross)
+    whole = policy.training_.folds.whole
+    linear = vec(_centred(model, gather(features, np.einsum("nab,nb->na", N, actions), members)).cross)
     error = Quadratic(hessian.reshape(-1, p * d, p * d), linear, whole.energy)
     minima = softened_minima(error, standard_risk(whole), _SOFTNESSES)
     return _best(policy, test, [minima[..., k] for k in range(len(_SOFTNESSES))])
 
 
-def _whole(policy: Policy) -> Moments:
-    folds, centring = policy._folds, policy._centring()
-    return folds.whole if centring is None else folds.whole.in_features(centring)
+def _centred(model: Model, moments: Moments) -> Moments:
+    centring = model.centring
+    return moments if centring is None else moments.in_features(centring)
 
 
 def _best(policy: Policy, test: Sequence[Demonstration], found: Sequence[Array]) -> tuple[float, float, float]:
     """Errors of the weights (M, P), over ``T_m φ``, that are nearest to the truth."""
-    centring, d = policy._centring(), policy.n_outputs_
     states, truth = stack(test).states, np.concatenate([demo.truth.policy for demo in test if demo.truth is not None])
     judged = policy.with_learner(Direct())
     plain = best = judged.solution_
     least = np.inf
     for each in found:
-        weights = unvec(each, d)
-        judged.solution_ = replace(plain, weights=weights if centring is None else weights @ centring)
+        judged.solution_ = replace(plain, weights=unvec(each, policy.n_outputs_)).over(policy.training_.model)
         missed = float(((judged(states) - truth) ** 2).sum())
         if missed < least:
             best, least = judged.solution_, missed

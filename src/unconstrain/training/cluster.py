@@ -1,4 +1,4 @@
-"""Learning on many machines with dask: chunks to moments, and a tree of sums.
+"""Learning on many machines with dask: chunks to sums, and a tree of sums.
 
 Each chunk is looked at where it is; what is chosen from all first looks
 (features, fields, folds) is sent back; each chunk becomes moments, which
@@ -9,27 +9,28 @@ rounding. Needs the extra ``cluster``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from copy import copy
-from functools import reduce
+from collections.abc import Callable, Sequence
+from functools import partial, reduce
 from operator import add
-from typing import Any, TypeVar
+from typing import Any, Protocol, Self, TypeVar
 
-from sklearn.base import clone
-
-from .base.arrays import require_extra
-from .base.errors import InvalidDataError, SettingError
-from .learners import SampleLearner
-from .policies import Policy
-from .recordings import Batch, FirstLook
-from .training import FoldedMoments
-
-__all__ = ["FAN_IN", "check_learner", "connected", "fit", "fit_batches"]
+from ..base.arrays import require_extra
+from ..base.errors import InvalidDataError, SettingError
+from ..recordings import Batch
 
 FAN_IN = 8
 """So many results are added in one task."""
 
-P = TypeVar("P", bound=Policy)
+
+class Distributed(Protocol):
+    """What can be fitted to parts wherever they are: a policy."""
+
+    def fit_parts(self, parts: Sequence[Any], summed: Callable[..., Any]) -> Self:
+        """Learn from parts; ``summed(function, parts)`` is the sum of the function at each."""
+        ...
+
+
+P = TypeVar("P", bound=Distributed)
 
 
 def fit(
@@ -69,19 +70,6 @@ def fit(
     return fit_batches(policy, [delayed(_one_batch)(*row) for row in rows], client=client)
 
 
-def check_learner(policy: Policy) -> None:
-    """Refuse a learner that needs the samples.
-
-    Raises
-    ------
-    SettingError
-        If it does.
-    """
-    if isinstance(policy.learner, SampleLearner):
-        name = type(policy.learner).__name__
-        raise SettingError(f"learner: {name} needs the samples, and a cluster sends their sums alone. Take Hybrid().")
-
-
 def fit_batches(policy: P, parts: Sequence[Any], *, client: Any | None = None) -> P:
     """Fit a policy to parts that workers read for themselves.
 
@@ -99,7 +87,7 @@ def fit_batches(policy: P, parts: Sequence[Any], *, client: Any | None = None) -
     Returns
     -------
     Policy
-        The same, fitted.
+        The same, fitted; as it was, if anything fails.
 
     Raises
     ------
@@ -110,23 +98,8 @@ def fit_batches(policy: P, parts: Sequence[Any], *, client: Any | None = None) -
     MissingExtraError
         If dask is not installed.
     """
-    check_learner(policy)
     delayed = require_extra("dask", "cluster").delayed
-    if not parts:
-        raise InvalidDataError("got no part to learn from, expected at least one.")
-    plain = clone(policy)
-    wrapped = [delayed(part, traverse=False) for part in parts]
-    looks = [delayed(_look)(delayed(plain, traverse=False), part) for part in wrapped]
-    look, checked = _computed(_tree(delayed(_looks_added), looks), client)
-    policy._forget()
-    policy.__dict__.update(checked)
-    policy._begin(look, more=False)
-    begun = copy(policy)
-    del begun._folds  # zeros, which need not travel
-    sums = [delayed(_sum)(delayed(begun, traverse=False), part) for part in wrapped]
-    policy._folds = _computed(_tree(delayed(_added), sums), client)
-    policy._conclude()
-    return policy
+    return policy.fit_parts([delayed(part, traverse=False) for part in parts], partial(_summed, client))
 
 
 def connected(address: str, timeout_s: float = 10.0) -> Any:
@@ -148,27 +121,18 @@ def connected(address: str, timeout_s: float = 10.0) -> Any:
         ) from error
 
 
-_Checked = tuple[FirstLook | None, dict[str, Any]]
+def _summed(client: Any | None, function: Callable[[Any], Any], parts: Sequence[Any]) -> Any:
+    """Sum of a function at each part, in a tree of neighbours; both go to the workers."""
+    delayed = require_extra("dask", "cluster").delayed
+    carried = delayed(function, traverse=False, pure=False)
+    level = [carried(part) for part in parts]
+    while True:
+        level = [delayed(_added)(level[start : start + FAN_IN]) for start in range(0, len(level), FAN_IN)]
+        if len(level) == 1:
+            return level[0].compute() if client is None else client.compute(level[0]).result()
 
 
-def _look(policy: Policy, part: Iterable[Sequence[Any]]) -> _Checked:
-    """First look at a part, and what the policy noted when it checked it."""
-    fresh = clone(policy)
-    look = FirstLook.total(map(FirstLook.at, fresh._each_checked(part)))
-    return look, {name: value for name, value in vars(fresh).items() if name not in vars(policy)}
-
-
-def _looks_added(looks: Sequence[_Checked]) -> _Checked:
-    whole = FirstLook.total(look for look, _ in looks)
-    return whole, next((checked for look, checked in looks if look is not None), {})
-
-
-def _sum(begun: Policy, part: Iterable[Sequence[Any]]) -> FoldedMoments:
-    mine = copy(begun)
-    return mine._summed(mine._checked(*batch, reset=False) for batch in part)
-
-
-def _added(sums: Sequence[FoldedMoments]) -> FoldedMoments:
+def _added(sums: Sequence[Any]) -> Any:
     return reduce(add, sums)
 
 
@@ -185,16 +149,3 @@ def _by_rows(array: Any | None) -> list[Any] | None:
     whole = array if array.ndim == 1 else array.rechunk({1: -1})
     chunks: list[Any] = whole.to_delayed().ravel().tolist()
     return chunks
-
-
-def _tree(combine: Callable[[list[Any]], Any], parts: list[Any]) -> Any:
-    """Combine neighbours until one is left, in their order."""
-    level = parts
-    while True:
-        level = [combine(level[start : start + FAN_IN]) for start in range(0, len(level), FAN_IN)]
-        if len(level) == 1:
-            return level[0]
-
-
-def _computed(delayed: Any, client: Any | None) -> Any:
-    return delayed.compute() if client is None else client.compute(delayed).result()

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Protocol, runtime_checkable
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.arrays import Array
-from ...risks import Moments, Quadratic, gather
-from ...training import FoldedMoments
-from ..plain import Solution
+from ..base.arrays import Array
+from ..risks import Moments, Quadratic, gather
 
-__all__ = ["SampleLearner", "Samples"]
+_OF_MODELS = ("centring", "roughness")
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Samples as a policy sees them, in the order in which they were recorded.
+    """Samples as a policy sees them, demonstration by demonstration, each in the order in which it was recorded.
 
     Parameters
     ----------
+    states : ndarray, shape (N, n)
     features : ndarray, shape (N, p)
     actions : ndarray, shape (N, d)
     counts : ndarray, shape (N,)
@@ -38,8 +37,13 @@ class Samples:
         T_m, with which model m is solved in features ``T_m φ``, for the sake of rounding.
     roughness : ndarray, shape (M, p, p)
         Measures how rough each model's policy is, over ``T_m φ``; zero where nothing is said of it.
+    places : ndarray of int, shape (N,)
+        Where each sample is among all that were given.
+    times : ndarray, shape (N,), optional
+        Seconds, where they were given.
     """
 
+    states: Array
     features: Array
     actions: Array
     counts: Array
@@ -49,6 +53,8 @@ class Samples:
     folds: NDArray[np.intp]
     centring: Array
     roughness: Array
+    places: NDArray[np.intp]
+    times: Array | None = None
 
     def __len__(self) -> int:
         """Number of samples N."""
@@ -56,8 +62,9 @@ class Samples:
 
     def __getitem__(self, rows: slice | NDArray[np.intp] | NDArray[np.bool_]) -> Samples:
         """Some of them."""
-        per_sample = ("features", "actions", "counts", "memberships", "shares", "groups", "folds")
-        return replace(self, **{name: getattr(self, name)[rows] for name in per_sample})
+        per_sample = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in _OF_MODELS}
+        some: dict[str, Any] = {name: None if part is None else part[rows] for name, part in per_sample.items()}
+        return replace(self, **some)
 
     @property
     def sizes(self) -> Array:
@@ -94,15 +101,11 @@ class Samples:
         hessian = np.einsum("mij,kl->mikjl", gram, np.eye(d)).reshape(-1, p * d, p * d)
         return Quadratic(hessian, linear, counted.T @ (targets**2).sum(axis=1))
 
+    @property
+    def counted(self) -> Samples:
+        """Those of some weight."""
+        return self if self.counts.all() else self[self.counts > 0.0]
+
     def by_fold(self) -> list[Samples]:
         """What is held out together."""
         return [self[self.folds == fold] for fold in range(int(self.folds.max()) + 1)]
-
-
-@runtime_checkable
-class SampleLearner(Protocol):
-    """A learner that needs the samples, not only their moments."""
-
-    def learn(self, samples: Samples, folds: FoldedMoments) -> Solution:
-        """Learn from all of them; ``folds`` are their moments over ``T_m φ``, the solution's weights are over φ."""
-        ...

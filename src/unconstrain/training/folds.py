@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable
-from dataclasses import dataclass
-from itertools import accumulate
-from operator import add
+from collections.abc import Hashable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -13,10 +11,8 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array, check_at_least
 from ..base.errors import SettingError
-from ..recordings import FirstLook, Groups, in_order, mixed
-from ..risks import Moments, total
-
-__all__ = ["FoldedMoments", "Folds", "HeldOut", "Splitter", "Validation"]
+from ..recordings import Groups
+from .first_look import FirstLook, in_order, mixed
 
 Unit = Literal["auto", "demonstration", "sample"]
 
@@ -105,8 +101,9 @@ class HeldOut:
 Validation = Folds | HeldOut
 
 
-class Splitter:
-    """Assigns samples to folds as they arrive, so that one pass over any stream is enough.
+@dataclass(frozen=True, eq=False)
+class Split:
+    """Which fold each sample is in, decided as samples arrive, so that one pass over any stream is enough.
 
     A demonstration's fold depends on the order in which demonstrations are
     first seen. A sample's fold is a hash of its state, to a thousandth of the
@@ -116,34 +113,49 @@ class Splitter:
     Parameters
     ----------
     validation : Folds or HeldOut
-    look : FirstLook
-        At everything, or at the first batch. Fixes the spread and what "auto"
-        means, and deals the demonstrations in it.
-    more : bool
-        Whether further batches may come. Then a single demonstration is the
-        first of several.
+    by : {"demonstration", "sample"}
+        What stays together.
+    origin, scale : ndarray, shape (n,)
+        A state in the midst of those at first look, and how far they spread.
+    fold_of : mapping
+        Fold of each demonstration seen so far, by name.
     """
 
-    def __init__(self, validation: Validation, look: FirstLook, more: bool = False) -> None:
-        self.validation = validation
+    validation: Validation
+    by: Literal["demonstration", "sample"]
+    origin: Array
+    scale: Array
+    fold_of: Mapping[Hashable, int] = field(default_factory=dict)
+
+    @classmethod
+    def begin(cls, validation: Validation, look: FirstLook, more: bool = False) -> Split:
+        """Deal the demonstrations seen at first look.
+
+        Parameters
+        ----------
+        validation : Folds or HeldOut
+        look : FirstLook
+            At everything, or at the first batch. Fixes the spread and what "auto" means.
+        more : bool
+            Whether further batches may come. Then a single demonstration is the first of several.
+        """
         several = look.groups is not None and (more or len(look.groups) > 1)
-        automatic: Unit = "demonstration" if several else "sample"
-        self.by = automatic if validation.by == "auto" else validation.by
-        self._origin, size = look.mean, look.size
+        automatic: Literal["demonstration", "sample"] = "demonstration" if several else "sample"
+        by = automatic if validation.by == "auto" else validation.by
         spread = np.sqrt(look.scatter / look.weight)
         # A coordinate that has not moved yet may do so later; its size is all that is known of it.
-        self._scale = np.where(spread > 1e-9 * size, spread, np.where(size > 0, size, 1.0))
-        self._fold_of: dict[Hashable, int] = {}
-        if self.by == "demonstration":
-            self._deal(look.groups or ())
+        scale = np.where(spread > 1e-9 * look.size, spread, np.where(look.size > 0, look.size, 1.0))
+        split = cls(validation, by, look.mean, scale)
+        return split.dealing(look.groups or ()) if by == "demonstration" else split
 
-    @property
-    def typical(self) -> Array:
-        """A state in the midst of those at first look, shape (n,)."""
-        return self._origin
+    def dealing(self, names: Iterable[Hashable]) -> Split:
+        """With further demonstrations dealt, in their order; those that are known keep their fold."""
+        further = dict.fromkeys(name for name in names if name not in self.fold_of)
+        dealt = {name: self.validation.deal_in_turn(place) for place, name in enumerate(further, len(self.fold_of))}
+        return replace(self, fold_of={**self.fold_of, **dealt}) if dealt else self
 
-    def assign(self, states: Array, groups: Groups | None) -> NDArray[np.intp]:
-        """Folds of some samples, shape (N,).
+    def seeing(self, groups: Groups | None) -> Split:
+        """With the demonstrations of some samples dealt.
 
         Raises
         ------
@@ -151,66 +163,19 @@ class Splitter:
             If demonstrations are to be held out and ``groups`` does not name them.
         """
         if self.by == "sample":
-            return self.validation.deal(_scatter((states - self._origin) / self._scale, self.validation.seed))
+            return self
         if groups is None:
             raise SettingError(
                 "validation by demonstration: expected groups=, one name or number for each sample, in every batch."
             )
-        self._deal(in_order(groups))
+        return self.dealing(in_order(groups))
+
+    def assign(self, states: Array, groups: Groups | None) -> NDArray[np.intp]:
+        """Folds of some samples, shape (N,), whose demonstrations have been seen."""
+        if self.by == "sample":
+            return self.validation.deal(_scatter((states - self.origin) / self.scale, self.validation.seed))
         names, places = np.unique(np.asarray(groups), return_inverse=True)
-        return np.array([self._fold_of[name] for name in names.tolist()], dtype=np.intp)[places]
-
-    def _deal(self, names: Iterable[Hashable]) -> None:
-        for name in names:
-            if name not in self._fold_of:
-                self._fold_of[name] = self.validation.deal_in_turn(len(self._fold_of))
-
-
-@dataclass(frozen=True, eq=False)
-class FoldedMoments:
-    """Moments of each fold, from a single pass over the data.
-
-    Parameters
-    ----------
-    parts : tuple of Moments
-        One for each fold, all of the same shape.
-    held_out : range
-        Which of them are held out, one after the other.
-    """
-
-    parts: tuple[Moments, ...]
-    held_out: range
-
-    @property
-    def whole(self) -> Moments:
-        """Moments of everything."""
-        return total(self.parts)
-
-    @property
-    def filled(self) -> list[int]:
-        """Indices of the parts that hold anything."""
-        return [i for i, part in enumerate(self.parts) if part.weight.any()]
-
-    def rounds(self) -> list[tuple[Moments, Moments]]:
-        """Pairs of training and held-out moments; empty if nothing can be held out."""
-        filled = self.filled
-        if len(filled) < 2:
-            return []
-        # Everything but one from the sums before and after it: subtracting would leave rounding behind.
-        before = list(accumulate(self.parts[i] for i in filled[:-1]))
-        after = list(accumulate(self.parts[i] for i in reversed(filled[1:])))[::-1]
-        others = [after[0], *map(add, before[:-1], after[1:]), before[-1]]
-        return [(rest, self.parts[i]) for rest, i in zip(others, filled, strict=True) if i in self.held_out]
-
-    def in_features(self, change: Array) -> FoldedMoments:
-        """Change the features of every part; see :meth:`Moments.in_features`."""
-        return FoldedMoments(tuple(part.in_features(change) for part in self.parts), self.held_out)
-
-    def __add__(self, other: FoldedMoments) -> FoldedMoments:
-        """Add, fold by fold."""
-        return FoldedMoments(
-            tuple(mine + theirs for mine, theirs in zip(self.parts, other.parts, strict=True)), self.held_out
-        )
+        return np.array([self.fold_of[name] for name in names.tolist()], dtype=np.intp)[places]
 
 
 def _check_unit(by: str) -> None:

@@ -1,0 +1,26 @@
+"""Ordinary regression on what was observed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..risks import SECONDARY_NOISE, eigensystem, minimum, standard_risk, unvec
+from ..training import Training
+from .learner import Learner
+from .solution import Solution
+
+
+@dataclass(frozen=True)
+class Direct(Learner):
+    """Minimise the standard risk alone: ordinary regression on what was observed (eq. 5)."""
+
+    def learn(self, training: Training) -> Solution:
+        """Learn from the whole; nothing is left to choose."""
+        whole = training.folds.whole
+        models, d, p = whole.cross.shape
+        spectrum, _ = eigensystem(whole.gram)
+        rank = (spectrum > SECONDARY_NOISE * spectrum[:, -1:]).sum(axis=1)
+        weights = unvec(minimum(standard_risk(whole)), d)
+        return Solution(weights, d * rank, d * p, np.zeros(models), method="direct")

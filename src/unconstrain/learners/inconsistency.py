@@ -1,0 +1,42 @@
+"""The distance after projection onto each recorded action."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..risks import Moments, Path, inconsistency, lexicographic_path
+from ..training import Training
+from .learner import Learner
+from .solution import Solution
+from .thresholds import Averaging, check_settings, solve_at_threshold
+
+
+@dataclass(frozen=True)
+class Inconsistency(Learner):
+    """Minimise the inconsistency alone (eqs 4, 7 and 14, 15).
+
+    Parameters
+    ----------
+    threshold : float, optional
+        Eigenvalues up to this share of the largest are left out and their
+        directions stay zero. 0 leaves out rounding noise only. None chooses
+        by the inconsistency on held-out data.
+    averaging
+        See :class:`Hybrid`.
+    """
+
+    threshold: float | None = 0.0
+    averaging: Averaging = "geometric"
+
+    def __post_init__(self) -> None:
+        check_settings(self.threshold, self.averaging)
+
+    def learn(self, training: Training) -> Solution:
+        """Learn from the whole, at a threshold chosen on the folds."""
+        return solve_at_threshold(
+            training.folds, _path, inconsistency, self.threshold, self.averaging, method="inconsistency"
+        )
+
+
+def _path(moments: Moments) -> Path:
+    return lexicographic_path(inconsistency(moments))

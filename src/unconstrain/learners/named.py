@@ -1,0 +1,37 @@
+"""Learners by name."""
+
+from __future__ import annotations
+
+from ..base.errors import SettingError
+from .direct import Direct
+from .hybrid import Hybrid
+from .inconsistency import Inconsistency
+from .learner import Learner
+from .robust import Robust
+
+BY_NAME: dict[str, type[Learner]] = {
+    "robust": Robust,
+    "hybrid": Hybrid,
+    "inconsistency": Inconsistency,
+    "direct": Direct,
+}
+
+
+def named(learner: Learner | str | None) -> Learner:
+    """The learner itself, or one with its default settings by name; :class:`~unconstrain.Hybrid` for None.
+
+    Raises
+    ------
+    SettingError
+        If it is neither.
+    """
+    if learner is None:
+        return Hybrid()
+    if isinstance(learner, str) and learner in BY_NAME:
+        return BY_NAME[learner]()
+    if not callable(getattr(learner, "learn", None)):
+        raise SettingError(
+            f"learner: got {learner!r}, expected one of {', '.join(map(repr, BY_NAME))}, or an object with a method "
+            "learn(training) such as Hybrid()."
+        )
+    return learner  # type: ignore[return-value]

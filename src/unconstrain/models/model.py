@@ -1,0 +1,95 @@
+"""What a policy is made of, without what was learnt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.arrays import Array, as_matrix
+from ..base.errors import SettingError
+from .features import FeatureMap
+from .formula import ClosedForm
+from .receptive_fields import Everywhere, ReceptiveFields
+
+__all__ = ["Model"]
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """M models on common features, averaged by their fields: ``π̃(x) = Σ_m s_m(x) W_m φ(x)``.
+
+    A parametric policy (section III-C) has M = 1 and a field that is 1
+    everywhere; a locally linear one (section III-D) has affine features.
+
+    Parameters
+    ----------
+    features : FeatureMap
+        φ, states (N, n) to features (N, p).
+    fields : ReceptiveFields or Everywhere
+        Where each of the M models counts.
+    """
+
+    features: FeatureMap
+    fields: ReceptiveFields | Everywhere
+
+    def design(self, states: Array) -> Array:
+        """Features of states (N, n), finite, shape (N, p).
+
+        Raises
+        ------
+        SettingError
+            If the features are not of that shape.
+        """
+        features = self.features(states)
+        if np.ndim(features) != 2 or np.shape(features)[0] != states.shape[0]:
+            raise SettingError(
+                f"features: got an array of shape {tuple(np.shape(features))} for {states.shape[0]} states, "
+                "expected (samples, features)."
+            )
+        return as_matrix(features, "features")
+
+    def predict(self, weights: Array, states: Array) -> Array:
+        """Predict with weights (M, d, p) at states (N, n), shape (N, d)."""
+        return self.fields.blend(self.design(states), weights, states)
+
+    def support(self, states: Array) -> Array:
+        """How near to the data each state is, from 1 to 0, shape (N,).
+
+        Raises
+        ------
+        SettingError
+            If neither fields nor features have a place in state space.
+        """
+        measure = getattr(self.fields, "support", None) or getattr(self.features, "support", None)
+        if measure is None:
+            raise SettingError(f"support: {type(self.features).__name__} does not say where its data was.")
+        return np.asarray(measure(states))
+
+    @property
+    def centring(self) -> Array | None:
+        """``T_m`` (M, p, p): model m is solved on features ``T_m φ``, for the sake of rounding; None for φ itself."""
+        return self.fields.centring(self.features)
+
+    def roughness(self, models: int, size: int) -> Array:
+        """``R_m`` (M, p, p): ``wᵀ R_m w`` tells how rough a policy of weights w is; zero where it is not known."""
+        measure = getattr(self.features, "roughness", None)
+        return np.zeros((models, size, size)) if measure is None else measure()[None]
+
+    def formula(self, weights: Array) -> ClosedForm:
+        """The policy of weights (M, d, p) as one formula: what is exported, and what other targets are made from.
+
+        Raises
+        ------
+        SettingError
+            If the features are a callable that does not say its formula.
+        """
+        form = self.fields.formula(self.features, weights)
+        if form is None:
+            name = getattr(self.features, "__name__", type(self.features).__name__)
+            raise SettingError(
+                f"cannot export a policy on the features {name}: they are Python code. Can be exported are locally "
+                "linear policies, and parametric ones on Affine, NormalisedRBF or KMeansRBF features, or on features "
+                "that offer closed_form(weights) -> unconstrain.ClosedForm."
+            )
+        return form

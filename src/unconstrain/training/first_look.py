@@ -1,0 +1,167 @@
+"""The little that has to be known of all samples before the first is summed."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import Array, on_host
+from ..base.errors import InvalidDataError
+from ..recordings import Batch, Groups
+
+PLACING_SAMPLES = 20_000
+"""Features and fields are placed on at most this many different states."""
+
+_ALL = np.uint64(2**64 - 1)
+
+
+@dataclass(frozen=True, eq=False)
+class FirstLook:
+    """What features, fields and folds are chosen by. First looks add, in the order of the samples.
+
+    Parameters
+    ----------
+    weight : float
+        ``Σ w``.
+    mean, scatter : ndarray, shape (n,)
+        Weighted mean of the states, and ``Σ w (x − mean)²``.
+    size : ndarray, shape (n,)
+        Largest absolute value of each state.
+    actions : int
+        Dimension d of the actions.
+    fastest : float
+        Largest absolute value in the actions.
+    keys : ndarray of uint64, shape (K,)
+        Hashes of different states, ascending: the smallest of all, at most :data:`PLACING_SAMPLES`.
+        So the choice depends neither on the order of the samples nor on how they come in batches.
+    states : ndarray, shape (K, n)
+        Those states.
+    groups : dict, optional
+        Names of the demonstrations, in the order of first appearance.
+    """
+
+    weight: float
+    mean: Array
+    scatter: Array
+    size: Array
+    actions: int
+    fastest: float
+    keys: NDArray[np.uint64]
+    states: Array
+    groups: dict[Hashable, None] | None
+
+    @property
+    def is_typical(self) -> bool:
+        """Whether enough different states were seen, and so a spread, to place features and deal folds by: n + 2."""
+        return len(self.keys) > len(self.mean) + 1
+
+    @property
+    def different(self) -> Array:
+        """Its states in a fixed order: repetition and order of the samples must not move the features."""
+        return np.unique(self.states, axis=0)
+
+    @classmethod
+    def at(cls, batch: Batch) -> FirstLook | None:
+        """Look at a batch; None if it is empty but for samples of no weight."""
+        look: FirstLook | None = None
+        for block in batch.blocks():
+            full = look is not None and len(look.keys) == PLACING_SAMPLES
+            further = cls._at_block(block, look.keys[-1] if look is not None and full else _ALL)
+            look = further if look is None else look + further
+        return look
+
+    @classmethod
+    def _at_block(cls, block: Batch, largest_key: np.uint64) -> FirstLook:
+        states, actions, weights, groups = on_host(block.states), on_host(block.actions), block.weights, block.groups
+        counts = np.ones(len(states)) if weights is None else weights
+        weight = float(counts.sum())
+        columns, shares = np.ascontiguousarray(states.T), counts / weight  # sums along memory are fast
+        mean = (shares * columns).sum(axis=1)
+        keys = mixed((columns + 0.0).view(np.uint64), 0)
+        keys, first = _smallest(keys, largest_key)
+        return cls(
+            weight,
+            mean,
+            weight * (shares * (columns - mean[:, None]) ** 2).sum(axis=1),
+            np.abs(columns).max(axis=1),
+            actions.shape[1],
+            float(np.abs(actions).max()),
+            keys,
+            states[first],
+            None if groups is None else dict.fromkeys(in_order(groups)),
+        )
+
+    def __add__(self, other: FirstLook) -> FirstLook:
+        """Look at both, this one first.
+
+        Raises
+        ------
+        InvalidDataError
+            If they differ in the number of columns, or only one names its demonstrations.
+        """
+        for what, mine, theirs in (
+            ("states", len(self.mean), len(other.mean)),
+            ("actions", self.actions, other.actions),
+        ):
+            if mine != theirs:
+                raise InvalidDataError(f"{what}: got {theirs} columns, expected {mine} as before.")
+        if (self.groups is None) != (other.groups is None):
+            raise InvalidDataError("groups: got them for some batches only, expected them for all or for none.")
+        weight = self.weight + other.weight
+        gap, share = other.mean - self.mean, other.weight / weight
+        keys, first = np.unique(np.concatenate([self.keys, other.keys]), return_index=True)
+        first = first[:PLACING_SAMPLES]
+        return FirstLook(
+            weight,
+            self.mean + share * gap,
+            self.scatter + other.scatter + self.weight * share * gap**2,
+            np.maximum(self.size, other.size),
+            self.actions,
+            max(self.fastest, other.fastest),
+            keys[:PLACING_SAMPLES],
+            np.concatenate([self.states, other.states])[first],
+            None if self.groups is None else self.groups | (other.groups or {}),
+        )
+
+    @staticmethod
+    def total(looks: Iterable[FirstLook | None]) -> FirstLook | None:
+        """Sum of several, in their order; None if nothing was seen."""
+        whole: FirstLook | None = None
+        for look in looks:
+            whole = look if whole is None else whole if look is None else whole + look
+        return whole
+
+
+def _smallest(keys: NDArray[np.uint64], largest: np.uint64) -> tuple[NDArray[np.uint64], NDArray[np.intp]]:
+    """The smallest different keys, ascending, and where each is first; finding them is faster than sorting all."""
+    low = np.flatnonzero(keys <= largest)
+    few = low
+    if len(low) > 2 * PLACING_SAMPLES:
+        few = low[keys[low] <= np.partition(keys[low], PLACING_SAMPLES)[PLACING_SAMPLES]]
+    for places in (few, low):
+        different, first = np.unique(keys[places], return_index=True)
+        if len(different) >= PLACING_SAMPLES or len(places) == len(low):
+            break  # or else many of the few are equal
+    return different[:PLACING_SAMPLES], places[first[:PLACING_SAMPLES]]
+
+
+def in_order(names: Groups) -> list[Hashable]:
+    """Different names in the order of first appearance."""
+    different, first = np.unique(np.asarray(names), return_index=True)
+    ordered: list[Hashable] = different[np.argsort(first)].tolist()
+    return ordered
+
+
+def mixed(columns: NDArray[np.uint64], seed: int) -> NDArray[np.uint64]:
+    """A hash for each row of a table, given by columns (k, N): SplitMix64's finaliser, shape (N,)."""
+    hashes = np.full(columns.shape[1], seed % 2**32 + 1, dtype=np.uint64)
+    with np.errstate(over="ignore"):
+        for column in columns:
+            hashes = (hashes ^ column) * np.uint64(0x9E3779B97F4A7C15)
+            hashes = (hashes ^ (hashes >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+            hashes = (hashes ^ (hashes >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+            hashes ^= hashes >> np.uint64(31)
+    return hashes

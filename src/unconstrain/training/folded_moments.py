@@ -1,0 +1,57 @@
+"""Moments of each fold, and which of them are held out in turn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import accumulate
+from operator import add
+
+from ..base.arrays import Array
+from ..risks import Moments, total
+
+
+@dataclass(frozen=True, eq=False)
+class FoldedMoments:
+    """Moments of each fold, from a single pass over the data.
+
+    Parameters
+    ----------
+    parts : tuple of Moments
+        One for each fold, all of the same shape; none before the first sample.
+    held_out : range
+        Which of them are held out, one after the other.
+    """
+
+    parts: tuple[Moments, ...]
+    held_out: range
+
+    @property
+    def whole(self) -> Moments:
+        """Moments of everything."""
+        return total(self.parts)
+
+    @property
+    def filled(self) -> list[int]:
+        """Indices of the parts that hold anything."""
+        return [i for i, part in enumerate(self.parts) if part.weight.any()]
+
+    def rounds(self) -> list[tuple[Moments, Moments]]:
+        """Pairs of training and held-out moments; empty if nothing can be held out."""
+        filled = self.filled
+        if len(filled) < 2:
+            return []
+        # Everything but one from the sums before and after it: subtracting would leave rounding behind.
+        before = list(accumulate(self.parts[i] for i in filled[:-1]))
+        after = list(accumulate(self.parts[i] for i in reversed(filled[1:])))[::-1]
+        others = [after[0], *map(add, before[:-1], after[1:]), before[-1]]
+        return [(rest, self.parts[i]) for rest, i in zip(others, filled, strict=True) if i in self.held_out]
+
+    def in_features(self, change: Array) -> FoldedMoments:
+        """Change the features of every part; see :meth:`Moments.in_features`."""
+        return replace(self, parts=tuple(part.in_features(change) for part in self.parts))
+
+    def __add__(self, other: FoldedMoments) -> FoldedMoments:
+        """Add, fold by fold."""
+        if not self.parts:
+            return other
+        return replace(self, parts=tuple(mine + theirs for mine, theirs in zip(self.parts, other.parts, strict=True)))
