@@ -1,4 +1,4 @@
-"""What a policy is made of: features, receptive fields, and the fitted policy as one formula."""
+"""What a policy is made of: features, receptive fields, its formula."""
 
 from .closed_form import ClosedForm, exponents
 from .features import Affine, FeatureMap, KMeansRBF, NormalisedRBF, Placeable
