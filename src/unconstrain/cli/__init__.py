@@ -142,13 +142,13 @@ def fit(
     """
     from .. import storage
     from ..recordings import expand
-    from ..training import validation
+    from ..training import Folds
 
     paths = expand(files)
     check_writable((output, report), paths)
     learner = learner or default_learner(paths, scheduler, alpha, softness, speed_power)
     check_speed_power(learner, speed_power)
-    chosen = {"learner": learner_of(learner, alpha, softness), "validation": validation.Folds(folds, hold_out)}
+    chosen = {"learner": learner_of(learner, alpha, softness), "validation": Folds(folds, hold_out)}
     fitted = policy_of(model, variance, centres, **chosen)
     stream = stream_of(paths, speed_power, **reading)
     learn(fitted, stream, scheduler)
@@ -216,14 +216,13 @@ def rollout(
     policy: str, start: tuple[float, ...], steps: int, dt: float, plane: tuple[float, ...] | None, output: str
 ) -> None:
     """Follow POLICY, freely or on a plane, and write it as CSV."""
-    from .. import storage
-    from ..motion import rollouts
+    from .. import motion, storage
 
     learnt, recipe = _fitted(policy), storage.load_notes(policy).get("recipe", {})
     if len(start) != learnt.n_features_in_:
         raise SettingError(f"--start: got {len(start)} numbers, expected {learnt.n_features_in_}, one for each state.")
     constraint = _plane(plane, len(start), "as many as states")
-    path = rollouts.rollout(learnt, list(start), steps, dt, constraint)
+    path = motion.rollout(learnt, list(start), steps, dt, constraint)
     states = recipe.get("states") or [f"x{i + 1}" for i in range(len(start))]
     try:
         support = learnt.support(path.states)
