@@ -216,4 +216,4 @@ def test_our_rooms_do_not_import_each_other_in_a_circle(ours):
 
 
 def test_our_rooms_each_say_what_they_are_for(ours):
-    assert all(0 < len(ours.caption(room)) <= 80 for room in ours.rooms)
+    assert all(0 < len(ours.caption(room)) <= 100 for room in ours.rooms)
