@@ -9,7 +9,7 @@ DEV_STAMP := $(VENV)/.installed-dev
 DEMO_DIR := build/demo
 DOCS_DIR := build/docs
 
-.PHONY: help demo test check docs bench bench-gpu clean
+.PHONY: help demo test check house docs bench bench-gpu clean
 .DELETE_ON_ERROR:
 
 help: ## show this list
@@ -29,6 +29,9 @@ check: $(DEV_STAMP) ## lint, formatting, types, import order
 	@failed=0; for tool in "ruff check ." "ruff format --check ." mypy "lint-imports --no-logo"; do \
 		echo "==> $$tool"; $(BIN)/$$tool || failed=1; \
 	done; exit $$failed
+
+house: $(DEV_STAMP) ## print the plan of the rooms and its figures; HOUSE=--walk or HOUSE=--list for more
+	@$(BIN)/python scripts/house.py $(HOUSE)
 
 docs: $(DEV_STAMP) ## build the documentation; warnings are errors
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs $(DOCS_DIR)

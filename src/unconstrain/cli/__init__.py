@@ -216,14 +216,13 @@ def rollout(
     policy: str, start: tuple[float, ...], steps: int, dt: float, plane: tuple[float, ...] | None, output: str
 ) -> None:
     """Follow POLICY, freely or on a plane, and write it as CSV."""
-    from .. import storage
-    from ..motion import rollouts
+    from .. import motion, storage
 
     learnt, recipe = _fitted(policy), storage.load_notes(policy).get("recipe", {})
     if len(start) != learnt.n_features_in_:
         raise SettingError(f"--start: got {len(start)} numbers, expected {learnt.n_features_in_}, one for each state.")
     constraint = _plane(plane, len(start), "as many as states")
-    path = rollouts.rollout(learnt, list(start), steps, dt, constraint)
+    path = motion.rollout(learnt, list(start), steps, dt, constraint)
     states = recipe.get("states") or [f"x{i + 1}" for i in range(len(start))]
     try:
         support = learnt.support(path.states)

@@ -41,7 +41,7 @@ def diagnose(
 
     How much noise there is, where the constraints varied too little, and which demonstrations look free.
     """
-    from ..evaluation import diagnosis
+    from .. import evaluation
     from ..learners import Robust
     from ..recordings import expand, prepare
 
@@ -51,7 +51,7 @@ def diagnose(
     recipe = complete(recipe_of(**reading), recordings[0])
     demonstrations = prepare(recordings, recipe)
     policy = policy_of(model, variance, centres, learner=Robust()).fit_demonstrations(demonstrations)
-    found = diagnosis.diagnose(policy, demonstrations)
+    found = evaluation.diagnose(policy, demonstrations)
     states = recipe.states or ()
     actions = recipe.actions or tuple(f"v{name}" for name in states)
     if as_json:

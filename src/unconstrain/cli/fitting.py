@@ -92,14 +92,14 @@ def check_writable(outputs: Sequence[str | None], paths: Sequence[str | Path]) -
 def policy_of(model: str, variance: float | None, centres: int | None, **chosen: Any) -> Policy:
     """Make the policy that the options say."""
     from .. import policies
-    from ..models import features
+    from ..models import Affine, KMeansRBF
 
     for option, value, needed in (("--variance", variance, "local"), ("--centres", centres, "rbf")):
         if value is not None and model != needed:
             raise SettingError(f"{option}: belongs to --model {needed}, got --model {model}.")
     if model == "local":
         return policies.LocallyLinearPolicy(variance, **chosen)
-    shape = features.KMeansRBF(centres or 25) if model == "rbf" else features.Affine()
+    shape = KMeansRBF(centres or 25) if model == "rbf" else Affine()
     return policies.ParametricPolicy(shape, **chosen)
 
 

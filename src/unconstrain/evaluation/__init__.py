@@ -1,4 +1,4 @@
-"""How good a policy is: errors against the truth, and what the data leaves unknown."""
+"""How good a policy is, and what the data leaves unknown."""
 
 from .diagnosis import CONSTRAINED, FREE, SMALL, Diagnosis, diagnose, named, sentences
 from .metrics import cpe, inconsistency, ncpe, ninconsistency, nupe, upe

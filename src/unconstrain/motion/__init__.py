@@ -1,4 +1,4 @@
-"""A policy in motion: roll-outs under constraints, and keeping near the data."""
+"""A policy in motion: roll-outs, and keeping near the data."""
 
 from .containment import Contained
 from .rollouts import rollout

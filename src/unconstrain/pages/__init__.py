@@ -1,4 +1,4 @@
-"""What a person looks at: pages that need no network, and the figures in them."""
+"""What a person looks at: pages and their figures. None needs a network."""
 
 import lazy_loader
 

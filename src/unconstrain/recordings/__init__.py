@@ -1,4 +1,4 @@
-"""From files to demonstrations: readers, preparation, and batches of what does not fit into memory."""
+"""From files to demonstrations: readers, preparation, batches."""
 
 from .batches import Batch, Groups
 from .demonstration import Demonstration, Recording, Truth, stack, times_of

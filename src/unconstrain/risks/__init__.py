@@ -1,4 +1,4 @@
-"""The mathematics: projections, moments, objectives as quadratics, and their minima in order of importance."""
+"""The mathematics: projections, moments, quadratics and their minima."""
 
 from .moments import Moments, Sums, gather, total
 from .objectives import inconsistency, standard_risk, unvec, vec
