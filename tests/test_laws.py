@@ -9,7 +9,7 @@ from sklearn.base import clone
 
 import naive
 import unconstrain as uc
-from samples import draw, rotation
+from samples import draw, rotation, seen
 from unconstrain.risks.moments import Moments, gather
 from unconstrain.risks.objectives import inconsistency, standard_risk
 from unconstrain.risks.quadratic import lexicographic_path

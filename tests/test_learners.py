@@ -89,11 +89,11 @@ def test_among_equal_scores_most_is_left_to_the_standard_risk():
 
 def test_a_direction_that_no_held_out_sample_sees_is_left_to_the_standard_risk():
     axes = np.array([[1.0, 0.0], [0.0, 1.0]])
-    seen = gather(np.tile([[1.0, 0.0]], (2, 1)), axes)
-    unseen = gather(np.tile([[0.0, 1.0]], (2, 1)), axes)
+    known = gather(np.tile([[1.0, 0.0]], (2, 1)), axes)
+    further = gather(np.tile([[0.0, 1.0]], (2, 1)), axes)
     for averaging in AVERAGES:
         solution = Hybrid(alpha=0.0, averaging=averaging).learn(
-            seen(FoldedMoments((seen, 4 * seen + unseen), range(1)))
+            seen(FoldedMoments((known, 4 * known + further), range(1)))
         )
         assert solution.scores[0, 0] == solution.scores[0, 1] == solution.scores[0, 2] < solution.scores[0, 3]
         assert_array_equal(solution.determined, [2])

@@ -44,9 +44,32 @@ def test_sums_and_multiples_are_those_of_the_values():
     assert_allclose((two * 0.5)(w), (0.5 * two)(w))
 
 
-def test_what_rounding_leaves_below_zero_is_cut_off():
+def test_a_value_below_zero_is_told_and_judged_as_zero():
     quadratic = Quadratic(np.ones((1, 1, 1)), np.ones((1, 1)), np.array([1.0 - 1e-15]))
-    assert quadratic(np.ones((1, 1))) == [0.0]
+    assert -2e-15 < quadratic(np.ones((1, 1)))[0] < 0.0
+    assert judged(quadratic, np.ones((1, 1))) == [0.0]
+
+
+def test_a_quadratic_scales_and_adds_with_all_it_carries():
+    rng = np.random.default_rng(0)
+    gram = rng.standard_normal((2, 3, 3))
+    gram = gram @ gram.mT
+    hessian = np.stack([np.kron(one, np.eye(2)) for one in gram])
+    with_gram = Quadratic(hessian, rng.standard_normal((2, 6)), np.ones(2), gram)
+    without = Quadratic(hessian, with_gram.linear, with_gram.constant)
+    vectors, factors = rng.standard_normal((2, 6, 4)), np.array([0.5, 3.0])
+    for made, expected in ((factors * with_gram, factors[:, None, None] * hessian), (with_gram * 2.0, 2.0 * hessian)):
+        assert made.gram is not None
+        assert_allclose(made.times(vectors), expected @ vectors)
+        assert_allclose(made(vectors), made.constant[:, None] + _by_hand(made, vectors))
+    both = with_gram + factors * with_gram
+    assert_allclose(both.times(vectors), (1.0 + factors)[:, None, None] * (hessian @ vectors))
+    assert (with_gram + without).gram is None
+
+
+def _by_hand(quadratic, vectors):
+    bent = np.einsum("mik,mij,mjk->mk", vectors, quadratic.hessian, vectors)
+    return bent - 2.0 * np.einsum("mi,mik->mk", quadratic.linear, vectors)
 
 
 def test_a_value_that_overflows_is_judged_worse_than_all():

@@ -1,5 +1,7 @@
 """Learners that look at the samples."""
 
+import pickle
+from copy import copy, deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -58,7 +60,7 @@ def test_smooth_policies_are_nearer_to_the_truth_under_noise(monkeypatch):
     found = {}
     for smooth in (True, False):
         if not smooth:
-            monkeypatch.setattr(uc.ParametricPolicy, "_roughness", lambda policy: None)
+            monkeypatch.delattr(uc.NormalisedRBF, "roughness")
         for seed in (4201, 4202, 4203):
             training, test = recorded("pendulum", "half", 0.05, seed)
             policy = on_grid(uc.Robust()).fit_demonstrations(training)
@@ -86,9 +88,9 @@ def test_half_free_half_constrained_is_told_apart():
 def test_what_it_chose_from_is_kept():
     training, _ = recorded(noise=0.0)
     solution = on_grid(uc.Robust()).fit_demonstrations(training).solution_
-    assert solution.candidates.keys() == solution.compared.keys() == {"noise-corrected", "likelihood"}
+    assert solution.candidates.keys() == solution.belief.compared.keys() == {"noise-corrected", "likelihood"}
     assert_array_equal(solution.weights, solution.candidates[solution.method])
-    assert not solution.refuted
+    assert not solution.belief.refuted
 
 
 def test_where_constraints_are_a_function_of_the_state_consistency_is_taken():
@@ -351,12 +353,54 @@ def test_a_buffer_that_is_used_again_does_no_harm():
     assert_array_equal(buffered.predict(data.states), plain.predict(data.states))
 
 
-def test_samples_that_were_not_kept_in_between_are_missed():
+def test_samples_that_were_kept_once_are_kept_whatever_learns_in_between():
     data = draw(samples=120)
     policy = uc.ParametricPolicy(uc.Affine(), uc.Robust()).fit(data.states, data.actions, groups=data.groups)
     hybrid = policy.with_learner(uc.Hybrid()).partial_fit(data.states, data.actions, groups=data.groups)
+    assert len(hybrid.with_learner(uc.Robust()).solution_.free) == 240
+
+
+def test_samples_that_were_never_kept_are_missed():
+    data = draw(samples=120)
+    policy = uc.ParametricPolicy(uc.Affine(), uc.Hybrid()).fit(data.states, data.actions, groups=data.groups)
     with pytest.raises(uc.UnconstrainError, match="sums alone"):
-        hybrid.with_learner(uc.Robust())
+        policy.with_learner(uc.Robust())
+
+
+@pytest.mark.parametrize("copied", [copy, deepcopy, lambda policy: pickle.loads(pickle.dumps(policy))])
+def test_a_copy_goes_on_learning(copied, sampler):
+    data = draw(samples=120)
+    policy = uc.ParametricPolicy(uc.Affine(), sampler).fit(data.states, data.actions, groups=data.groups)
+    again = copied(policy).partial_fit(data.states, data.actions, groups=data.groups)
+    policy.partial_fit(data.states, data.actions, groups=data.groups)
+    assert_array_equal(again.predict(data.states), policy.predict(data.states))
+
+
+def test_a_stored_policy_says_that_its_samples_are_gone(tmp_path):
+    data = draw(samples=120)
+    policy = uc.ParametricPolicy(uc.Affine(), uc.Robust()).fit(data.states, data.actions, groups=data.groups)
+    uc.save(policy, tmp_path / "p.npz")
+    again = uc.load(tmp_path / "p.npz")
+    with pytest.raises(uc.UnconstrainError, match="it was stored"):
+        again.partial_fit(data.states, data.actions, groups=data.groups)
+    assert_array_equal(again.predict(data.states), policy.predict(data.states))
+
+
+def test_free_has_an_entry_for_each_sample_of_no_weight_too(sampler):
+    data = draw(samples=200, groups=5)
+    states, actions, groups = data.states, data.actions, data.groups
+    weights = np.ones(200)
+    weights[[3, 50, 51, 199]] = 0.0
+    weights[groups == 4] = 0.0  # a whole demonstration
+    policy = uc.ParametricPolicy(uc.Affine(), sampler)
+    weighted = clone(policy).fit(states, actions, weights, groups)
+    counting = weights > 0
+    without = clone(policy).fit(states[counting], actions[counting], groups=groups[counting])
+    assert weighted.solution_.free.shape == (200,)
+    assert ((weighted.solution_.free >= 0) & (weighted.solution_.free <= 1)).all()
+    assert_allclose(weighted.solution_.free[counting], without.solution_.free, atol=1e-9)
+    assert_allclose(weighted.predict(states), without.predict(states), atol=1e-9)
+    assert_allclose(weighted.solution_.free_share, without.solution_.free_share, atol=1e-12)
 
 
 def test_a_refused_batch_leaves_no_trace():

@@ -104,7 +104,8 @@ def test_demonstrations_are_dealt_in_turn_as_they_are_first_seen():
     states, groups = spread(6), ["c", "a", "c", "b", "d", "a"]
     split = splitter(Folds(3), states, groups)
     assert_array_equal(split.assign(states, groups), [0, 1, 0, 2, 0, 1])
-    assert_array_equal(split.assign(states[:3], ["e", "b", "a"]), [1, 2, 1])
+    later = ["e", "b", "a"]
+    assert_array_equal(split.seeing(later).assign(states[:3], later), [1, 2, 1])
 
 
 @pytest.mark.parametrize(
@@ -133,7 +134,7 @@ def test_automatic_means_demonstrations_where_there_are_several(by, groups, expe
 
 def test_demonstrations_that_are_not_named_cannot_be_held_out():
     with pytest.raises(SettingError, match="validation by demonstration: expected groups=, one name or number"):
-        splitter(Folds(2, by="demonstration"), spread(3)).assign(spread(3), None)
+        splitter(Folds(2, by="demonstration"), spread(3)).seeing(None)
 
 
 @pytest.mark.parametrize("groups", [np.array([3, 1, 3]), ["b", "a", "b"], (2.5, 1.0, 2.5)])

@@ -35,7 +35,8 @@ class Batch(NamedTuple):
         """Go through it by some rows at a time, without those of no weight."""
         xp = namespace(self.states)
         for rows in slices(self.states, FOREIGN_BLOCK_ROWS if is_foreign(self.states) else BLOCK_ROWS):
-            part = Batch(*(None if one is None else one[rows, ...] for one in self))  # type: ignore[arg-type]
+            columns = (None if one is None else one[rows] for one in self[2:])
+            part = Batch(self.states[rows, :], self.actions[rows, :], *columns)  # type: ignore[arg-type]
             if part.weights is not None and not part.weights.all():
                 part = part.at(np.flatnonzero(part.weights))  # a weight of zero is the same as not being there
             if part.states.shape[0]:

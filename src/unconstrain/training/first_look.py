@@ -55,8 +55,8 @@ class FirstLook:
 
     @property
     def is_typical(self) -> bool:
-        """Whether enough different states were seen, and so a spread, to place features and deal folds by: n + 2."""
-        return len(self.keys) > len(self.mean) + 1
+        """Whether enough different states were seen to place features and fields on: ten for each affine weight."""
+        return len(self.keys) >= 10 * (len(self.mean) + 1)
 
     @property
     def different(self) -> Array:

@@ -1,0 +1,157 @@
+"""A call that fails leaves the estimator as it was, and a retry counts nothing twice."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.base import clone
+
+import unconstrain as uc
+from samples import draw
+from unconstrain.base.errors import InvalidDataError, SettingError
+
+DATA = draw(samples=120, groups=6)
+POLICIES = {
+    "robust": uc.LocallyLinearPolicy(learner=uc.Robust()),
+    "hybrid": uc.ParametricPolicy(uc.KMeansRBF(5)),
+}
+
+
+class LearnsNothing(uc.Direct):
+    """A learner that fails once everything is summed."""
+
+    def learn(self, training):
+        raise RuntimeError("as told")
+
+
+def halves():
+    return [(DATA.states[rows], DATA.actions[rows], None, DATA.groups[rows]) for rows in (slice(0, 60), slice(60, 120))]
+
+
+def broken():
+    """A stream that breaks off after it gave something."""
+    yield halves()[0]
+    raise OSError("the disk is gone")
+
+
+class Twice:
+    """What can be walked through again, and breaks off on one of the walks."""
+
+    def __init__(self, fails_on):
+        self.walks, self.fails_on = 0, fails_on
+
+    def __iter__(self):
+        self.walks += 1
+        yield halves()[0]
+        if self.walks == self.fails_on:
+            raise OSError("the disk is gone")
+        yield halves()[1]
+
+
+FAILING = {
+    "a batch with NaN": lambda policy: policy.partial_fit(np.full((5, 2), np.nan), np.ones((5, 2))),
+    "other columns": lambda policy: policy.partial_fit(np.ones((5, 3)), np.ones((5, 2))),
+    "a batch without groups": lambda policy: policy.partial_fit(DATA.states, DATA.actions),
+    "a fit to NaN": lambda policy: policy.fit(np.full((5, 2), np.nan), np.ones((5, 2))),
+    "a fit to weights of zero": lambda policy: policy.fit(DATA.states, DATA.actions, np.zeros(120)),
+    "a generator": lambda policy: policy.fit_batches(broken()),
+    "the first walk": lambda policy: policy.fit_batches(Twice(fails_on=1)),
+    "the second walk": lambda policy: policy.fit_batches(Twice(fails_on=2)),
+    "no batch": lambda policy: policy.fit_batches([]),
+    "no demonstration": lambda policy: policy.fit_demonstrations([]),
+    "a learner": lambda policy: policy.set_params(learner=LearnsNothing()).partial_fit(*halves()[0]),
+    "a learner in fit": lambda policy: policy.set_params(learner=LearnsNothing()).fit(*halves()[0]),
+    "parts": lambda policy: policy.fit_parts([halves(), broken()], lambda call, parts: sum_of(map(call, parts))),
+}
+
+
+def sum_of(parts):
+    first, *rest = parts
+    for part in rest:
+        first = first + part
+    return first
+
+
+@pytest.mark.parametrize("kind", POLICIES)
+@pytest.mark.parametrize("failing", FAILING)
+def test_a_call_that_fails_leaves_the_policy_as_it_was(kind, failing):
+    policy = clone(POLICIES[kind]).partial_fit(*halves()[0])
+    before, learner = vars(policy).copy(), policy.learner
+    with pytest.raises((uc.UnconstrainError, OSError, RuntimeError)):
+        FAILING[failing](policy)
+    policy.learner = learner
+    assert vars(policy).keys() == before.keys()
+    assert all(value is before[name] for name, value in vars(policy).items())
+    retried = policy.partial_fit(*halves()[1])
+    expected = clone(POLICIES[kind]).partial_fit(*halves()[0]).partial_fit(*halves()[1])
+    assert_array_equal(retried.predict(DATA.states), expected.predict(DATA.states))
+    assert retried.moments_.weight.sum() == expected.moments_.weight.sum()
+
+
+@pytest.mark.parametrize("kind", POLICIES)
+@pytest.mark.parametrize("failing", FAILING)
+def test_a_first_call_that_fails_fixes_nothing(kind, failing):
+    policy = clone(POLICIES[kind])
+    learner, before = policy.learner, vars(policy).keys()
+    if failing not in ("a batch without groups", "other columns"):  # these are good first batches
+        with pytest.raises((uc.UnconstrainError, OSError, RuntimeError)):
+            FAILING[failing](policy)
+        policy.learner = learner
+        assert vars(policy).keys() == before
+        assert not hasattr(policy, "n_features_in_")
+    scaled = (1000 * DATA.states, 1000 * DATA.actions, None, DATA.groups)
+    assert_allclose(policy.partial_fit(*scaled).predict(scaled[0]), clone(policy).fit(*scaled).predict(scaled[0]))
+
+
+@pytest.mark.parametrize("scale", [1.0, 1000.0])
+@pytest.mark.parametrize("kind", POLICIES)
+def test_a_stream_that_begins_with_single_samples_waits_for_a_spread(kind, scale):
+    states, actions = scale * DATA.states, scale * DATA.actions
+    policy = clone(POLICIES[kind])
+    for row in range(6):
+        policy.partial_fit(states[row : row + 1], actions[row : row + 1], groups=DATA.groups[row : row + 1])
+        assert np.isfinite(policy.predict(states)).all()
+    policy.partial_fit(states[6:], actions[6:], groups=DATA.groups[6:])
+    assert policy.moments_.weight.sum() > 0.2 * len(states)
+    assert policy.score(states, actions) > 0.9
+    [whole] = clone(policy).fit(states, actions, groups=DATA.groups).moments_.weight.sum(keepdims=True)
+    assert policy.moments_.weight.sum() > 0.3 * whole
+
+
+def test_a_generator_that_begins_with_single_samples_is_read_until_there_is_a_spread():
+    rows = [slice(0, 1), slice(1, 2), slice(2, 3), slice(3, 120)]
+    batches = [(1000 * DATA.states[r], 1000 * DATA.actions[r], None, DATA.groups[r]) for r in rows]
+    policy = uc.LocallyLinearPolicy().fit_batches(iter(batches))
+    assert policy.fields_.variance > 1000.0
+    assert policy.score(1000 * DATA.states, 1000 * DATA.actions) > 0.9
+
+
+def test_states_that_never_spread_are_learnt_from_all_the_same():
+    policy = uc.LocallyLinearPolicy()
+    for _ in range(3):
+        policy.partial_fit(np.ones((4, 2)), np.full((4, 2), 0.5))
+    assert_allclose(policy.predict(np.ones((1, 2))), [[0.5, 0.5]], atol=1e-6)
+    assert policy.moments_.weight.sum() == 12.0
+
+
+@pytest.mark.parametrize("learner", [uc.Robust(), uc.Likelihood(), uc.NoiseCorrected(), uc.Segments(), "robust"])
+def test_speed_is_weighed_once_wherever_it_comes_from(learner, tmp_path):
+    path = tmp_path / "a.csv"
+    rows = "\n".join(",".join(map(repr, map(float, row))) for row in np.hstack([DATA.states, DATA.actions]))
+    path.write_text(f"x,y,vx,vy\n{rows}\n")
+    stream = uc.Stream(path, uc.preparation.Recipe(("x", "y"), ("vx", "vy")), speed_power=2.0)
+    policy = uc.ParametricPolicy(uc.Affine(), learner)
+    demonstration = uc.Demonstration(DATA.states, DATA.actions)
+    for refused in (
+        lambda: policy.fit_batches(stream),
+        lambda: policy.fit_demonstrations([demonstration], speed_power=2.0),
+    ):
+        with pytest.raises(SettingError, match="weigh speed themselves"):
+            refused()
+    uc.ParametricPolicy(uc.Affine(), uc.Hybrid()).fit_batches(stream)
+
+
+def test_what_has_no_learn_is_refused_before_any_work():
+    with pytest.raises(SettingError, match=r"learner: got 'hybird', expected one of 'robust'"):
+        uc.ParametricPolicy(learner="hybird").fit(DATA.states, DATA.actions)
+    with pytest.raises(InvalidDataError, match="no part"):
+        uc.ParametricPolicy().fit_parts([], sum_of)
