@@ -11,7 +11,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tempfile
 import zipfile
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
@@ -21,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from . import policies
+from .base import files
 from .base.errors import ModelFileError
 from .learners import plain as learners
 from .learners import robust
@@ -150,18 +150,7 @@ def _plain(notes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _write(target: Path, arrays: Mapping[str, np.ndarray[Any, Any]]) -> None:
-    """Write an archive beside its place, then put it there in one step."""
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
-            stream.flush()
-            os.fsync(stream.fileno())
-        Path(temporary).chmod(0o666 & ~_umask())
-        Path(temporary).replace(target)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    files.write(target, lambda stream: np.savez_compressed(stream, **arrays), ModelFileError)  # type: ignore[arg-type]
 
 
 def _pack(value: Any, arrays: dict[str, np.ndarray[Any, Any]]) -> Any:
@@ -259,12 +248,6 @@ def _digest(header: Mapping[str, Any], arrays: Mapping[str, np.ndarray[Any, Any]
         said.update(f"{name}{array.dtype.str}{array.shape}".encode())
         said.update(array.tobytes())
     return said.hexdigest()
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _said(error: Exception) -> str:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from abc import abstractmethod
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted
 
+from ..base import files
 from ..base.arrays import Array
 from ..base.errors import SettingError
 from ..deployment import Step, c_source, onnx_model, stepper, stepper_on
@@ -117,7 +117,7 @@ class Deployable:
         form = self.closed_form()
         states = _probes(form)
         source = c_source(form, "policy" if name is None else name, states, self(states))
-        Path(path).write_text(source, encoding="ascii")
+        files.write(path, source)
 
     def export_onnx(self, path: str | os.PathLike[str]) -> None:
         """Write the policy as an ONNX graph, ``states`` (N, n) to ``actions`` (N, d), in float64.
@@ -129,7 +129,7 @@ class Deployable:
         SettingError
             If the features cannot be exported (:meth:`closed_form`).
         """
-        Path(path).write_bytes(onnx_model(self.closed_form()))
+        files.write(path, onnx_model(self.closed_form()))
 
     def _prepare_step(self) -> tuple[Solution, Step]:
         check_is_fitted(self, "solution_")
