@@ -855,7 +855,7 @@ def test_trouble_with_the_file_system_is_told_in_one_sentence(policy, tmp_path, 
     def fail(*_, **__):
         raise error
 
-    monkeypatch.setattr(cli.click, "open_file", fail)
+    monkeypatch.setattr(cli, "write", fail)
     assert refused("rollout", policy, "--start", "0,0", "-o", tmp_path / "path.csv") == sentence
 
 

@@ -126,11 +126,17 @@ class TestFiles:
             report.write(results("of another kind"), tmp_path)
         assert list(tmp_path.iterdir()) == []
 
-    def test_without_plotly_it_writes_the_numbers_and_says_what_to_install(self, results, tmp_path, monkeypatch):
-        monkeypatch.setitem(sys.modules, "plotly.offline", None)
-        with pytest.raises(MissingExtraError, match=r"'plotly', which is not installed.*unconstrain\[viz\]"):
-            report.write(results("of another kind"), tmp_path / "out")
-        assert [path.name for path in (tmp_path / "out").iterdir()] == ["else.json"]
+    @pytest.mark.parametrize("module", ["plotly.offline", "jinja2"])
+    @pytest.mark.parametrize("name", ["of another kind", "table1"])
+    def test_without_the_extra_it_writes_the_numbers_and_says_what_to_install(
+        self, results, tmp_path, monkeypatch, module, name
+    ):
+        html._templates.cache_clear()
+        monkeypatch.setitem(sys.modules, module, None)
+        missing = module.partition(".")[0]
+        with pytest.raises(MissingExtraError, match=rf"'{missing}', which is not installed.*unconstrain\[viz\]"):
+            report.write(results(name), tmp_path / "out")
+        assert [path.suffix for path in (tmp_path / "out").iterdir()] == [".json"]
 
 
 class TestRows:

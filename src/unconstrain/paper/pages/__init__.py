@@ -44,7 +44,7 @@ def page(result: Result) -> str:
     Raises
     ------
     MissingExtraError
-        If plotly is not installed.
+        If plotly or jinja2 is not installed.
     """
     return _PAGES.get(result.name, plain.page)(result)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,6 +10,9 @@ from ...base.arrays import Array
 from ...pages import figures, html
 from ..experiments import figure5
 from ..experiments.trials import LABELS, Result
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 __all__ = ["page"]
 
@@ -25,12 +28,14 @@ def page(result: Result) -> str:
     curves = {metric: _curves(result.rows, metric) for metric in TITLES}
     return html.document(
         "Figure 5: from one constraint to many",
-        "Movement is allowed only along the policy turned by a random angle of at most θ<sub>max</sub>. At 0 the "
-        "recordings are the policy itself; to the right the constraint takes away more, and differently at each "
-        "sample. Direct learning is good at the left and gets worse steadily; inconsistency alone is the other way "
-        "round. The hybrid has to follow the lower of the two without being told where on this axis the data lies. "
-        "<b>nUPE</b> is the error of the learnt policy where it is free, <b>nCPE</b> after the constraint has "
-        "taken its share, both as a share of the policy’s variance.",
+        html.markup(
+            "Movement is allowed only along the policy turned by a random angle of at most θ<sub>max</sub>. At 0 the "
+            "recordings are the policy itself; to the right the constraint takes away more, and differently at each "
+            "sample. Direct learning is good at the left and gets worse steadily; inconsistency alone is the other way "
+            "round. The hybrid has to follow the lower of the two without being told where on this axis the data lies. "
+            "<b>nUPE</b> is the error of the learnt policy where it is free, <b>nCPE</b> after the constraint has "
+            "taken its share, both as a share of the policy’s variance."
+        ),
         html.section("Errors", _errors(widest, curves)),
         html.section("The hybrid against the better of the other two", _ratio(widest, result)),
         html.section("Numbers", _table(widest, curves, result)),
@@ -46,7 +51,7 @@ def _curves(rows: list[dict[str, Any]], metric: str) -> Curves:
     return found
 
 
-def _errors(widest: Array, curves: dict[str, Curves]) -> str:
+def _errors(widest: Array, curves: dict[str, Curves]) -> Markup:
     panels = []
     for metric, title in TITLES.items():
         ours = curves[metric]
@@ -64,7 +69,7 @@ def _errors(widest: Array, curves: dict[str, Curves]) -> str:
     )
 
 
-def _ratio(widest: Array, result: Result) -> str:
+def _ratio(widest: Array, result: Result) -> Markup:
     found = {title: figure5.ratios(result, metric) for metric, title in TITLES.items()}
     made = figures.ratios(
         widest,
@@ -82,9 +87,9 @@ def _ratio(widest: Array, result: Result) -> str:
     )
 
 
-def _table(widest: Array, curves: dict[str, Curves], result: Result) -> str:
-    header = ["θ<sub>max</sub> (rad)"]
-    header += [f"{title}<br>{method}" for title in TITLES.values() for method in figures.METHODS]
+def _table(widest: Array, curves: dict[str, Curves], result: Result) -> Markup:
+    header: list[str] = [html.markup("θ<sub>max</sub> (rad)")]
+    header += [f"{title}\n{method}" for title in TITLES.values() for method in figures.METHODS]
     rows = [
         [
             html.number(angle),
