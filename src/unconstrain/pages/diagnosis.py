@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +12,6 @@ from ..evaluation import CONSTRAINED, FREE, SMALL, Diagnosis, diagnose, named, s
 from ..policies import Policy
 from ..recordings import Demonstration, stack
 from . import figures, html
-
-if TYPE_CHECKING:
-    from markupsafe import Markup
 
 __all__ = ["diagnosis_page", "unknown"]
 
@@ -64,7 +60,7 @@ def diagnosis_page(
     )
 
 
-def unknown(policy: Policy, demos: list[Demonstration]) -> list[Markup]:
+def unknown(policy: Policy, demos: list[Demonstration]) -> list[html.Markup]:
     """The map and what to record next, for the page of a fit."""
     try:
         found = diagnose(policy, demos)
@@ -76,7 +72,7 @@ def unknown(policy: Policy, demos: list[Demonstration]) -> list[Markup]:
     return [*told, _map(found, demos, states, actions), _next(found, states, actions)]
 
 
-def _tiles(found: Diagnosis, demos: list[Demonstration]) -> Markup:
+def _tiles(found: Diagnosis, demos: list[Demonstration]) -> html.Markup:
     return html.tiles(
         [
             (str(len(demos)), f"demonstrations, {len(found.undetermined)} samples"),
@@ -88,7 +84,7 @@ def _tiles(found: Diagnosis, demos: list[Demonstration]) -> Markup:
     )
 
 
-def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], actions: Sequence[str]) -> Markup:
+def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], actions: Sequence[str]) -> html.Markup:
     """Two state columns, coloured by how little is known."""
     recorded = stack(demos).states
     regions = found.regions[:MOST_REGIONS]
@@ -124,7 +120,7 @@ def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], ac
     return html.picture("known", [picture], caption)
 
 
-def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> Markup:
+def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> html.Markup:
     shown = found.regions[:MOST_REGIONS]
     rows = [
         [
@@ -150,7 +146,7 @@ def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> Ma
     return html.table(header, rows, left=4, note=note)
 
 
-def _freedom(found: Diagnosis) -> Markup:
+def _freedom(found: Diagnosis) -> html.Markup:
     if found.free is None:
         return html.paragraph("The policy was fitted to other demonstrations.")
     shown = found.movements[:MOST_MOVEMENTS]
@@ -174,7 +170,7 @@ def _freedom(found: Diagnosis) -> Markup:
     return html.picture("free", [picture], caption)
 
 
-def _chosen(found: Diagnosis) -> Markup:
+def _chosen(found: Diagnosis) -> html.Markup:
     if not found.compared:
         return html.paragraph(f"Nothing was compared with the policy, which was learnt as {found.method}.")
     rows = [

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import is_dataclass
 from html import escape
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,9 +17,6 @@ from ..recordings import Demonstration, stack
 from ..risks import action_projection, project
 from . import figures, html
 from .diagnosis import unknown
-
-if TYPE_CHECKING:
-    from markupsafe import Markup
 
 __all__ = ["policy_page"]
 
@@ -68,7 +64,7 @@ def policy_page(policy: Policy, demonstrations: Sequence[Demonstration], title: 
     return html.document(title, _lead(policy, demos, type(learner).__name__), *parts)
 
 
-def _lead(policy: Policy, demos: list[Demonstration], learner: str) -> Markup:
+def _lead(policy: Policy, demos: list[Demonstration], learner: str) -> html.Markup:
     states, actions, _ = stack(demos)
     kind = "Locally linear" if hasattr(policy, "fields_") else "Parametric"
     return html.markup(
@@ -79,7 +75,7 @@ def _lead(policy: Policy, demos: list[Demonstration], learner: str) -> Markup:
     ).format(kind, learner, states.shape[1], actions.shape[1])
 
 
-def _summary(policy: Policy, demos: list[Demonstration]) -> Markup:
+def _summary(policy: Policy, demos: list[Demonstration]) -> html.Markup:
     solution = policy.solution_
     models, d, p = solution.weights.shape
     shape = f"{models} × {p}" if models > 1 else str(p)
@@ -94,7 +90,7 @@ def _summary(policy: Policy, demos: list[Demonstration]) -> Markup:
     )
 
 
-def _movements(policy: Policy, demos: list[Demonstration]) -> Markup:
+def _movements(policy: Policy, demos: list[Demonstration]) -> html.Markup:
     n, d = demos[0].states.shape[1], demos[0].actions.shape[1]
     tracks = [_thin(demo) for demo in demos]
     if n >= 3:
@@ -141,7 +137,7 @@ def _field(policy: Policy, demos: list[Demonstration]) -> object:
     )
 
 
-def _actions(policy: Policy, demos: list[Demonstration]) -> Markup:
+def _actions(policy: Policy, demos: list[Demonstration]) -> html.Markup:
     shown = demos[:MOST_PANELS]
     panels = []
     for demo in map(_thin, shown):
@@ -166,7 +162,7 @@ def _actions(policy: Policy, demos: list[Demonstration]) -> Markup:
     )
 
 
-def _errors(policy: Policy, demos: list[Demonstration]) -> Markup:
+def _errors(policy: Policy, demos: list[Demonstration]) -> html.Markup:
     known = all(demo.truth is not None for demo in demos)
     support = _support(policy, demos)
     header = ["demonstration", "samples", "norm. inconsistency"]
@@ -195,7 +191,7 @@ def _errors(policy: Policy, demos: list[Demonstration]) -> Markup:
     return html.table(header, rows, note=note, rules=(len(shown),))
 
 
-def _determined(policy: Policy) -> Markup:
+def _determined(policy: Policy) -> html.Markup:
     solution = policy.solution_
     panels = []
     if solution.eigenvalues is not None:

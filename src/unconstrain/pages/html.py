@@ -19,7 +19,7 @@ from ..base.arrays import require_extra
 from .figures.style import COLOURS, LABELS, MARKERS, PALETTE, plotly
 
 if TYPE_CHECKING:
-    from markupsafe import Markup
+    from markupsafe import Markup as Markup
 
 __all__ = [
     "bullets",
@@ -252,9 +252,8 @@ def _meanings(kind: type) -> dict[str, str]:
     for one in kind.__mro__:
         text = inspect.cleandoc(one.__doc__ or "")
         for names, body in re.findall(r"^(\w[\w, ]*) : .*\n((?:    .*\n?)*)", text, flags=re.MULTILINE):
-            plain = re.sub(
-                r":\w+:`~?([^`]*)`", lambda match: match[1].rpartition(".")[2], " ".join(body.split()).replace("``", "")
-            )
+            words = " ".join(body.split()).replace("``", "")
+            plain = re.sub(r":\w+:`~?([^`]*)`", lambda match: match[1].rpartition(".")[2], words)
             for name in names.split(", "):
                 found.setdefault(name, plain)
     return found

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...pages import figures, html
 from ..experiments.trials import METRICS, Result
 from .table1 import TITLES
-
-if TYPE_CHECKING:
-    from markupsafe import Markup
 
 __all__ = ["page"]
 
@@ -35,7 +32,7 @@ def page(result: Result) -> str:
     )
 
 
-def _fields(result: Result) -> Markup:
+def _fields(result: Result) -> html.Markup:
     details = result.details
     grid, truth = details["grid"], details["policy"]
     longest = float(np.linalg.norm(truth, axis=1).max())
@@ -72,7 +69,7 @@ def _cut(fields: dict[str, Any], longest: float, constraint: str) -> list[str]:
     return [f"{share:.0%} of {figures.LABELS[key]} ({words})" for key, share in shares.items() if share > 0]
 
 
-def _table(result: Result) -> Markup:
+def _table(result: Result) -> html.Markup:
     header = ["method", "data", *(TITLES[metric] for metric in METRICS)]
     words = {"none": "free", "random": "constrained"}
     rows = [

@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
 
 from ...base.arrays import Array
 from ...pages import figures, html
 from ..experiments import figure5
 from ..experiments.trials import LABELS, Result
-
-if TYPE_CHECKING:
-    from markupsafe import Markup
+from . import table1
 
 __all__ = ["page"]
 
 TITLES = {metric: LABELS[metric] for metric in ("nupe", "ncpe")}
 ANGLE = "how far constraints vary, θ<sub>max</sub> (rad)"
 
-Curves = dict[str, tuple[Array, Array]]
-
 
 def page(result: Result) -> str:
     """Errors against how much the constraints vary."""
     widest = np.array(sorted({row["theta_max"] for row in result.rows}))
-    curves = {metric: _curves(result.rows, metric) for metric in TITLES}
+    rows = sorted(result.rows, key=lambda row: row["theta_max"])
+    curves = {metric: table1.curves(rows, metric) for metric in TITLES}
     return html.document(
         "Figure 5: from one constraint to many",
         html.markup(
@@ -43,15 +38,7 @@ def page(result: Result) -> str:
     )
 
 
-def _curves(rows: list[dict[str, Any]], metric: str) -> Curves:
-    found: Curves = {}
-    for method in figures.METHODS:
-        own = sorted((row for row in rows if row["method"] == method), key=lambda row: row["theta_max"])
-        found[method] = tuple(np.array([row[f"{metric}_{what}"] for row in own]) for what in ("mean", "sd"))  # type: ignore[assignment]
-    return found
-
-
-def _errors(widest: Array, curves: dict[str, Curves]) -> Markup:
+def _errors(widest: Array, curves: dict[str, table1.Curves]) -> html.Markup:
     panels = []
     for metric, title in TITLES.items():
         ours = curves[metric]
@@ -69,7 +56,7 @@ def _errors(widest: Array, curves: dict[str, Curves]) -> Markup:
     )
 
 
-def _ratio(widest: Array, result: Result) -> Markup:
+def _ratio(widest: Array, result: Result) -> html.Markup:
     found = {title: figure5.ratios(result, metric) for metric, title in TITLES.items()}
     made = figures.ratios(
         widest,
@@ -87,7 +74,7 @@ def _ratio(widest: Array, result: Result) -> Markup:
     )
 
 
-def _table(widest: Array, curves: dict[str, Curves], result: Result) -> Markup:
+def _table(widest: Array, curves: dict[str, table1.Curves], result: Result) -> html.Markup:
     header: list[str] = [html.markup("θ<sub>max</sub> (rad)")]
     header += [f"{title}\n{method}" for title in TITLES.values() for method in figures.METHODS]
     rows = [

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...pages import figures, html
 from ..experiments.regimes import DEFAULT, KNOWN, ORACLE, PAPER
 from ..experiments.trials import Result
-
-if TYPE_CHECKING:
-    from markupsafe import Markup
 
 __all__ = ["page"]
 
@@ -21,31 +18,26 @@ TOP = 10.0
 def page(result: Result) -> str:
     """What holds where, as cells, as a summary, and row by row."""
     noises = list(dict.fromkeys(row["noise"] for row in result.rows))
-    trials = getattr(result.settings, "trials", 1)
+    systems = ", ".join(dict.fromkeys(row["system"] for row in result.rows))
     return html.document(
         "Learners in every regime of constraints and noise",
         html.markup(
-            "{systems} under constraints of many kinds, from none to some that are drawn at random, with and "
-            "without noise on the recorded actions. Every learner sees the same recordings. The <b>oracle</b> sees the "
-            "truth as well, and takes with it the best point on the paper’s path between consistency and risk. With "
-            "<b>{known}</b>, every sample’s projection is given, and a ridge chosen by the truth. What counts "
-            "is <b>nUPE</b>, how far the learnt policy is from the true one where nothing holds it back. {said}"
-        ).format(systems=_systems(result), known=KNOWN, said=_said(result)),
+            "Demonstrators ({systems}) move under constraints of many kinds, from none to some that are drawn at "
+            "random, with and without noise on the recorded actions. Every learner sees the same recordings. The "
+            "<b>oracle</b> sees the truth as well, and takes with it the best point on the paper’s path between "
+            "consistency and risk. With <b>{known}</b>, every sample’s projection is given, and a ridge chosen by the "
+            "truth. What counts is <b>nUPE</b>, how far the learnt policy is from the true one where nothing holds it "
+            "back. {said}"
+        ).format(systems=systems, known=KNOWN, said=_said(result)),
         html.section("Summary", _summary(result)),
         html.section("Regime by regime", *(_cells(result, noise, index) for index, noise in enumerate(noises))),
         html.section("What they know of their data", _knowledge(result)),
-        html.section("All numbers", _rows(result, trials)),
+        html.section("All numbers", _rows(result)),
         html.settings_table(result.settings),
     )
 
 
-def _systems(result: Result) -> str:
-    """Those that took part."""
-    names = list(dict.fromkeys(row["system"] for row in result.rows))
-    return f"Demonstrators ({', '.join(names)}) move"
-
-
-def _said(result: Result) -> Markup:
+def _said(result: Result) -> html.Markup:
     """The default learner, at each noise level."""
     ours = [one for one in result.tables["summary"] if one["method"] == DEFAULT]
     parts = [
@@ -59,7 +51,7 @@ def _said(result: Result) -> Markup:
     )
 
 
-def _summary(result: Result) -> Markup:
+def _summary(result: Result) -> html.Markup:
     summary = {(one["method"], one["noise"]): one for one in result.tables["summary"]}
     methods, noises = (list(dict.fromkeys(key[at] for key in summary)) for at in (0, 1))
     rows: list[list[str]] = []
@@ -81,7 +73,7 @@ def _summary(result: Result) -> Markup:
     return html.table(header, rows, left=3, note=note, rules=rules[1:])
 
 
-def _cells(result: Result, noise: float, index: int) -> Markup:
+def _cells(result: Result, noise: float, index: int) -> html.Markup:
     """What each method has for nUPE over what the oracle has, methods by regimes."""
     mine = [row for row in result.rows if row["noise"] == noise and row["method"] != ORACLE]
     methods = list(dict.fromkeys(row["method"] for row in mine))
@@ -105,7 +97,7 @@ def _cells(result: Result, noise: float, index: int) -> Markup:
     return html.picture(f"noise-{index + 1}", [picture], caption if index == 0 else "As above.")
 
 
-def _knowledge(result: Result) -> Markup:
+def _knowledge(result: Result) -> html.Markup:
     """How well free samples are told, and how often intervals hold the truth."""
     keys = ("auc_mean", "coverage_mean")
     methods = [
@@ -136,7 +128,7 @@ def _range(rows: list[dict[str, Any]], key: str) -> list[str]:
     return [html.number(float(np.mean(known))), html.number(min(known))] if known else ["–", "–"]
 
 
-def _rows(result: Result, trials: int) -> Markup:
+def _rows(result: Result) -> html.Markup:
     header = ["system", "constraint", "noise", "method", "nUPE", "nUPE, geom.", "/ oracle", "nCPE", "norm. incon."]
     header += ["area", "coverage"]
     rows, rules, before = [], [], None
@@ -160,6 +152,6 @@ def _rows(result: Result, trials: int) -> Markup:
                 html.number(row["coverage_mean"]),
             ]
         )
-    note = f"Mean ± standard deviation over {trials} data sets; errors × 10⁻²."
+    note = f"Mean ± standard deviation over {getattr(result.settings, 'trials', 1)} data sets; errors × 10⁻²."
     table = html.table(header, rows, left=4, note=note, rules=rules)
     return html.folded(f"{len(rows)} rows", table)

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+
+from ...base.arrays import Array
 from ...pages import figures, html
 from ..experiments.trials import METRICS, Result
 
-if TYPE_CHECKING:
-    from markupsafe import Markup
-
-__all__ = ["dots", "page", "table"]
+__all__ = ["Curves", "curves", "dots", "page", "table"]
 
 WORDS = {"none": "free", "random": "constrained"}
 TITLES = {"nupe": "nUPE", "ncpe": "nCPE", "ninc": "inconsistency"}
+
+Curves = dict[str, tuple[Array, Array]]
 
 
 def page(result: Result) -> str:
@@ -34,7 +36,7 @@ def page(result: Result) -> str:
     )
 
 
-def table(result: Result, trials_of_paper: int) -> Markup:
+def table(result: Result, trials_of_paper: int) -> html.Markup:
     """Ours beside the paper's, row by row."""
     header = ["method", "data"]
     for metric in METRICS:
@@ -52,7 +54,7 @@ def table(result: Result, trials_of_paper: int) -> Markup:
     return html.table(header, rows, left=2, note=note, rules=rules)
 
 
-def dots(result: Result) -> Markup:
+def dots(result: Result) -> html.Markup:
     """Means of both, method by method, on logarithmic axes."""
     constraints = list(dict.fromkeys(row["constraint"] for row in result.rows))
     found = {(row["method"], row["constraint"]): row for row in result.rows}
@@ -75,6 +77,15 @@ def dots(result: Result) -> Markup:
         "upwards only; downwards it would often pass zero. Lower is better.",
         keys=figures.METHODS,
     )
+
+
+def curves(rows: list[dict[str, Any]], metric: str) -> Curves:
+    """Means and standard deviations of each method, in the order of the rows."""
+    of_methods = {method: [row for row in rows if row["method"] == method] for method in figures.METHODS}
+    return {
+        method: (np.array([row[f"{metric}_mean"] for row in own]), np.array([row[f"{metric}_sd"] for row in own]))
+        for method, own in of_methods.items()
+    }
 
 
 def _pair(row: dict[str, Any], metric: str, scale: float = 1.0) -> tuple[float | None, float | None]:

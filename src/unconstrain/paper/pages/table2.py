@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ...pages import figures, html
 from ..experiments import table2
 from ..experiments.trials import Result
 from . import table1
-
-if TYPE_CHECKING:
-    from markupsafe import Markup
 
 __all__ = ["page"]
 
@@ -38,18 +33,11 @@ def page(result: Result) -> str:
     )
 
 
-def _curves(result: Result) -> Markup:
+def _curves(result: Result) -> html.Markup:
     held = np.arange(1.0, len(table2.CONSTRAINTS) + 1.0)
     panels = []
     for metric, title in (("nupe", "nUPE"), ("ncpe", "nCPE")):
-        of_methods = {method: [row for row in result.rows if row["method"] == method] for method in figures.METHODS}
-        curves = {
-            method: (
-                np.array([row[f"{metric}_mean"] for row in rows]),
-                np.array([row[f"{metric}_sd"] for row in rows]),
-            )
-            for method, rows in of_methods.items()
-        }
+        curves = table1.curves(result.rows, metric)
         panels.append(figures.bands(held, curves, title=title, labels=(HELD, title), log=True))
     return html.picture(
         "curves",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from ..experiments.washing import Split, Surface
 from ..systems.wiping import WipingPolicy
 from .washing_arm import on_the_arm
 from .washing_scores import bars, scores
-
-if TYPE_CHECKING:
-    from markupsafe import Markup
 
 __all__ = ["page"]
 
@@ -68,7 +65,7 @@ def page(result: Result) -> str:
     )
 
 
-def _lead(real: bool) -> Markup:
+def _lead(real: bool) -> html.Markup:
     recorded = html.markup(
         "A robot arm is led by hand to wipe a car rim at four tilts. One tilt at a time is left out: the policy is "
         "learnt from the other three, put under the constraint of the fourth, and compared with what was done there. "
@@ -87,7 +84,7 @@ def _lead(real: bool) -> Markup:
     )
 
 
-def _demonstrations(splits: list[Split]) -> Markup:
+def _demonstrations(splits: list[Split]) -> html.Markup:
     if len(splits) == 1:
         [split] = splits
         kinds = [("training", one) for one in split.training] + [("held out", one) for one in split.held_out]
@@ -115,7 +112,7 @@ def _demonstrations(splits: list[Split]) -> Markup:
     )
 
 
-def _fields(cases: list[Case], real: bool) -> Markup:
+def _fields(cases: list[Case], real: bool) -> html.Markup:
     panels = []
     for case in cases:
         plate = case.plate
@@ -155,7 +152,7 @@ def _fields(cases: list[Case], real: bool) -> Markup:
     )
 
 
-def _velocities(cases: list[Case]) -> Markup:
+def _velocities(cases: list[Case]) -> html.Markup:
     panels = []
     for case in cases:
         demo = case.demonstration
@@ -173,7 +170,7 @@ def _velocities(cases: list[Case]) -> Markup:
     )
 
 
-def _rollouts(splits: list[Split]) -> Markup:
+def _rollouts(splits: list[Split]) -> html.Markup:
     panels, left = [], []
     for split in splits:
         surface = split.held_out[0]
@@ -204,7 +201,7 @@ def _seconds(movement: Demonstration, at: int) -> str:
     return f"step {at}" if movement.times is None else f"{round(movement.times[at], 1):g} s"
 
 
-def _spectra(splits: list[Split], settings: Any) -> Markup:
+def _spectra(splits: list[Split], settings: Any) -> html.Markup:
     panels, counts, directions = [], [], 0
     for split in splits:
         found = split.policies["inconsistency"].solution_

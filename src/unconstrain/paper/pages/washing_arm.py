@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +13,6 @@ from ..experiments.washing import WITHOUT_PHYSICS, Reproduction
 from ..simulation import BACKENDS, Wipe
 from ..simulation.pictures import animation, film, strip
 from ..systems.arm import LWR3
-
-if TYPE_CHECKING:
-    from markupsafe import Markup
 
 __all__ = ["on_the_arm"]
 
@@ -28,7 +25,7 @@ STATEMENT = (
 )
 
 
-def on_the_arm(result: Result) -> list[Markup]:
+def on_the_arm(result: Result) -> list[html.Markup]:
     """Everything about the reproduction; a sentence where there is no physics engine."""
     settings: Any = result.settings
     done: list[Reproduction] = result.details["reproductions"]
@@ -42,7 +39,7 @@ def on_the_arm(result: Result) -> list[Markup]:
     return [*parts, _measures(result.tables["reproduction"])]
 
 
-def _pictures(shown: Reproduction) -> Markup:
+def _pictures(shown: Reproduction) -> html.Markup:
     wipe = shown.wipe
     assert wipe is not None
     name = f"plate {shown.plate.name}, which nobody {'wiped' if shown.demonstration is None else 'learnt from'}"
@@ -78,7 +75,7 @@ def _lines(wipe: Wipe) -> bytes:
     return figures.arm_on_plate(np.moveaxis(joints, -1, 0), track, plate)
 
 
-def _tracks(wiped: list[Reproduction]) -> Markup:
+def _tracks(wiped: list[Reproduction]) -> html.Markup:
     panels = []
     for one in wiped:
         wipe = one.wipe
@@ -103,10 +100,10 @@ def _tracks(wiped: list[Reproduction]) -> Markup:
     )
 
 
-def _measures(rows: list[dict[str, Any]]) -> Markup:
-    header = ["plate", "learnt from", "turns", "contact", "force (N)", "frequency (Hz)", "demonstrated (Hz)"]
-    header += ["radius (cm)", "demonstrated (cm)", "drift (mm)", "path error (mm)", "largest torque"]
-    header += ["× real time"]
+def _measures(rows: list[dict[str, Any]]) -> html.Markup:
+    header = ["plate", "learnt\nfrom", "turns", "contact", "force\n(N)", "frequency\n(Hz)", "demonstrated\n(Hz)"]
+    header += ["radius\n(cm)", "demonstrated\n(cm)", "drift\n(mm)", "path error\n(mm)", "largest\ntorque"]
+    header += ["× real\ntime"]
     several = len({row["trial"] for row in rows}) > 1
     body = []
     for surface in dict.fromkeys(row["surface"] for row in rows):

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...pages import figures, html
 from ..experiments.trials import Result
-
-if TYPE_CHECKING:
-    from markupsafe import Markup
 
 __all__ = ["bars", "scores"]
 
@@ -21,12 +18,12 @@ KINDS = {"plane": "normal of the plane", "tool": "axis of the tool"}
 _COLUMNS = (*figures.METHODS, "robust")
 
 
-def scores(result: Result) -> Markup:
+def scores(result: Result) -> html.Markup:
     """Method by surface, and the mean over those that were held out."""
     return _real_scores(result.rows) if "normal" in result.rows[0] else _simulated_scores(result.rows)
 
 
-def bars(result: Result) -> Markup:
+def bars(result: Result) -> html.Markup:
     """NCPE on each surface."""
     kinds = list(dict.fromkeys(row.get("normal") for row in result.rows))
     panels = []
@@ -43,7 +40,7 @@ def bars(result: Result) -> Markup:
     return html.picture("scores", panels, f"Error along each surface; lower is better.{mark}", keys=figures.METHODS)
 
 
-def _simulated_scores(rows: list[Row]) -> Markup:
+def _simulated_scores(rows: list[Row]) -> html.Markup:
     header = ["surface", "learnt from"]
     header += [f"{title}\n{method}" for title in ("nCPE", "nUPE") for method in _COLUMNS]
     surfaces = list(dict.fromkeys((row["surface"], row["seen"]) for row in rows))
@@ -61,7 +58,7 @@ def _simulated_scores(rows: list[Row]) -> Markup:
     return html.table(header, body, left=2, note=note, rules=(seen_count, len(surfaces)))
 
 
-def _real_scores(rows: list[Row]) -> Markup:
+def _real_scores(rows: list[Row]) -> html.Markup:
     kinds = list(dict.fromkeys(row["normal"] for row in rows))
     header = ["held-out tilt"]
     header += [f"{method}\n{kind} normal" for kind in kinds for method in _COLUMNS]
