@@ -127,10 +127,12 @@ class TestFiles:
             report.write(results("of another kind"), tmp_path)
         assert list(tmp_path.iterdir()) == []
 
-    @pytest.mark.parametrize("module", ["plotly.offline", "jinja2"])
-    @pytest.mark.parametrize("name", ["of another kind", "table1"])
+    @pytest.mark.parametrize(
+        ("name", "module"),
+        [("of another kind", "plotly.offline"), ("of another kind", "jinja2"), ("table1", "jinja2")],
+    )
     def test_without_the_extra_it_writes_the_numbers_and_says_what_to_install(
-        self, results, tmp_path, monkeypatch, module, name
+        self, results, tmp_path, monkeypatch, name, module
     ):
         html._templates.cache_clear()
         monkeypatch.setitem(sys.modules, module, None)
