@@ -759,7 +759,9 @@ def test_a_recording_is_never_overwritten_by_its_policy(files, tmp_path):
 def test_a_place_that_cannot_be_written_to_is_named(files, policy, tmp_path):
     away = tmp_path / "none" / "x"
     assert refused("fit", files[0], "-o", away) == f"{away}: cannot be written, its folder does not exist."
-    assert refused("rollout", policy, "--start", "0,0", "-o", away) == f"{away}: No such file or directory."
+    assert refused("rollout", policy, "--start", "0,0", "-o", away) == (
+        f"{away}: cannot be written (No such file or directory)."
+    )
     assert "is a directory" in refused("rollout", policy, "--start", "0,0", "-o", tmp_path)
     assert "is a directory" in refused("fit", files[0], "-o", tmp_path)
 
@@ -853,7 +855,7 @@ def test_trouble_with_the_file_system_is_told_in_one_sentence(policy, tmp_path, 
     def fail(*_, **__):
         raise error
 
-    monkeypatch.setattr(cli.click, "open_file", fail)
+    monkeypatch.setattr(cli, "write", fail)
     assert refused("rollout", policy, "--start", "0,0", "-o", tmp_path / "path.csv") == sentence
 
 

@@ -15,11 +15,12 @@ import numpy as np
 import pytest
 
 import unconstrain as uc
-from unconstrain.base.errors import MissingExtraError
+from unconstrain.base.errors import MissingExtraError, SettingError
 from unconstrain.pages import fit, html
 from unconstrain.paper import pages as report
 from unconstrain.paper.experiments import figure4, figure5, table1, table2, toy, washing
 from unconstrain.paper.experiments.trials import Result
+from unconstrain.paper.pages import washing_arm
 from unconstrain.paper.systems.wiping import PLATES, Strokes, demonstrate
 
 DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))
@@ -126,11 +127,19 @@ class TestFiles:
             report.write(results("of another kind"), tmp_path)
         assert list(tmp_path.iterdir()) == []
 
-    def test_without_plotly_it_writes_the_numbers_and_says_what_to_install(self, results, tmp_path, monkeypatch):
-        monkeypatch.setitem(sys.modules, "plotly.offline", None)
-        with pytest.raises(MissingExtraError, match=r"'plotly', which is not installed.*unconstrain\[viz\]"):
-            report.write(results("of another kind"), tmp_path / "out")
-        assert [path.name for path in (tmp_path / "out").iterdir()] == ["else.json"]
+    @pytest.mark.parametrize(
+        ("name", "module"),
+        [("of another kind", "plotly.offline"), ("of another kind", "jinja2"), ("table1", "jinja2")],
+    )
+    def test_without_the_extra_it_writes_the_numbers_and_says_what_to_install(
+        self, results, tmp_path, monkeypatch, name, module
+    ):
+        html._templates.cache_clear()
+        monkeypatch.setitem(sys.modules, module, None)
+        missing = module.partition(".")[0]
+        with pytest.raises(MissingExtraError, match=rf"'{missing}', which is not installed.*unconstrain\[viz\]"):
+            report.write(results(name), tmp_path / "out")
+        assert [path.suffix for path in (tmp_path / "out").iterdir()] == [".json"]
 
 
 class TestRows:
@@ -199,6 +208,25 @@ class TestPages:
         page = fit.policy_page(uc.ParametricPolicy().fit_demonstrations(demos), demos, evil)
         assert evil not in page
         assert "&lt;script&gt;alert(1)" in page
+
+    def test_names_are_text_in_pictures_too(self):
+        demos = [replace(demo, name="<b>bold</b>") for demo in wiping()]
+        page = fit.policy_page(uc.ParametricPolicy().fit_demonstrations(demos), demos, "A policy")
+        assert "bold" in page
+        assert r"\u003cb\u003ebold" not in page  # as plotly stores what it would show in bold
+
+    def test_text_is_escaped_and_markup_is_not(self):
+        assert html.section("a < b", html.paragraph("<i>")).split() == ["<h2>a", "&lt;", "b</h2>", "<p>&lt;i&gt;</p>"]
+        assert "<p><i>&lt;b&gt;</i></p>" in html.paragraph(html.markup("<i>{}</i>").format("<b>"))
+
+    def test_without_graphics_the_arm_is_drawn_as_lines(self, results, monkeypatch):
+        def fail(_):
+            raise SettingError("no graphics")
+
+        monkeypatch.setattr(washing_arm, "film", fail)
+        page = report.page(results("washing"))
+        assert "as lines" in page
+        assert "<code>apt-get install libosmesa6</code>" in page
 
     def test_settings_are_explained_by_their_docstring(self, results):
         page = report.page(results("of another kind"))

@@ -508,7 +508,7 @@ def test_a_folder_that_does_not_exist_is_named(small, tmp_path):
 
 
 def test_a_folder_cannot_be_replaced_by_a_policy(small, tmp_path):
-    with pytest.raises(ModelFileError, match=r"cannot be written: it is a folder or a device, expected a file\."):
+    with pytest.raises(ModelFileError, match=r"cannot be written \(it is a folder or a device, expected a file\)\."):
         uc.save(small, tmp_path)
 
 

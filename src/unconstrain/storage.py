@@ -11,7 +11,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tempfile
 import zipfile
 from collections.abc import Mapping
 from copy import copy
@@ -21,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from .base import files
 from .base.errors import ModelFileError
 from .learners import Belief, Direct, Hybrid, Inconsistency, Likelihood, NoiseCorrected, Robust, Segments, Solution
 from .models import Affine, Everywhere, KMeansRBF, Model, NormalisedRBF, ReceptiveFields
@@ -87,13 +87,8 @@ def save(policy: Policy, path: str | os.PathLike[str], notes: Mapping[str, Any] 
     content = {"policy": _pack(_without_samples(policy), arrays), "notes": _plain(notes or {})}
     header = {"format": _FORMAT, "version": VERSION, "content": content}
     header["digest"] = _digest(header, arrays)
-    target = Path(path)
-    if target.exists() and not target.is_file():
-        raise ModelFileError(f"{target}: cannot be written: it is a folder or a device, expected a file.")
-    try:
-        _write(target, {_HEADER: np.array(json.dumps(header)), **arrays})
-    except OSError as error:
-        raise ModelFileError(f"{target}: cannot be written ({error.strerror or error}).") from error
+    arrays[_HEADER] = np.array(json.dumps(header))
+    files.write(path, lambda stream: np.savez_compressed(stream, **arrays), ModelFileError)  # type: ignore[arg-type]
 
 
 def load(path: str | os.PathLike[str]) -> Policy:
@@ -174,21 +169,6 @@ def _plain(notes: Mapping[str, Any]) -> dict[str, Any]:
         return dict(json.loads(json.dumps(dict(notes))))
     except (TypeError, ValueError) as error:
         raise ModelFileError(f"notes: {error}; expected what JSON can say: text, numbers, lists, mappings.") from error
-
-
-def _write(target: Path, arrays: Mapping[str, np.ndarray[Any, Any]]) -> None:
-    """Write an archive beside its place, then put it there in one step."""
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
-            stream.flush()
-            os.fsync(stream.fileno())
-        Path(temporary).chmod(0o666 & ~_umask())
-        Path(temporary).replace(target)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
 
 
 def _pack(value: Any, arrays: dict[str, np.ndarray[Any, Any]]) -> Any:
@@ -286,12 +266,6 @@ def _digest(header: Mapping[str, Any], arrays: Mapping[str, np.ndarray[Any, Any]
         said.update(f"{name}{array.dtype.str}{array.shape}".encode())
         said.update(array.tobytes())
     return said.hexdigest()
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _said(error: Exception) -> str:

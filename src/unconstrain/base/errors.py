@@ -11,6 +11,7 @@ __all__ = [
     "ReadError",
     "SettingError",
     "UnconstrainError",
+    "WriteError",
 ]
 
 
@@ -32,6 +33,10 @@ class ReadError(UnconstrainError):
 
 class ModelFileError(UnconstrainError):
     """A model file that is damaged, of a newer version, or not ours."""
+
+
+class WriteError(UnconstrainError, OSError):
+    """A file that cannot be written."""
 
 
 class MissingExtraError(UnconstrainError, ImportError):

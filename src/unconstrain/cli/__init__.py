@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainError
+from ..base.files import write
 from ..paper import experiments
 from .diagnosing import diagnose
 from .fitting import MODELS, Alpha, check_speed_power, check_writable, default_learner, learn, learner_of, policy_of
@@ -160,7 +162,7 @@ def fit(
     if report is not None:
         from ..pages.fit import policy_page
 
-        Path(report).write_text(policy_page(fitted, stream.beginning(), Path(output).stem), encoding="utf-8")
+        write(report, policy_page(fitted, stream.beginning(), Path(output).stem))
         click.echo(f"report: {report}")
 
 
@@ -229,10 +231,11 @@ def rollout(
     except SettingError:  # an affine policy, say, is at home everywhere
         support = None
     assert path.times is not None
-    with click.open_file(output, "w") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(["t", *states, *(f"v{name}" for name in states)])
-        writer.writerows([f"{value:.9g}" for value in row] for row in _columns(path))
+    table = _csv(["t", *states, *(f"v{name}" for name in states)], path)
+    if output == "-":
+        click.echo(table, nl=False)
+    else:
+        write(output, table)
     if support is not None and support.min() < 1e-3:
         click.echo(
             f"Note: from {path.times[int((support < 1e-3).argmax())]:.2f} s on the movement is far from all data.",
@@ -374,8 +377,13 @@ def _plane(normal: tuple[float, ...] | None, dimensions: int, meaning: str) -> P
     return Plane(np.array(normal))
 
 
-def _columns(path: Demonstration) -> Any:
+def _csv(header: Sequence[str], path: Demonstration) -> str:
     import numpy as np
 
     assert path.times is not None
-    return np.column_stack([path.times, path.states, path.actions])
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    rows = np.column_stack([path.times, path.states, path.actions])
+    writer.writerows([f"{value:.9g}" for value in row] for row in rows)
+    return text.getvalue()

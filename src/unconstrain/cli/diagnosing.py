@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..base.files import write
 from .fitting import MODELS, check_writable, policy_of
 from .printing import print_table
 from .reading import complete, options_for_reading, recipe_of, recordings_in, said_recipe
@@ -63,7 +64,7 @@ def diagnose(
         from ..pages.diagnosis import diagnosis_page
 
         page = diagnosis_page(found, demonstrations, Path(report).stem, states, actions)
-        Path(report).write_text(page, encoding="utf-8")
+        write(report, page)
         click.echo(f"report: {report}", err=as_json)
 
 

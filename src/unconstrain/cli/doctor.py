@@ -9,7 +9,7 @@ from typing import NamedTuple
 __all__ = ["Finding", "examine"]
 
 EXTRAS = {
-    "viz": ("plotly", "matplotlib"),
+    "viz": ("plotly", "jinja2", "matplotlib"),
     "data": ("pyarrow", "h5py", "pooch"),
     "arm": ("yourdfpy",),
     "sim": ("mujoco", "pillow"),

@@ -6,10 +6,10 @@ import os
 import re
 from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
 import numpy as np
 
+from ..base import files
 from ..base.arrays import Array
 from ..base.errors import SettingError
 from ..models import ClosedForm
@@ -30,7 +30,7 @@ FAR = 100.0
 def export_c(form: ClosedForm, policy: Callable[[Array], Array], path: str | os.PathLike[str], name: str) -> None:
     """Write :func:`c_source` to a file, with a self-test that compares it with the policy."""
     states = _probes(form)
-    Path(path).write_text(c_source(form, name, states, policy(states)), encoding="ascii")
+    files.write(path, c_source(form, name, states, policy(states)))
 
 
 def c_source(form: ClosedForm, name: str, states: Array, actions: Array) -> str:

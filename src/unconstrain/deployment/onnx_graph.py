@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..base import files
 from ..base.arrays import Array, require_extra
 from ..models import ClosedForm
 
@@ -21,7 +21,7 @@ IR_VERSION = 8
 
 def export_onnx(form: ClosedForm, path: str | os.PathLike[str]) -> None:
     """Write :func:`onnx_model` to a file."""
-    Path(path).write_bytes(onnx_model(form))
+    files.write(path, onnx_model(form))
 
 
 def onnx_model(form: ClosedForm) -> bytes:

@@ -31,9 +31,9 @@ def diagnosis_page(
     demonstrations : sequence of Demonstration
         Those that it is of, in the same order.
     title : str
-        Of the page; text.
+        Of the page.
     states, actions : sequence of str
-        Names of the columns; text.
+        Names of the columns.
 
     Returns
     -------
@@ -43,17 +43,16 @@ def diagnosis_page(
     Raises
     ------
     MissingExtraError
-        If plotly is not installed.
+        If plotly or jinja2 is not installed.
     """
     demos = list(demonstrations)
-    said = "".join(f"<li>{escape(one)}</li>" for one in sentences(found, states, actions))
     return html.document(
         title,
         "What was recorded is the wish of the demonstrator with whatever the surroundings took away. This page says "
         "how well the wish can be told from these recordings: how much noise is in the way, where the constraints "
         "varied too little, and which further demonstration would help most.",
         _tiles(found, demos),
-        f"<ul>{said}</ul>",
+        html.bullets(sentences(found, states, actions)),
         html.section("Where the policy is not known", _map(found, demos, states, actions)),
         html.section("What to record next", _next(found, states, actions)),
         html.section("Free or constrained", _freedom(found)),
@@ -61,19 +60,19 @@ def diagnosis_page(
     )
 
 
-def unknown(policy: Policy, demos: list[Demonstration]) -> str:
-    """The map and what to record next, for the page of a fit; HTML."""
+def unknown(policy: Policy, demos: list[Demonstration]) -> list[html.Markup]:
+    """The map and what to record next, for the page of a fit."""
     try:
         found = diagnose(policy, demos)
     except InvalidDataError as error:
-        return html.paragraph(f"Nothing can be said about that: {escape(str(error))}")
+        return [html.paragraph(f"Nothing can be said about that: {error}")]
     states = [f"state {index + 1}" for index in range(demos[0].states.shape[1])]
     actions = [f"action {index + 1}" for index in range(demos[0].actions.shape[1])]
-    told = "".join(html.paragraph(escape(one)) for one in sentences(found, states, actions))
-    return told + _map(found, demos, states, actions) + _next(found, states, actions)
+    told = map(html.paragraph, sentences(found, states, actions))
+    return [*told, _map(found, demos, states, actions), _next(found, states, actions)]
 
 
-def _tiles(found: Diagnosis, demos: list[Demonstration]) -> str:
+def _tiles(found: Diagnosis, demos: list[Demonstration]) -> html.Markup:
     return html.tiles(
         [
             (str(len(demos)), f"demonstrations, {len(found.undetermined)} samples"),
@@ -85,7 +84,7 @@ def _tiles(found: Diagnosis, demos: list[Demonstration]) -> str:
     )
 
 
-def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], actions: Sequence[str]) -> str:
+def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], actions: Sequence[str]) -> html.Markup:
     """Two state columns, coloured by how little is known."""
     recorded = stack(demos).states
     regions = found.regions[:MOST_REGIONS]
@@ -121,14 +120,14 @@ def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], ac
     return html.picture("known", [picture], caption)
 
 
-def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> str:
+def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> html.Markup:
     shown = found.regions[:MOST_REGIONS]
     rows = [
         [
             str(number),
             ", ".join(map(html.number, one.state)),
             ", ".join(map(html.number, one.direction)),
-            escape(one.demonstration),
+            one.demonstration,
             f"{one.along:.1%}",
             f"{one.spread:.1%}",
             f"{one.determined:.0%}",
@@ -136,9 +135,9 @@ def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> st
         ]
         for number, one in enumerate(shown, 1)
     ]
-    around, along = (escape(", ".join(names)) for names in (states, actions))
-    header = ["", f"demonstrate around<br>({around})", f"with motion left free along<br>({along})", "recorded in"]
-    header += ["unknown<br>along it", "unknown in<br>the region", "states<br>determined", "samples"]
+    around, along = (", ".join(names) for names in (states, actions))
+    header = ["", f"demonstrate around\n({around})", f"with motion left free along\n({along})", "recorded in"]
+    header += ["unknown\nalong it", "unknown in\nthe region", "states\ndetermined", "samples"]
     note = (
         f"The {len(shown)} of {len(found.regions)} regions with the least known state. What is unknown is a standard "
         "deviation as a share of the typical action; a state is determined where less than a tenth, or less than noise "
@@ -147,7 +146,7 @@ def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> st
     return html.table(header, rows, left=4, note=note)
 
 
-def _freedom(found: Diagnosis) -> str:
+def _freedom(found: Diagnosis) -> html.Markup:
     if found.free is None:
         return html.paragraph("The policy was fitted to other demonstrations.")
     shown = found.movements[:MOST_MOVEMENTS]
@@ -171,12 +170,11 @@ def _freedom(found: Diagnosis) -> str:
     return html.picture("free", [picture], caption)
 
 
-def _chosen(found: Diagnosis) -> str:
+def _chosen(found: Diagnosis) -> html.Markup:
     if not found.compared:
-        return html.paragraph(f"Nothing was compared with the policy, which was learnt as {escape(found.method)}.")
+        return html.paragraph(f"Nothing was compared with the policy, which was learnt as {found.method}.")
     rows = [
-        [escape(name), html.number(times), "yes" if name == found.method else "no"]
-        for name, times in found.compared.items()
+        [name, html.number(times), "yes" if name == found.method else "no"] for name, times in found.compared.items()
     ]
     note = "Inconsistency on held-out demonstrations over that on noise-corrected moments; the most probable policy is "
     note += "refuted where it is too far above 1; the less it knows of its samples, the sooner."

@@ -36,7 +36,7 @@ def policy_page(policy: Policy, demonstrations: Sequence[Demonstration], title: 
     demonstrations : sequence of Demonstration
         What it was fitted to, or others.
     title : str
-        Of the page; text.
+        Of the page.
 
     Returns
     -------
@@ -46,7 +46,7 @@ def policy_page(policy: Policy, demonstrations: Sequence[Demonstration], title: 
     Raises
     ------
     MissingExtraError
-        If plotly is not installed.
+        If plotly or jinja2 is not installed.
     """
     demos = list(demonstrations)
     learner = named(policy.learner)
@@ -58,24 +58,24 @@ def policy_page(policy: Policy, demonstrations: Sequence[Demonstration], title: 
         html.section("What the data determined", _determined(policy)),
     ]
     if policy.solution_.belief is not None:
-        parts.append(html.section("What is not known", unknown(policy, demos)))
+        parts.append(html.section("What is not known", *unknown(policy, demos)))
     if is_dataclass(learner):
         parts.append(html.settings_table(learner))
     return html.document(title, _lead(policy, demos, type(learner).__name__), *parts)
 
 
-def _lead(policy: Policy, demos: list[Demonstration], learner: str) -> str:
+def _lead(policy: Policy, demos: list[Demonstration], learner: str) -> html.Markup:
     states, actions, _ = stack(demos)
     kind = "Locally linear" if hasattr(policy, "fields_") else "Parametric"
-    return (
-        f"{kind} policy with the {escape(learner)} learner, for {states.shape[1]} state and {actions.shape[1]} action "
+    return html.markup(
+        "{} policy with the {} learner, for {} state and {} action "
         "columns. What was recorded is the wish of the demonstrator with whatever the surroundings took away; what was "
         "learnt is meant to be the wish alone. So it should agree with the recordings <i>along the observed motion</i> "
         "and may differ from them across it."
-    )
+    ).format(kind, learner, states.shape[1], actions.shape[1])
 
 
-def _summary(policy: Policy, demos: list[Demonstration]) -> str:
+def _summary(policy: Policy, demos: list[Demonstration]) -> html.Markup:
     solution = policy.solution_
     models, d, p = solution.weights.shape
     shape = f"{models} × {p}" if models > 1 else str(p)
@@ -90,12 +90,12 @@ def _summary(policy: Policy, demos: list[Demonstration]) -> str:
     )
 
 
-def _movements(policy: Policy, demos: list[Demonstration]) -> str:
+def _movements(policy: Policy, demos: list[Demonstration]) -> html.Markup:
     n, d = demos[0].states.shape[1], demos[0].actions.shape[1]
     tracks = [_thin(demo) for demo in demos]
     if n >= 3:
         panel = figures.movements(
-            [("training", demo.name, demo.states[:, :3]) for demo in tracks],
+            [("training", escape(demo.name), demo.states[:, :3]) for demo in tracks],
             labels=("state 1", "state 2", "state 3"),
         )
         rest = f" The other {n - 3} columns are not drawn." if n > 3 else ""
@@ -137,7 +137,7 @@ def _field(policy: Policy, demos: list[Demonstration]) -> object:
     )
 
 
-def _actions(policy: Policy, demos: list[Demonstration]) -> str:
+def _actions(policy: Policy, demos: list[Demonstration]) -> html.Markup:
     shown = demos[:MOST_PANELS]
     panels = []
     for demo in map(_thin, shown):
@@ -147,7 +147,7 @@ def _actions(policy: Policy, demos: list[Demonstration]) -> str:
         series = {"hybrid": predicted, "direct": along, "observed": demo.actions}
         panels.append(
             figures.over_time(
-                _times(demo), series, names, title=demo.name, time_label=_time_label(demo), row_height=130
+                _times(demo), series, names, title=escape(demo.name), time_label=_time_label(demo), row_height=130
             )
         )
     more = f" The first {len(shown)} of {len(demos)} demonstrations." if len(demos) > len(shown) else ""
@@ -162,7 +162,7 @@ def _actions(policy: Policy, demos: list[Demonstration]) -> str:
     )
 
 
-def _errors(policy: Policy, demos: list[Demonstration]) -> str:
+def _errors(policy: Policy, demos: list[Demonstration]) -> html.Markup:
     known = all(demo.truth is not None for demo in demos)
     support = _support(policy, demos)
     header = ["demonstration", "samples", "norm. inconsistency"]
@@ -171,7 +171,7 @@ def _errors(policy: Policy, demos: list[Demonstration]) -> str:
     metrics = (ninconsistency, ncpe, nupe) if known else (ninconsistency,)
 
     def cells(name: str, of: list[Demonstration], near: Array | None) -> list[str]:
-        row = [escape(name), str(sum(map(len, of))), *(html.number(_or_nan(metric, policy, of)) for metric in metrics)]
+        row = [name, str(sum(map(len, of))), *(html.number(_or_nan(metric, policy, of)) for metric in metrics)]
         return row if near is None else [*row, html.number(float(np.median(near))), html.number(float(near.min()))]
 
     shown = demos[:MOST_ROWS]
@@ -191,7 +191,7 @@ def _errors(policy: Policy, demos: list[Demonstration]) -> str:
     return html.table(header, rows, note=note, rules=(len(shown),))
 
 
-def _determined(policy: Policy) -> str:
+def _determined(policy: Policy) -> html.Markup:
     solution = policy.solution_
     panels = []
     if solution.eigenvalues is not None:

@@ -7,6 +7,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
+from ...base import files
+
 __all__ = ["DataClass", "Journal"]
 
 VERSION = 2
@@ -44,7 +46,7 @@ class Journal:
             done = {}
         self.path.parent.mkdir(parents=True, exist_ok=True)
         kept = [head, *(json.dumps([index, result]) for index, result in done.items()), ""]
-        self.path.write_text("\n".join(kept), encoding="utf-8")
+        files.write(self.path, "\n".join(kept))
         return done
 
     def add(self, index: int, result: Any) -> None:

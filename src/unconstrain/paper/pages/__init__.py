@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...base import files
 from ..experiments.trials import Result
 from . import figure4, figure5, plain, regimes, table1, table2, washing
 
@@ -44,7 +44,7 @@ def page(result: Result) -> str:
     Raises
     ------
     MissingExtraError
-        If plotly is not installed.
+        If plotly or jinja2 is not installed.
     """
     return _PAGES.get(result.name, plain.page)(result)
 
@@ -65,14 +65,16 @@ def write(result: Result, directory: str | os.PathLike[str]) -> tuple[Path, Path
     Raises
     ------
     MissingExtraError
-        If plotly is not installed; the JSON is written all the same.
+        If plotly or jinja2 is not installed; the JSON is written all the same.
+    WriteError
+        If a file cannot be written.
     """
     rows = json.dumps(_finite(result.to_json()), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     folder = Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
     data, shown = folder / f"{result.name}.json", folder / f"{result.name}.html"
-    _replace(data, rows)
-    _replace(shown, page(result))
+    files.write(data, rows)
+    files.write(shown, page(result))
     return data, shown
 
 
@@ -87,16 +89,3 @@ def _finite(value: Any) -> Any:
     if isinstance(value, float) and not np.isfinite(value):
         return None
     return value
-
-
-def _replace(path: Path, text: str) -> None:
-    """Write a file in one step: whoever reads it sees the old one or the new one."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise

@@ -32,7 +32,7 @@ def page(result: Result) -> str:
     )
 
 
-def _fields(result: Result) -> str:
+def _fields(result: Result) -> html.Markup:
     details = result.details
     grid, truth = details["grid"], details["policy"]
     longest = float(np.linalg.norm(truth, axis=1).max())
@@ -69,7 +69,7 @@ def _cut(fields: dict[str, Any], longest: float, constraint: str) -> list[str]:
     return [f"{share:.0%} of {figures.LABELS[key]} ({words})" for key, share in shares.items() if share > 0]
 
 
-def _table(result: Result) -> str:
+def _table(result: Result) -> html.Markup:
     header = ["method", "data", *(TITLES[metric] for metric in METRICS)]
     words = {"none": "free", "random": "constrained"}
     rows = [

@@ -2,35 +2,35 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ...base.arrays import Array
 from ...pages import figures, html
 from ..experiments import figure5
 from ..experiments.trials import LABELS, Result
+from . import table1
 
 __all__ = ["page"]
 
 TITLES = {metric: LABELS[metric] for metric in ("nupe", "ncpe")}
 ANGLE = "how far constraints vary, θ<sub>max</sub> (rad)"
 
-Curves = dict[str, tuple[Array, Array]]
-
 
 def page(result: Result) -> str:
     """Errors against how much the constraints vary."""
     widest = np.array(sorted({row["theta_max"] for row in result.rows}))
-    curves = {metric: _curves(result.rows, metric) for metric in TITLES}
+    rows = sorted(result.rows, key=lambda row: row["theta_max"])
+    curves = {metric: table1.curves(rows, metric) for metric in TITLES}
     return html.document(
         "Figure 5: from one constraint to many",
-        "Movement is allowed only along the policy turned by a random angle of at most θ<sub>max</sub>. At 0 the "
-        "recordings are the policy itself; to the right the constraint takes away more, and differently at each "
-        "sample. Direct learning is good at the left and gets worse steadily; inconsistency alone is the other way "
-        "round. The hybrid has to follow the lower of the two without being told where on this axis the data lies. "
-        "<b>nUPE</b> is the error of the learnt policy where it is free, <b>nCPE</b> after the constraint has "
-        "taken its share, both as a share of the policy’s variance.",
+        html.markup(
+            "Movement is allowed only along the policy turned by a random angle of at most θ<sub>max</sub>. At 0 the "
+            "recordings are the policy itself; to the right the constraint takes away more, and differently at each "
+            "sample. Direct learning is good at the left and gets worse steadily; inconsistency alone is the other way "
+            "round. The hybrid has to follow the lower of the two without being told where on this axis the data lies. "
+            "<b>nUPE</b> is the error of the learnt policy where it is free, <b>nCPE</b> after the constraint has "
+            "taken its share, both as a share of the policy’s variance."
+        ),
         html.section("Errors", _errors(widest, curves)),
         html.section("The hybrid against the better of the other two", _ratio(widest, result)),
         html.section("Numbers", _table(widest, curves, result)),
@@ -38,15 +38,7 @@ def page(result: Result) -> str:
     )
 
 
-def _curves(rows: list[dict[str, Any]], metric: str) -> Curves:
-    found: Curves = {}
-    for method in figures.METHODS:
-        own = sorted((row for row in rows if row["method"] == method), key=lambda row: row["theta_max"])
-        found[method] = tuple(np.array([row[f"{metric}_{what}"] for row in own]) for what in ("mean", "sd"))  # type: ignore[assignment]
-    return found
-
-
-def _errors(widest: Array, curves: dict[str, Curves]) -> str:
+def _errors(widest: Array, curves: dict[str, table1.Curves]) -> html.Markup:
     panels = []
     for metric, title in TITLES.items():
         ours = curves[metric]
@@ -64,7 +56,7 @@ def _errors(widest: Array, curves: dict[str, Curves]) -> str:
     )
 
 
-def _ratio(widest: Array, result: Result) -> str:
+def _ratio(widest: Array, result: Result) -> html.Markup:
     found = {title: figure5.ratios(result, metric) for metric, title in TITLES.items()}
     made = figures.ratios(
         widest,
@@ -82,9 +74,9 @@ def _ratio(widest: Array, result: Result) -> str:
     )
 
 
-def _table(widest: Array, curves: dict[str, Curves], result: Result) -> str:
-    header = ["θ<sub>max</sub> (rad)"]
-    header += [f"{title}<br>{method}" for title in TITLES.values() for method in figures.METHODS]
+def _table(widest: Array, curves: dict[str, table1.Curves], result: Result) -> html.Markup:
+    header: list[str] = [html.markup("θ<sub>max</sub> (rad)")]
+    header += [f"{title}\n{method}" for title in TITLES.values() for method in figures.METHODS]
     rows = [
         [
             html.number(angle),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
 from typing import Any
 
 from ...pages import html
@@ -22,7 +21,7 @@ def page(result: Result) -> str:
     return html.document(
         result.name,
         "The numbers of this experiment, in plain units, one row for each method and setting.",
-        html.table([escape(name) for name in header], rows, left=len(texts)),
+        html.table(header, rows, left=len(texts)),
         html.settings_table(result.settings),
     )
 
@@ -30,4 +29,4 @@ def page(result: Result) -> str:
 def _cell(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return html.number(value) if value is None or isinstance(value, int | float) else escape(str(value))
+    return html.number(value) if value is None or isinstance(value, int | float) else str(value)

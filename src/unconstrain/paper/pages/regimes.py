@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
 from typing import Any
 
 import numpy as np
@@ -19,43 +18,40 @@ TOP = 10.0
 def page(result: Result) -> str:
     """What holds where, as cells, as a summary, and row by row."""
     noises = list(dict.fromkeys(row["noise"] for row in result.rows))
-    trials = getattr(result.settings, "trials", 1)
+    systems = ", ".join(dict.fromkeys(row["system"] for row in result.rows))
     return html.document(
         "Learners in every regime of constraints and noise",
-        f"{_systems(result)} under constraints of many kinds, from none to some that are drawn at random, with and "
-        "without noise on the recorded actions. Every learner sees the same recordings. The <b>oracle</b> sees the "
-        "truth as well, and takes with it the best point on the paper’s path between consistency and risk. With "
-        f"<b>{KNOWN}</b>, every sample’s projection is given, and a ridge chosen by the truth. What counts "
-        f"is <b>nUPE</b>, how far the learnt policy is from the true one where nothing holds it back. {_said(result)}",
+        html.markup(
+            "Demonstrators ({systems}) move under constraints of many kinds, from none to some that are drawn at "
+            "random, with and without noise on the recorded actions. Every learner sees the same recordings. The "
+            "<b>oracle</b> sees the truth as well, and takes with it the best point on the paper’s path between "
+            "consistency and risk. With <b>{known}</b>, every sample’s projection is given, and a ridge chosen by the "
+            "truth. What counts is <b>nUPE</b>, how far the learnt policy is from the true one where nothing holds it "
+            "back. {said}"
+        ).format(systems=systems, known=KNOWN, said=_said(result)),
         html.section("Summary", _summary(result)),
         html.section("Regime by regime", *(_cells(result, noise, index) for index, noise in enumerate(noises))),
         html.section("What they know of their data", _knowledge(result)),
-        html.section("All numbers", _rows(result, trials)),
+        html.section("All numbers", _rows(result)),
         html.settings_table(result.settings),
     )
 
 
-def _systems(result: Result) -> str:
-    """Those that took part."""
-    names = list(dict.fromkeys(escape(row["system"]) for row in result.rows))
-    return f"Demonstrators ({', '.join(names)}) move"
-
-
-def _said(result: Result) -> str:
+def _said(result: Result) -> html.Markup:
     """The default learner, at each noise level."""
     ours = [one for one in result.tables["summary"] if one["method"] == DEFAULT]
     parts = [
         f"{one['noise']:.0%} noise {html.number(one['to_paper'])} times the paper’s {PAPER} and "
         f"{html.number(one['to_oracle'])} times the oracle (at worst {html.number(one['worst_to_oracle'])}, "
-        f"{escape(one['worst'])})"
+        f"{one['worst']})"
         for one in ours
     ]
-    return (
-        f"The nUPE of the learner <b>{DEFAULT}</b>, as a geometric mean over all regimes, is at {'; at '.join(parts)}."
+    return html.markup("The nUPE of the learner <b>{}</b>, as a geometric mean over all regimes, is at {}.").format(
+        DEFAULT, "; at ".join(parts)
     )
 
 
-def _summary(result: Result) -> str:
+def _summary(result: Result) -> html.Markup:
     summary = {(one["method"], one["noise"]): one for one in result.tables["summary"]}
     methods, noises = (list(dict.fromkeys(key[at] for key in summary)) for at in (0, 1))
     rows: list[list[str]] = []
@@ -64,12 +60,12 @@ def _summary(result: Result) -> str:
         rules.append(len(rows))
         for method in methods:
             one = summary[method, noise]
-            name = f"<b>{escape(method)}</b>" if method == DEFAULT else escape(method)
+            name = html.markup("<b>{}</b>").format(method) if method == DEFAULT else method
             cells = [html.number(one[key]) for key in ("to_paper", "to_oracle", "worst_to_oracle")]
-            rows.append([f"{noise:.0%}", name, escape(one["worst"]), *cells])
+            rows.append([f"{noise:.0%}", name, one["worst"], *cells])
     count = summary[methods[0], noises[0]]["regimes"]
-    header = ["noise", "method", "worst regime", f"nUPE / that of<br>the paper’s {PAPER}", "nUPE /<br>the oracle’s"]
-    header.append("the same in the<br>worst regime")
+    header = ["noise", "method", "worst regime", f"nUPE / that of\nthe paper’s {PAPER}", "nUPE /\nthe oracle’s"]
+    header.append("the same in the\nworst regime")
     note = (
         f"Geometric means over {count} regimes. Noise is the standard deviation on each action coordinate as a share "
     )
@@ -77,7 +73,7 @@ def _summary(result: Result) -> str:
     return html.table(header, rows, left=3, note=note, rules=rules[1:])
 
 
-def _cells(result: Result, noise: float, index: int) -> str:
+def _cells(result: Result, noise: float, index: int) -> html.Markup:
     """What each method has for nUPE over what the oracle has, methods by regimes."""
     mine = [row for row in result.rows if row["noise"] == noise and row["method"] != ORACLE]
     methods = list(dict.fromkeys(row["method"] for row in mine))
@@ -92,16 +88,16 @@ def _cells(result: Result, noise: float, index: int) -> str:
         scale="ratio",
         top=TOP,
     )
-    caption = (
+    caption = html.markup(
         "Geometric means over the data sets. White is as good as the oracle, orange worse, blue better; colours end at "
-        f"{TOP:g} and {1 / TOP:g}. Numbers after a system are the θ<sub>max</sub> of eq. 20 (rad) in the plane, and "
+        "{:g} and {:g}. Numbers after a system are the θ<sub>max</sub> of eq. 20 (rad) in the plane, and "
         "the coordinates of the hand that are held for the arm; “half” and “quarter free” say how many demonstrations "
         "nothing constrained."
-    )
+    ).format(TOP, 1 / TOP)
     return html.picture(f"noise-{index + 1}", [picture], caption if index == 0 else "As above.")
 
 
-def _knowledge(result: Result) -> str:
+def _knowledge(result: Result) -> html.Markup:
     """How well free samples are told, and how often intervals hold the truth."""
     keys = ("auc_mean", "coverage_mean")
     methods = [
@@ -115,8 +111,8 @@ def _knowledge(result: Result) -> str:
     for noise in dict.fromkeys(row["noise"] for row in result.rows):
         for method in methods:
             mine = [row for row in result.rows if (row["method"], row["noise"]) == (method, noise)]
-            rows.append([f"{noise:.0%}", escape(method), *(cell for key in keys for cell in _range(mine, key))])
-    header = ["noise", "method", "free told apart:<br>mean area", "least", "95 % intervals hold<br>the truth: mean"]
+            rows.append([f"{noise:.0%}", method, *(cell for key in keys for cell in _range(mine, key))])
+    header = ["noise", "method", "free told apart:\nmean area", "least", "95 % intervals hold\nthe truth: mean"]
     header.append("least")
     note = (
         "The area under the curve is the probability that a free sample is thought freer than a constrained one, over "
@@ -132,7 +128,7 @@ def _range(rows: list[dict[str, Any]], key: str) -> list[str]:
     return [html.number(float(np.mean(known))), html.number(min(known))] if known else ["–", "–"]
 
 
-def _rows(result: Result, trials: int) -> str:
+def _rows(result: Result) -> html.Markup:
     header = ["system", "constraint", "noise", "method", "nUPE", "nUPE, geom.", "/ oracle", "nCPE", "norm. incon."]
     header += ["area", "coverage"]
     rows, rules, before = [], [], None
@@ -143,10 +139,10 @@ def _rows(result: Result, trials: int) -> str:
         before = where
         rows.append(
             [
-                escape(row["system"]),
-                escape(row["constraint"]),
+                row["system"],
+                row["constraint"],
                 f"{row['noise']:.0%}",
-                escape(row["method"]),
+                row["method"],
                 html.mean_sd(row["nupe_mean"], row["nupe_sd"]),
                 html.number(100.0 * row["nupe_geometric"]),
                 html.number(row["to_oracle"]),
@@ -156,6 +152,6 @@ def _rows(result: Result, trials: int) -> str:
                 html.number(row["coverage_mean"]),
             ]
         )
-    note = f"Mean ± standard deviation over {trials} data sets; errors × 10⁻²."
+    note = f"Mean ± standard deviation over {getattr(result.settings, 'trials', 1)} data sets; errors × 10⁻²."
     table = html.table(header, rows, left=4, note=note, rules=rules)
-    return f"<details><summary>{len(rows)} rows</summary>{table}</details>"
+    return html.folded(f"{len(rows)} rows", table)

@@ -4,36 +4,43 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+from ...base.arrays import Array
 from ...pages import figures, html
 from ..experiments.trials import METRICS, Result
 
-__all__ = ["dots", "page", "table"]
+__all__ = ["Curves", "curves", "dots", "page", "table"]
 
 WORDS = {"none": "free", "random": "constrained"}
 TITLES = {"nupe": "nUPE", "ncpe": "nCPE", "ninc": "inconsistency"}
+
+Curves = dict[str, tuple[Array, Array]]
 
 
 def page(result: Result) -> str:
     """Ours beside the paper's, as a table and as dots."""
     return html.document(
         "Table I: free and randomly constrained demonstrations",
-        "A point moves in the plane on a limit cycle. It is recorded either <b>free</b> or while a rail that nobody "
-        "tells the learner about holds it to one direction, and the rail turns twice on the way. Three methods learn "
-        "from these recordings. <b>nUPE</b> says how far the learnt policy is from the true one where nothing holds it "
-        "back, and <b>nCPE</b> how far after the rail has taken its share; both are squared errors as a share of the "
-        "policy’s variance, so 1 is as bad as always answering the mean. Direct learning fails on constrained "
-        "data and inconsistency alone on free data; the hybrid should be good at both.",
+        html.markup(
+            "A point moves in the plane on a limit cycle. It is recorded either <b>free</b> or while a rail that "
+            "nobody tells the learner about holds it to one direction, and the rail turns twice on the way. Three "
+            "methods learn from these recordings. <b>nUPE</b> says how far the learnt policy is from the true one "
+            "where nothing holds it back, and <b>nCPE</b> how far after the rail has taken its share; both are squared "
+            "errors as a share of the policy’s variance, so 1 is as bad as always answering the mean. Direct learning "
+            "fails on constrained data and inconsistency alone on free data; the hybrid should be good at both."
+        ),
         html.section("Errors", table(result, 100)),
         html.section("The same, to compare at a glance", dots(result)),
         html.settings_table(result.settings),
     )
 
 
-def table(result: Result, trials_of_paper: int) -> str:
+def table(result: Result, trials_of_paper: int) -> html.Markup:
     """Ours beside the paper's, row by row."""
     header = ["method", "data"]
     for metric in METRICS:
-        header += [f"{TITLES[metric]}<br>ours", f"{TITLES[metric]}<br>paper"]
+        header += [f"{TITLES[metric]}\nours", f"{TITLES[metric]}\npaper"]
     rows, rules = [], []
     for index, row in enumerate(result.rows):
         if index and row["method"] != result.rows[index - 1]["method"]:
@@ -47,7 +54,7 @@ def table(result: Result, trials_of_paper: int) -> str:
     return html.table(header, rows, left=2, note=note, rules=rules)
 
 
-def dots(result: Result) -> str:
+def dots(result: Result) -> html.Markup:
     """Means of both, method by method, on logarithmic axes."""
     constraints = list(dict.fromkeys(row["constraint"] for row in result.rows))
     found = {(row["method"], row["constraint"]): row for row in result.rows}
@@ -70,6 +77,15 @@ def dots(result: Result) -> str:
         "upwards only; downwards it would often pass zero. Lower is better.",
         keys=figures.METHODS,
     )
+
+
+def curves(rows: list[dict[str, Any]], metric: str) -> Curves:
+    """Means and standard deviations of each method, in the order of the rows."""
+    of_methods = {method: [row for row in rows if row["method"] == method] for method in figures.METHODS}
+    return {
+        method: (np.array([row[f"{metric}_mean"] for row in own]), np.array([row[f"{metric}_sd"] for row in own]))
+        for method, own in of_methods.items()
+    }
 
 
 def _pair(row: dict[str, Any], metric: str, scale: float = 1.0) -> tuple[float | None, float | None]:

@@ -18,11 +18,14 @@ def page(result: Result) -> str:
     """Errors against the number of constraints, and ours beside the paper's."""
     return html.document(
         "Table II: an arm whose hand is held",
-        "An arm of seven joints moves away from its joint limits while one to six coordinates of its hand (position, "
-        "then orientation) are kept still. Nobody tells the learner that, and it has to find how the joints would move "
-        "if the hand were free. <b>nUPE</b> says how far it is from that, <b>nCPE</b> how far once the hand is held "
-        "again; both as a share of the policy’s variance. The more is held, the less direct learning sees; "
-        "inconsistency alone loses its footing where one direction is left. The hybrid should stay low everywhere.",
+        html.markup(
+            "An arm of seven joints moves away from its joint limits while one to six coordinates of its hand "
+            "(position, then orientation) are kept still. Nobody tells the learner that, and it has to find how the "
+            "joints would move if the hand were free. <b>nUPE</b> says how far it is from that, <b>nCPE</b> how far "
+            "once the hand is held again; both as a share of the policy’s variance. The more is held, the less direct "
+            "learning sees; inconsistency alone loses its footing where one direction is left. The hybrid should stay "
+            "low everywhere."
+        ),
         html.section("Errors against the constraint", _curves(result)),
         html.section("Beside the paper", table1.table(result, 50)),
         html.section("The same, to compare at a glance", table1.dots(result)),
@@ -30,18 +33,11 @@ def page(result: Result) -> str:
     )
 
 
-def _curves(result: Result) -> str:
+def _curves(result: Result) -> html.Markup:
     held = np.arange(1.0, len(table2.CONSTRAINTS) + 1.0)
     panels = []
     for metric, title in (("nupe", "nUPE"), ("ncpe", "nCPE")):
-        of_methods = {method: [row for row in result.rows if row["method"] == method] for method in figures.METHODS}
-        curves = {
-            method: (
-                np.array([row[f"{metric}_mean"] for row in rows]),
-                np.array([row[f"{metric}_sd"] for row in rows]),
-            )
-            for method, rows in of_methods.items()
-        }
+        curves = table1.curves(result.rows, metric)
         panels.append(figures.bands(held, curves, title=title, labels=(HELD, title), log=True))
     return html.picture(
         "curves",

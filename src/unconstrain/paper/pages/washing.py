@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -66,25 +65,26 @@ def page(result: Result) -> str:
     )
 
 
-def _lead(real: bool) -> str:
-    task = (
+def _lead(real: bool) -> html.Markup:
+    recorded = html.markup(
         "A robot arm is led by hand to wipe a car rim at four tilts. One tilt at a time is left out: the policy is "
         "learnt from the other three, put under the constraint of the fourth, and compared with what was done there. "
         "The true policy is not known, so only the error along the surface can be told (<b>nCPE</b>)."
-        if real
-        else "One wish in three dimensions (circle, come back to height, press down) wipes seven plates, and each "
+    )
+    simulated = html.markup(
+        "One wish in three dimensions (circle, come back to height, press down) wipes seven plates, and each "
         "plate takes away what points into it. A camera watches with millimetres of noise. The policy is learnt from "
         "the five plates that are tilted about x and tested on the two that are tilted about y. <b>nCPE</b> is its "
         "error along the plate, <b>nUPE</b> its error where nothing is in the way."
     )
-    return (
-        f"{task} Nobody tells the learner where the plates are. Direct learning averages them into the skill; "
+    return (recorded if real else simulated) + (
+        " Nobody tells the learner where the plates are. Direct learning averages them into the skill; "
         "inconsistency alone removes them, but trusts noisy directions as much as clear ones; the hybrid weighs the "
         "one against the other."
     )
 
 
-def _demonstrations(splits: list[Split]) -> str:
+def _demonstrations(splits: list[Split]) -> html.Markup:
     if len(splits) == 1:
         [split] = splits
         kinds = [("training", one) for one in split.training] + [("held out", one) for one in split.held_out]
@@ -112,7 +112,7 @@ def _demonstrations(splits: list[Split]) -> str:
     )
 
 
-def _fields(cases: list[Case], real: bool) -> str:
+def _fields(cases: list[Case], real: bool) -> html.Markup:
     panels = []
     for case in cases:
         plate = case.plate
@@ -152,7 +152,7 @@ def _fields(cases: list[Case], real: bool) -> str:
     )
 
 
-def _velocities(cases: list[Case]) -> str:
+def _velocities(cases: list[Case]) -> html.Markup:
     panels = []
     for case in cases:
         demo = case.demonstration
@@ -170,7 +170,7 @@ def _velocities(cases: list[Case]) -> str:
     )
 
 
-def _rollouts(splits: list[Split]) -> str:
+def _rollouts(splits: list[Split]) -> html.Markup:
     panels, left = [], []
     for split in splits:
         surface = split.held_out[0]
@@ -182,7 +182,7 @@ def _rollouts(splits: list[Split]) -> str:
             path = plate.flatten(run.states)
             outside = np.flatnonzero(np.abs(path).max(axis=1) > reach)
             if len(outside):
-                left.append(f"{figures.LABELS[name]} after {_seconds(run, outside[0])} on {escape(case.title)}")
+                left.append(f"{figures.LABELS[name]} after {_seconds(run, outside[0])} on {case.title}")
             lines[name] = path[: outside[0] + 1] if len(outside) else path
         panels.append(figures.paths(lines, reach=reach, title=case.title, labels=_axis_labels(case), height=480))
     longest = next(iter(splits[0].rollouts.values()))
@@ -201,7 +201,7 @@ def _seconds(movement: Demonstration, at: int) -> str:
     return f"step {at}" if movement.times is None else f"{round(movement.times[at], 1):g} s"
 
 
-def _spectra(splits: list[Split], settings: Any) -> str:
+def _spectra(splits: list[Split], settings: Any) -> html.Markup:
     panels, counts, directions = [], [], 0
     for split in splits:
         found = split.policies["inconsistency"].solution_

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
 from typing import Any
 
 import numpy as np
@@ -17,12 +16,6 @@ from ..systems.arm import LWR3
 
 __all__ = ["on_the_arm"]
 
-WITHOUT_GRAPHICS = (
-    "The scene cannot be rendered on this machine, so the arm is drawn as lines. On Debian, "
-    f"<code>apt-get install {BACKENDS['egl']} libegl-mesa0</code> or <code>apt-get install {BACKENDS['osmesa']}</code> "
-    "gives the real picture; <code>unconstrain doctor</code> tells what is missing."
-)
-
 STATEMENT = (
     "The hybrid policy gives a velocity at every position; projected onto the plate it becomes joint velocities, "
     "together with standing upright on the plate and an admittance that holds the pressing force; what that leaves "
@@ -32,12 +25,12 @@ STATEMENT = (
 )
 
 
-def on_the_arm(result: Result) -> list[str]:
+def on_the_arm(result: Result) -> list[html.Markup]:
     """Everything about the reproduction; a sentence where there is no physics engine."""
     settings: Any = result.settings
     done: list[Reproduction] = result.details["reproductions"]
     if not done:
-        return [html.paragraph(escape(WITHOUT_PHYSICS))]
+        return [html.paragraph(WITHOUT_PHYSICS)]
     parts = [html.paragraph(STATEMENT.format(reach=100.0 * settings.reach))]
     wiped = [one for one in done if one.wipe is not None]
     if wiped:
@@ -46,10 +39,10 @@ def on_the_arm(result: Result) -> list[str]:
     return [*parts, _measures(result.tables["reproduction"])]
 
 
-def _pictures(shown: Reproduction) -> str:
+def _pictures(shown: Reproduction) -> html.Markup:
     wipe = shown.wipe
     assert wipe is not None
-    name = f"plate {escape(shown.plate.name)}, which nobody {'wiped' if shown.demonstration is None else 'learnt from'}"
+    name = f"plate {shown.plate.name}, which nobody {'wiped' if shown.demonstration is None else 'learnt from'}"
     try:
         moving = html.image(
             "animation", animation(film(wipe)), "gif", f"The arm wipes a plate tilted {shown.plate.name}",
@@ -63,10 +56,13 @@ def _pictures(shown: Reproduction) -> str:
             "reproduction (below), like figure 6 of the paper. The demonstration was not learnt from.",
         )  # fmt: skip
     except UnconstrainError:
-        return html.image(
-            "arm", _lines(wipe), "png", f"The arm wipes a plate tilted {shown.plate.name}, as lines",
-            f"The arm on {name}, at four moments of its last turn. {WITHOUT_GRAPHICS}",
-        )  # fmt: skip
+        without = html.markup(
+            "The arm on {}, at four moments of its last turn. The scene cannot be rendered on this machine, so the arm "
+            "is drawn as lines. On Debian, <code>apt-get install {egl} libegl-mesa0</code> or <code>apt-get install "
+            "{osmesa}</code> gives the real picture; <code>unconstrain doctor</code> tells what is missing."
+        ).format(name, **BACKENDS)
+        shows = f"The arm wipes a plate tilted {shown.plate.name}, as lines"
+        return html.image("arm", _lines(wipe), "png", shows, without)
 
 
 def _lines(wipe: Wipe) -> bytes:
@@ -79,7 +75,7 @@ def _lines(wipe: Wipe) -> bytes:
     return figures.arm_on_plate(np.moveaxis(joints, -1, 0), track, plate)
 
 
-def _tracks(wiped: list[Reproduction]) -> str:
+def _tracks(wiped: list[Reproduction]) -> html.Markup:
     panels = []
     for one in wiped:
         wipe = one.wipe
@@ -104,16 +100,16 @@ def _tracks(wiped: list[Reproduction]) -> str:
     )
 
 
-def _measures(rows: list[dict[str, Any]]) -> str:
-    header = ["plate", "learnt from", "turns", "contact", "force (N)", "frequency (Hz)", "demonstrated (Hz)"]
-    header += ["radius (cm)", "demonstrated (cm)", "drift (mm)", "path error (mm)", "largest torque"]
-    header += ["× real time"]
+def _measures(rows: list[dict[str, Any]]) -> html.Markup:
+    header = ["plate", "learnt\nfrom", "turns", "contact", "force\n(N)", "frequency\n(Hz)", "demonstrated\n(Hz)"]
+    header += ["radius\n(cm)", "demonstrated\n(cm)", "drift\n(mm)", "path error\n(mm)", "largest\ntorque"]
+    header += ["× real\ntime"]
     several = len({row["trial"] for row in rows}) > 1
     body = []
     for surface in dict.fromkeys(row["surface"] for row in rows):
         of_plate = [row for row in rows if row["surface"] == surface]
         done = [row for row in of_plate if not row["failed"]]
-        name = escape(surface) + (f"<br>{len(of_plate)} runs" if several else "")
+        name = surface + (f"\n{len(of_plate)} runs" if several else "")
         if not done:
             body.append([name, "yes" if of_plate[0]["seen"] else "no", *["–"] * 11])
             continue
@@ -124,8 +120,8 @@ def _measures(rows: list[dict[str, Any]]) -> str:
         "have been. "
     )
     note += "Means over the runs, and in brackets the worst." if several else ""
-    failed = "".join(f"<br>Not wiped: {escape(row['failed'])}" for row in rows if row["failed"])
-    return html.table(header, body, left=2, note=note + failed)
+    failed = [f"Not wiped: {row['failed']}" for row in rows if row["failed"]]
+    return html.table(header, body, left=2, note=html.markup("<br>").join([note, *failed]))
 
 
 def _cells(rows: list[dict[str, Any]]) -> list[str]:
