@@ -187,7 +187,7 @@ def test_examples_use_options_that_exist():
 def test_importing_the_command_line_imports_nothing_heavy():
     code = "import sys, unconstrain.cli; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment(), check=True)
-    heavy = {"numpy", "scipy", "sklearn", "joblib", "pandas", "matplotlib", "plotly", "rich", "mujoco", "pooch"}
+    heavy = {"numpy", "scipy", "sklearn", "joblib", "pandas", "matplotlib", "plotly", "rich", "mink", "mujoco", "pooch"}
     assert not heavy & set(done.stdout.split())
 
 

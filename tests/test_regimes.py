@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import mannwhitneyu
 
 import unconstrain as uc
 from test_report import References, browser, opened  # noqa: F401 - a fixture
@@ -105,6 +106,15 @@ def test_noise_is_a_share_of_the_policys_spread():
 )  # fmt: skip
 def test_the_area_is_the_share_of_pairs_in_the_right_order(scores, labels, area):
     assert regimes.area_under_curve(np.array(scores, float), np.array(labels, bool)) == pytest.approx(area)
+
+
+def test_the_area_is_the_statistic_of_mann_and_whitney():
+    rng = np.random.default_rng(5)
+    for decimals in (1, 2, 8):  # with many ties, and with few
+        scores, labels = np.round(rng.random(200), decimals), rng.random(200) < 0.3
+        pairs = mannwhitneyu(scores[labels], scores[~labels]).statistic
+        area = pairs / (labels.sum() * (~labels).sum())
+        assert regimes.area_under_curve(scores, labels) == pytest.approx(area, abs=1e-12)
 
 
 def test_the_table_prints_what_is_not_known_as_a_dash(result, capsys):

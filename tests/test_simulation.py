@@ -13,8 +13,8 @@ from unconstrain.base.errors import InvalidDataError, MissingExtraError, Setting
 from unconstrain.motion.containment import Contained
 from unconstrain.pages import figures
 from unconstrain.paper import simulation
-from unconstrain.paper.simulation import control, pictures
-from unconstrain.paper.simulation.postures import in_plane
+from unconstrain.paper.simulation import control, pictures, postures
+from unconstrain.paper.simulation.postures import READY
 from unconstrain.paper.simulation.scene import LINK_MASSES, TOOL
 from unconstrain.paper.systems.arm import LWR3
 from unconstrain.paper.systems.wiping import HELD_OUT, PLATES, Plate, Strokes, WipingPolicy
@@ -85,25 +85,41 @@ def test_a_plate_out_of_reach_is_refused_with_the_reason(plate, said):
         simulation.postures_along(np.zeros((1, 3)), plate)
 
 
-def test_joint_velocities_do_the_task_and_return_to_rest_in_what_it_leaves_free():
-    rng = np.random.default_rng(3)
-    tasks, wanted, rest = rng.standard_normal((5, 7)), 0.1 * rng.standard_normal(5), 0.1 * rng.standard_normal(7)
-    found = control.joint_velocity(tasks, wanted, rest, np.zeros(7), LWR3, damping=1e-12)
+def tool_tasks(posture, plate):
+    """Jacobian of the sponge's face and of its tilt, straight from the arm's, shape (5, 7)."""
+    jacobian, axis = LWR3.jacobian(posture[None])[0], -plate.rotation[:, 2]
+    face = jacobian[:3] + TOOL * np.cross(jacobian[3:], axis, axis=0)
+    return np.vstack([face, plate.rotation[:, :2].T @ jacobian[3:]])
+
+
+def test_a_change_moves_the_face_and_returns_to_rest_in_what_that_leaves_free():
+    plate = PLATES[1]
+    posture, off, tilt = postures.Reach(plate, READY + np.r_[0.4, np.zeros(6)]).search(np.zeros(3))
+    assert off < 1e-5
+    assert tilt < 1e-4
+    reach = postures.Reach(plate, READY, returning=0.1)
+    reach.arm.update(posture)
+    shift = np.array([1e-3, -2e-3, 5e-4])
+    tasks = tool_tasks(posture, plate)
     inverse = np.linalg.pinv(tasks)
-    assert_allclose(found, inverse @ wanted + (np.eye(7) - inverse @ tasks) @ rest, atol=1e-9)
+    free = (np.eye(7) - inverse @ tasks) @ (0.1 * (READY - posture))
+    assert np.abs(free).max() > 0.01
+    assert_allclose(reach.change(shift), inverse @ np.r_[shift, 0.0, 0.0] + free, atol=3e-4)
 
 
 def test_a_joint_at_its_limit_stops_and_the_others_make_up_for_it():
-    rng = np.random.default_rng(4)
-    tasks = rng.standard_normal((3, 7))
-    posture = np.zeros(7)
-    posture[3] = LWR3.upper[3] - np.radians(3.0)
-    wanted = 0.3 * tasks[:, 3]  # joint 4 alone could do it
-    found = control.joint_velocity(tasks, wanted, np.zeros(7), posture, LWR3, damping=1e-12)
-    assert found[3] <= 1e-9
-    assert_allclose(tasks @ found, wanted, atol=1e-8)
-    everywhere = control.joint_velocity(tasks, 1e3 * wanted, np.zeros(7), LWR3.upper - np.radians(3.0), LWR3)
-    assert (everywhere <= 1e-9).all()
+    limit = LWR3.upper - np.radians(3.0)
+    posture = np.array([limit[0], -0.5, 0.5, 1.4, 0.3, -1.1, 0.0])  # not in one plane: there too few could make up
+    x, y, z = -LWR3.frames(posture[None])[0][-1, :, 2, 0]
+    plate = Plate(float(np.degrees(-np.arcsin(y))), float(np.degrees(np.arctan2(x, z))))  # as the tool stands
+    reach = postures.Reach(plate, posture)
+    tasks = tool_tasks(posture, plate)
+    wanted = np.r_[1e-3 * tasks[:3, 0], 0.0, 0.0]  # as the first joint would move the sponge
+    change = reach.change(wanted[:3])
+    assert abs(change[0]) < 1e-9
+    assert_allclose(tasks @ change, wanted, atol=2e-5)
+    for far in (-1e3, 1e3):
+        assert (np.abs(posture + reach.change(np.full(3, far))) <= limit + 1e-6).all()
 
 
 def test_the_arm_keeps_contact_and_follows_the_plan(wiped):
@@ -191,6 +207,9 @@ def test_without_the_engine_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MissingExtraError, match="sim"):
         simulation.arm_scene(PLATES[0])
+    monkeypatch.setitem(sys.modules, "mink", None)
+    with pytest.raises(MissingExtraError, match=r"mink.*sim"):
+        simulation.postures_along(np.zeros((1, 3)), PLATES[0])
 
 
 def test_contained_changes_nothing_near_the_data_and_comes_back_from_afar():
@@ -212,10 +231,3 @@ def test_contained_changes_nothing_near_the_data_and_comes_back_from_afar():
         Contained(outwards, states, reach=0.0)
     with pytest.raises(SettingError):
         Contained(outwards, states, reach=0.1, gain=-1.0)
-
-
-def test_the_axes_of_a_plane_are_orthonormal():
-    for plate in PLATES:
-        axes = in_plane(plate.rotation[:, 2])
-        assert_allclose(axes @ axes.T, np.eye(2), atol=1e-12)
-        assert_allclose(axes @ plate.rotation[:, 2], 0.0, atol=1e-12)

@@ -12,7 +12,7 @@ EXTRAS = {
     "viz": ("plotly", "jinja2", "matplotlib"),
     "data": ("pyarrow", "h5py", "pooch"),
     "arm": ("yourdfpy",),
-    "sim": ("mujoco", "pillow"),
+    "sim": ("mujoco", "mink", "pillow"),
     "onnx": ("onnx", "onnxruntime"),
     "cluster": ("dask", "distributed"),
     "arrays": ("array-api-compat",),

@@ -271,13 +271,9 @@ def _knowledge(policy: Policy, training: Sequence[Demonstration], test: Sequence
 
 def area_under_curve(scores: Array, labels: Array) -> float:
     """Probability that a labelled sample scores above one that is not, ties half; NaN without one of either."""
-    from scipy.stats import rankdata
+    from sklearn.metrics import roc_auc_score
 
-    count = int(labels.sum())
-    if count in (0, len(labels)):
-        return float("nan")
-    ranks = rankdata(scores)[labels].sum()
-    return float((ranks - count * (count + 1) / 2) / (count * (len(labels) - count)))
+    return float(roc_auc_score(labels, scores)) if len(np.unique(labels)) == 2 else float("nan")
 
 
 def _is_free(demo: Demonstration) -> Array:

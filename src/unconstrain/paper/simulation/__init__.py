@@ -6,7 +6,7 @@ Needs the extra ``sim``.
 from .control import Controller, Gains
 from .engine import BACKENDS, backend, engine
 from .hand import demonstrate
-from .postures import follow, postures_along
+from .postures import postures_along
 from .reproduction import Wipe, centres, turning, wipe
 from .scene import Scene, arm_scene, hand_scene
 
@@ -21,7 +21,6 @@ __all__ = [
     "centres",
     "demonstrate",
     "engine",
-    "follow",
     "hand_scene",
     "postures_along",
     "turning",

@@ -8,12 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.arrays import Array
-from ..systems.arm import LWR3, Arm
+from ..systems.arm import LWR3
 from .engine import engine
-from .postures import MARGIN, TILT_WEIGHT, in_plane
+from .postures import Reach
 from .scene import Scene
 
-__all__ = ["Controller", "Gains", "joint_velocity"]
+__all__ = ["Controller", "Gains"]
+
+MOMENT = 0.1
+"""The controller looks ahead by this: a joint may not go so fast that it would be at its limit sooner, s."""
 
 
 @dataclass(frozen=True)
@@ -27,13 +30,13 @@ class Gains:
     yielding : float
         Admittance: velocity along the normal for each newton of force error, m/s/N.
     upright : float
-        How fast the tool turns to stand on the plate, 1/s.
+        How fast the tool turns to stand on the plate, 1/s; at most 10.
     posture : float
-        How fast the arm returns to its resting posture where the tasks leave it free, 1/s.
+        How fast the arm returns to its resting posture where the tasks leave it free, 1/s; at most 10.
     stiffness : float
         Of the velocity loop of the joints, 1/s.
     every : int
-        The policy is asked anew after so many steps of the controller.
+        The policy is asked, and joint velocities are found, anew after so many steps of the torque loop.
     """
 
     force: float = 15.0
@@ -48,10 +51,9 @@ class Controller:
     """Torques for one step after another.
 
     The policy's velocity is projected onto the plate. Along the normal the
-    arm yields until the sponge presses as it should. Both, and standing on the
-    plate, become joint velocities by damped least squares; what these tasks
-    leave free returns to a resting posture; joints stop before their limits.
-    An inverse-dynamics velocity loop makes torques of them.
+    arm yields until the sponge presses as it should. :class:`Reach` makes
+    joint velocities of both, and an inverse-dynamics velocity loop makes
+    torques of these.
 
     Parameters
     ----------
@@ -62,84 +64,37 @@ class Controller:
     rest : ndarray, shape (n,)
         The resting posture, rad.
     gains : Gains, optional
-    arm : Arm
     """
 
-    def __init__(
-        self, policy: Callable[[Array], Array], scene: Scene, rest: Array, gains: Gains | None = None, arm: Arm = LWR3
-    ) -> None:
+    def __init__(self, policy: Callable[[Array], Array], scene: Scene, rest: Array, gains: Gains | None = None) -> None:
         self.gains = gains or Gains()
-        self._policy, self._scene, self._rest, self._arm = policy, scene, rest, arm
+        self._policy, self._scene = policy, scene
+        self._reach = Reach(scene.plate, rest, MOMENT * self.gains.upright, MOMENT * self.gains.posture)
         self._normal = scene.plate.rotation[:, 2]
         self._tangent = np.eye(3) - np.outer(self._normal, self._normal)
-        self._across = in_plane(self._normal)
         self._mujoco = engine()
-        self._jacobian = np.zeros((6, scene.model.nv))
+        self._jacobian = np.zeros((3, scene.model.nv))
         self._inertia = np.zeros((scene.model.nv, scene.model.nv))
         self._face = scene.model.site("face").id
-        self._velocity, self._step = np.zeros(3), 0
+        self._velocity, self._step = np.zeros(LWR3.joints), 0
 
     def torques(self) -> Array:
         """Torques for the scene as it is, shape (n,), N m."""
-        model, data, gains, joints = self._scene.model, self._scene.data, self.gains, self._arm.joints
-        if self._step % gains.every == 0:
-            self._velocity = self._tangent @ self._policy(self._scene.face[None])[0]
+        model, data, joints = self._scene.model, self._scene.data, LWR3.joints
+        if self._step % self.gains.every == 0:
+            self._velocity = self._joint_velocity()
         self._step += 1
-        self._mujoco.mj_jacSite(model, data, self._jacobian[:3], self._jacobian[3:], self._face)
-        jacobian = self._jacobian[:, :joints]
-        tool = data.site_xmat[self._face].reshape(3, 3)[:, 2]
-        tasks = np.vstack([jacobian[:3], TILT_WEIGHT * self._across @ jacobian[3:]])
-        along = gains.yielding * (self._scene.force - gains.force)
-        upright = TILT_WEIGHT * self._across @ np.cross(tool, -self._normal)
-        wanted = np.concatenate([self._velocity + along * self._normal, gains.upright * upright])
-        posture = data.qpos[:joints]
-        velocity = joint_velocity(tasks, wanted, gains.posture * (self._rest - posture), posture, self._arm)
         self._mujoco.mj_fullM(model, data, self._inertia)
-        pull = gains.stiffness * (velocity - data.qvel[:joints])
-        pressed = jacobian[:3].T @ (gains.force * self._normal)  # what the plate is about to push back with
+        pull = self.gains.stiffness * (self._velocity - data.qvel[:joints])
+        self._mujoco.mj_jacSite(model, data, self._jacobian, None, self._face)
+        # What the plate is about to push back with.
+        pressed = self._jacobian[:, :joints].T @ (self.gains.force * self._normal)
         held = data.qfrc_bias[:joints] - data.qfrc_passive[:joints]  # weight and joint friction
         return self._inertia[:joints, :joints] @ pull + held - pressed
 
-
-def joint_velocity(
-    tasks: Array, wanted: Array, rest: Array, posture: Array, arm: Arm, *, damping: float = 1e-4, within: float = 0.1
-) -> Array:
-    """Joint velocities for a task, with what it leaves free for another, inside the joint limits.
-
-    A joint that would come nearer to a limit than it may within the next
-    moment is slowed down, and the others make up for it.
-
-    Parameters
-    ----------
-    tasks : ndarray, shape (k, n)
-    wanted : ndarray, shape (k,)
-    rest : ndarray, shape (n,)
-        Velocity for what the task leaves free, rad/s.
-    posture : ndarray, shape (n,)
-        rad.
-    arm : Arm
-    damping : float
-        Of the least squares, near singular postures.
-    within : float
-        The moment, s.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        rad/s.
-    """
-    lowest, highest = ((limit - posture) / within for limit in (arm.lower + MARGIN, arm.upper - MARGIN))
-    free, velocity = np.ones(len(posture), bool), np.zeros(len(posture))
-    while True:
-        moving = tasks[:, free]
-        solve = np.linalg.solve(moving @ moving.T + damping * np.eye(len(tasks)), np.eye(len(tasks)))
-        missing = wanted - tasks[:, ~free] @ velocity[~free] - moving @ rest[free]
-        velocity[free] = rest[free] + moving.T @ (solve @ missing)
-        beyond = np.maximum(velocity - highest, lowest - velocity)
-        worst = int(np.where(free, beyond, -np.inf).argmax())
-        if not free[worst] or beyond[worst] <= 1e-12:
-            return velocity
-        velocity[worst] = np.clip(velocity[worst], lowest[worst], highest[worst])
-        free[worst] = False
-        if not free.any():
-            return velocity
+    def _joint_velocity(self) -> Array:
+        """The policy's velocity along the plate and the yielding across it as joint velocities, rad/s, shape (n,)."""
+        along = self._tangent @ self._policy(self._scene.face[None])[0]
+        across = self.gains.yielding * (self._scene.force - self.gains.force) * self._normal
+        self._reach.arm.update(self._scene.data.qpos[: LWR3.joints])
+        return self._reach.change(MOMENT * (along + across)) / MOMENT

@@ -61,13 +61,13 @@ def _stroke(scene: Scene, wipe: WipingPolicy, how: Strokes, rng: np.random.Gener
     data.qpos[:3] = how.put_down(scene.plate, wipe, rng) - _face_at_rest(scene)
     seen = np.empty((how.samples, 3))
     for step in range(-settling, how.samples * every):
-        mujoco.mj_forward(model, data)
+        mujoco.mj_step1(model, data)
         at, moving = scene.face, data.qvel[:3]
         if step >= 0 and step % every == 0:
             seen[step // every] = at
         wanted = wipe(at[None])[0] + drift[step] if step >= 0 else np.zeros(3)
         data.qfrc_applied[:3] = -PRESS * normal + FOLLOWING * (wanted - moving)
-        mujoco.mj_step(model, data)
+        mujoco.mj_step2(model, data)
     return how.watched(seen, scene.plate.name, rng)
 
 

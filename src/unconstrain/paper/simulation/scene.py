@@ -18,7 +18,7 @@ from ..systems.arm import LWR3, Arm
 from ..systems.wiping import Plate
 from .engine import engine
 
-__all__ = ["TIME_STEP", "TOOL", "Scene", "arm_scene", "hand_scene"]
+__all__ = ["TIME_STEP", "TOOL", "Scene", "arm_alone", "arm_scene", "hand_scene"]
 
 TIME_STEP = 0.002
 """Of the physics and of the torque controller, s."""
@@ -96,27 +96,26 @@ def arm_scene(plate: Plate, arm: Arm = LWR3) -> Scene:
     """The arm with the sponge at its flange, on a pedestal before the plate; a torque for each joint."""
     mujoco = engine()
     spec = _room(mujoco, plate)
-    body = spec.worldbody
-    body.add_geom(
+    spec.worldbody.add_geom(
         type=mujoco.mjtGeom.mjGEOM_CYLINDER, fromto=[0, 0, 0, 0, 0, 0.06], size=[0.09, 0, 0], rgba=_DARK,
         contype=0, conaffinity=0,
     )  # fmt: skip
-    for joint in range(arm.joints):
-        body = _link(mujoco, spec, body, arm, joint)
-    flange = arm.origins[-1]
-    tool = body.add_body(name="flange", pos=flange[:3, 3], quat=_quaternion(flange[:3, :3]))
-    tool.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_CYLINDER, fromto=[0, 0, 0, 0, 0, HOLDER - 0.015], size=[0.02, 0, 0], rgba=_DARK,
-        mass=0.2, contype=0, conaffinity=0,
-    )  # fmt: skip
-    _sponge(mujoco, spec, tool, HOLDER)
+    _arm(mujoco, spec, arm)
     return _compiled(mujoco, spec, plate)
+
+
+def arm_alone(arm: Arm = LWR3) -> Any:
+    """The arm with a sponge that does not give, and nothing around it: the engine's model, for kinematics."""
+    mujoco = engine()
+    spec = _radians(mujoco)
+    _arm(mujoco, spec, arm)
+    spec.delete(spec.joint("sponge"))
+    return spec.compile()
 
 
 def _room(mujoco: Any, plate: Plate) -> Any:
     """Floor, light, camera and the plate on a post."""
-    spec = mujoco.MjSpec()
-    spec.compiler.degree = False
+    spec = _radians(mujoco)
     spec.option.timestep = TIME_STEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -149,6 +148,26 @@ def _room(mujoco: Any, plate: Plate) -> Any:
     )  # fmt: skip
     world.add_camera(name="view", pos=_CAMERA, fovy=33, xyaxes=_look())
     return spec
+
+
+def _radians(mujoco: Any) -> Any:
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    return spec
+
+
+def _arm(mujoco: Any, spec: Any, arm: Arm) -> None:
+    """Links, flange and sponge."""
+    body = spec.worldbody
+    for joint in range(arm.joints):
+        body = _link(mujoco, spec, body, arm, joint)
+    flange = arm.origins[-1]
+    tool = body.add_body(name="flange", pos=flange[:3, 3], quat=_quaternion(flange[:3, :3]))
+    tool.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER, fromto=[0, 0, 0, 0, 0, HOLDER - 0.015], size=[0.02, 0, 0], rgba=_DARK,
+        mass=0.2, contype=0, conaffinity=0,
+    )  # fmt: skip
+    _sponge(mujoco, spec, tool, HOLDER)
 
 
 def _link(mujoco: Any, spec: Any, parent: Any, arm: Arm, joint: int) -> Any:

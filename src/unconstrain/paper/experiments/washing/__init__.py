@@ -171,7 +171,7 @@ def headlines(result: Result) -> list[str]:
 
 
 WITHOUT_PHYSICS = (
-    "These demonstrations come from the kinematic stand-in, and no arm wipes: contact needs MuJoCo. "
+    "These demonstrations come from the kinematic stand-in, and no arm wipes: contact needs MuJoCo and mink. "
     "Install it with: pip install 'unconstrain[sim]'"
 )
 """What is said where the extra is missing."""

@@ -39,8 +39,8 @@ class Surface:
 
 
 def has_physics() -> bool:
-    """Whether the physics engine is installed."""
-    return find_spec("mujoco") is not None
+    """Whether the physics engine and its inverse kinematics are installed."""
+    return all(find_spec(name) is not None for name in ("mujoco", "mink"))
 
 
 def simulated_split(settings: Settings, seed: np.random.SeedSequence) -> tuple[list[Surface], list[Surface]]:
