@@ -22,25 +22,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import InvalidDataError, MissingExtraError, SettingError
 
-__all__ = [
-    "BLOCK_ROWS",
-    "LARGEST",
-    "SMALLEST_VARIANCE",
-    "Array",
-    "as_groups",
-    "as_matrix",
-    "as_table",
-    "as_vector",
-    "as_weights",
-    "beside",
-    "check_at_least",
-    "is_foreign",
-    "namespace",
-    "on_host",
-    "require_extra",
-    "slices",
-]
-
 Array = NDArray[np.float64]
 
 LARGEST = 1e30

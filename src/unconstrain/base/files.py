@@ -11,8 +11,6 @@ from typing import BinaryIO
 
 from .errors import UnconstrainError, WriteError
 
-__all__ = ["write"]
-
 
 def write(
     path: str | os.PathLike[str],

@@ -20,8 +20,6 @@ from typing import Any
 
 from threadpoolctl import ThreadpoolController
 
-__all__ = ["Workers", "workers"]
-
 WORTH_A_THREAD = 1e7
 """Multiplications below which threads take longer than they save."""
 

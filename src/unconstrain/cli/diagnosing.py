@@ -17,7 +17,6 @@ from .reading import complete, options_for_reading, recipe_of, recordings_in, sa
 if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
     from ..evaluation import Diagnosis
 
-__all__ = ["diagnose"]
 
 MOST_ROWS = 8
 

@@ -6,8 +6,6 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from typing import NamedTuple
 
-__all__ = ["Finding", "examine"]
-
 EXTRAS = {
     "viz": ("plotly", "jinja2", "matplotlib"),
     "data": ("pyarrow", "h5py", "pooch"),

@@ -14,16 +14,6 @@ if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
     from ..policies import Policy
     from ..recordings import Stream
 
-__all__ = [
-    "MODELS",
-    "Alpha",
-    "check_speed_power",
-    "check_writable",
-    "default_learner",
-    "learn",
-    "learner_of",
-    "policy_of",
-]
 
 MODELS = ("local", "rbf", "linear")
 

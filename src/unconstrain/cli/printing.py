@@ -23,8 +23,6 @@ if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
     from ..policies import Policy
     from ..recordings import Stream
 
-__all__ = ["Group", "deliver", "number", "print_table", "progress_bar", "say_fit", "show_warning"]
-
 
 class Group(click.Group):
     """Turns our errors, and those of the file system, into one sentence and exit code 2."""

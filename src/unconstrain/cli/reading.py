@@ -15,18 +15,6 @@ from ..base.errors import SettingError
 if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
     from ..recordings import Recipe, Recording, Stream
 
-__all__ = [
-    "Names",
-    "Numbers",
-    "complete",
-    "options_for_reading",
-    "recipe_of",
-    "recordings_in",
-    "recordings_one_by_one",
-    "said_recipe",
-    "stream_of",
-]
-
 
 class Names(click.ParamType):  # type: ignore[type-arg]  # generic in the newest click only
     """Names separated by commas."""

@@ -15,8 +15,6 @@ from ..base.arrays import Array, as_matrix, as_vector, check_at_least
 from ..base.errors import SettingError
 from ..risks import unit_actions
 
-__all__ = ["Constraint", "JacobianRows", "Plane", "PolicyAligned", "SwitchingLine"]
-
 Constraint = Callable[[Array, Array], Array]
 
 

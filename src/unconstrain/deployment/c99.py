@@ -14,8 +14,6 @@ from ..base.arrays import Array
 from ..base.errors import SettingError
 from ..models import ClosedForm
 
-__all__ = ["TOLERANCE", "c_source"]
-
 TOLERANCE = 1e-9
 """The self-test allows this share of the largest action: mathematics libraries differ in the last digit of ``exp``."""
 

@@ -11,8 +11,6 @@ from ..base import files
 from ..base.arrays import Array, require_extra
 from ..models import ClosedForm
 
-__all__ = ["onnx_model"]
-
 OPSET = 17
 """Of the standard operators; runtimes of 2022 know it."""
 

@@ -13,8 +13,6 @@ from ..base.arrays import Array
 from ..base.errors import InvalidDataError
 from ..models import ClosedForm
 
-__all__ = ["Step", "stepper", "stepper_on"]
-
 Step: TypeAlias = Callable[[ArrayLike, Array | None], Array]
 """From a state (n,) to an action (d,), written into the second argument if that is given."""
 

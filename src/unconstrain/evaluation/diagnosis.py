@@ -16,8 +16,6 @@ from ..models import choose_variance, cover
 from ..policies import Policy
 from ..recordings import Demonstration, stack, unique_names
 
-__all__ = ["Diagnosis", "Movement", "Region", "diagnose", "named", "sentences"]
-
 SMALL = 0.1
 """An undetermined spread below this share of the typical action does not count."""
 

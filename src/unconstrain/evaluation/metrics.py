@@ -21,8 +21,6 @@ from ..base.errors import InvalidDataError, SettingError
 from ..recordings import Demonstration, stack
 from ..risks import action_projection, null_space_projection, project
 
-__all__ = ["cpe", "inconsistency", "ncpe", "ninconsistency", "nupe", "upe"]
-
 PolicyLike = Callable[[Array], Array]
 ConstraintLike = Callable[[Array, Array], Array]
 Demonstrations = Demonstration | Sequence[Demonstration]

@@ -19,9 +19,6 @@ from ..base.arrays import SMALLEST_VARIANCE, Array, as_matrix, beside, check_at_
 from ..base.errors import InvalidDataError, SettingError
 from .formula import ClosedForm, exponents
 
-__all__ = ["Affine", "FeatureMap", "KMeansRBF", "NormalisedRBF", "Placeable", "gaussian", "shares", "squared_distances"]
-
-
 _LEAST_SPREAD = 1e10 * np.sqrt(SMALLEST_VARIANCE)
 """States that spread less count as one; centres laid among them may be nearer to one another, by a millionth."""
 

@@ -8,8 +8,6 @@ import numpy as np
 
 from ..base.arrays import Array
 
-__all__ = ["ClosedForm", "exponents"]
-
 
 @dataclass(frozen=True, eq=False)
 class ClosedForm:

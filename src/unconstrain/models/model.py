@@ -12,8 +12,6 @@ from .features import FeatureMap
 from .formula import ClosedForm
 from .receptive_fields import Everywhere, ReceptiveFields
 
-__all__ = ["Model"]
-
 
 @dataclass(frozen=True, eq=False)
 class Model:

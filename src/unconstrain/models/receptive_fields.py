@@ -11,8 +11,6 @@ from ..base.errors import SettingError
 from .features import Affine, FeatureMap, gaussian, shares, squared_distances
 from .formula import ClosedForm, exponents
 
-__all__ = ["MOST_FIELDS", "ReceptiveFields", "choose_variance", "cover"]
-
 MOST_FIELDS = 100
 """How many fields :func:`choose_variance` puts up with before it widens them."""
 

@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike
 from ..base.arrays import Array, as_matrix, check_at_least
 from ..models import cover
 
-__all__ = ["Contained"]
-
 
 class Contained:
     """A policy that is kept near the demonstrations: a robot must not follow it where nobody has been.

@@ -13,8 +13,6 @@ from ..base.errors import InvalidDataError, SettingError
 from ..recordings import Demonstration, Truth
 from ..risks import null_space_projection, project
 
-__all__ = ["rollout"]
-
 ConstraintLike = Callable[[Array, Array], Array]
 
 

@@ -13,8 +13,6 @@ from ..policies import Policy
 from ..recordings import Demonstration, stack
 from . import figures, html
 
-__all__ = ["diagnosis_page", "unknown"]
-
 MOST_POINTS = 4000
 MOST_REGIONS = 8
 MOST_MOVEMENTS = 60

@@ -18,8 +18,6 @@ from ..risks import action_projection, project
 from . import figures, html
 from .diagnosis import unknown
 
-__all__ = ["policy_page"]
-
 MOST_PANELS = 4
 MOST_ROWS = 30
 MOST_POINTS = 2000

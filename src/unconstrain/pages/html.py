@@ -21,22 +21,6 @@ from .figures.style import COLOURS, LABELS, MARKERS, PALETTE, plotly
 if TYPE_CHECKING:
     from markupsafe import Markup as Markup
 
-__all__ = [
-    "bullets",
-    "document",
-    "folded",
-    "image",
-    "label",
-    "markup",
-    "mean_sd",
-    "number",
-    "paragraph",
-    "picture",
-    "section",
-    "settings_table",
-    "table",
-    "tiles",
-]
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 

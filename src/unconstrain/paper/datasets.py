@@ -18,8 +18,6 @@ from ..base.arrays import Array, require_extra
 from ..base.errors import MissingExtraError, ReadError
 from ..recordings import Demonstration, Recipe, Recording, prepare
 
-__all__ = ["DATA_VARIABLE", "WipingBout", "load_rim_wiping"]
-
 DATA_VARIABLE = "UNCONSTRAIN_DATA"
 """Environment variable with a folder that holds local copies."""
 

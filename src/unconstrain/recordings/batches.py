@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from ..base.arrays import BLOCK_ROWS, Array, beside, is_foreign, namespace, slices
 
-__all__ = ["Batch", "Groups"]
-
 Groups = Sequence[Hashable] | NDArray[np.generic]
 
 FOREIGN_BLOCK_ROWS = 2**20

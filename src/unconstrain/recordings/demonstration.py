@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from ..base.arrays import Array, as_matrix, as_vector
 from ..base.errors import InvalidDataError
 
-__all__ = ["Demonstration", "Recording", "Stack", "Truth", "stack"]
-
 
 @dataclass(frozen=True, eq=False)
 class Recording:

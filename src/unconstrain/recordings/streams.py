@@ -17,8 +17,6 @@ from .demonstration import Demonstration, Recording
 from .preparation import Recipe, complete_recipe, prepare
 from .readers import expand, read_blocks
 
-__all__ = ["HELD_BYTES", "Stream"]
-
 HELD_BYTES = 2**25
 """Demonstrations that take no more than this in all are kept after the first walk, so that files are read once."""
 

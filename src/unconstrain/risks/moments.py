@@ -30,8 +30,6 @@ from numpy.typing import NDArray
 from ..base.arrays import Array, beside, is_foreign, namespace, on_host
 from .projection import unit_actions
 
-__all__ = ["Moments", "Sums", "gather", "gather_blocks", "total"]
-
 
 @dataclass(frozen=True, eq=False)
 class Moments:

@@ -11,8 +11,6 @@ from ..base.arrays import Array, beside, namespace
 from .moments import Moments
 from .quadratic import Quadratic
 
-__all__ = ["inconsistency", "standard_risk", "unvec", "vec"]
-
 
 def inconsistency(moments: Moments) -> Quadratic:
     """How far the policy, projected onto each action, misses it (eqs 4 and 14).

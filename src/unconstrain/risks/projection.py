@@ -13,8 +13,6 @@ import numpy as np
 from ..base.arrays import Array, namespace
 from ..base.errors import InvalidDataError
 
-__all__ = ["RANK_TOLERANCE", "ROW_TOLERANCE", "action_projection", "null_space_projection", "project", "unit_actions"]
-
 RANK_TOLERANCE = 1e-9
 """Singular values below this share of the largest count as zero."""
 

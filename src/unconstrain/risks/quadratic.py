@@ -38,17 +38,6 @@ from scipy.linalg.blas import dtrsm
 
 from ..base.arrays import Array, is_foreign, namespace
 
-__all__ = [
-    "NOISE",
-    "SECONDARY_NOISE",
-    "Path",
-    "Quadratic",
-    "eigensystem",
-    "lexicographic_path",
-    "minimum",
-    "softened_minima",
-]
-
 NOISE = 1e-10
 """Eigenvalues of the first objective below this share of the largest are rounding."""
 

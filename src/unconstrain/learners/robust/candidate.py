@@ -8,8 +8,6 @@ from ...base.arrays import Array
 from .posterior import Posterior
 from .smoothness import Smoothness
 
-__all__ = ["Candidate"]
-
 
 @dataclass(frozen=True, eq=False)
 class Candidate:

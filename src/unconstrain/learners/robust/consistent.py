@@ -33,8 +33,6 @@ from .segments import constrained_error
 from .smoothness import Smoothness
 from .sphere import distances
 
-__all__ = ["by_segments", "noise_corrected", "softened"]
-
 _ROUNDS = 3
 _STEPS = 6
 _REFUTED = 3.0

@@ -17,8 +17,6 @@ from .posterior import Posterior, unit_information
 from .smoothness import Smoothness
 from .sphere import SPREADS, Beliefs, Distances, beliefs, distances
 
-__all__ = ["clearly_more", "free_probability", "maximise", "settle"]
-
 MISFIT = 0.015
 """No model is right to better than this share of the actions' size."""
 

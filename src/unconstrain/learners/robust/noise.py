@@ -29,8 +29,6 @@ from scipy.stats import chi2
 from ...base.arrays import Array
 from ...risks import Moments, standard_risk
 
-__all__ = ["corrected", "correlation_time", "noise_by_differences"]
-
 _ORDER = 4
 _LAGS = 20
 _QUIET = 0.05

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from ...base.arrays import Array
 from ...risks import SECONDARY_NOISE, Quadratic, eigensystem, minimum, unvec
 
-__all__ = ["Posterior", "unit_information"]
-
 
 def unit_information(weights: int, sizes: Array) -> Array:
     """How much the standard risk counts beside the inconsistency, as priors go, shape (M,).

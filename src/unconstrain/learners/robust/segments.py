@@ -17,8 +17,6 @@ from ...base.arrays import Array
 from ...risks import Quadratic
 from ...training import Samples
 
-__all__ = ["change_points", "constrained_error", "found_segments", "projection_of"]
-
 _CLEAR = 3.0
 """A direction is real if the actions' rms along it is more than so many times the noise."""
 

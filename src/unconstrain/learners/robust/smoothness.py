@@ -25,8 +25,6 @@ from ...training import Samples
 from ..thresholds import judged
 from .posterior import Posterior
 
-__all__ = ["Smoothness"]
-
 _RANK = 1e-10
 """Eigenvalues of R below this share of the largest are rounding."""
 

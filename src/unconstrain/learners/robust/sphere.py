@@ -26,8 +26,6 @@ from scipy.special import gammaln, logsumexp
 
 from ...base.arrays import Array
 
-__all__ = ["SPREADS", "Beliefs", "Distances", "beliefs", "distances"]
-
 SPREADS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.4)
 """The s_k: typical angles between action and policy, in radians for the small ones."""
 

@@ -8,8 +8,6 @@ from ...base.arrays import Array, require_extra
 from .planes import Quad
 from .style import COLOURS, INK
 
-__all__ = ["arm_on_plate"]
-
 
 def arm_on_plate(joints: Array, track: Array, plate: Quad) -> bytes:
     """Draw an arm in several postures, its plate, and the path of its tip.

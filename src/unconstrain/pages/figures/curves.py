@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from ...base.arrays import Array
 from .style import COLOURS, DASHES, LABELS, MARKERS, METHODS, dress, figure, legend, plotly, translucent
 
-__all__ = ["bands", "bars", "dots", "over_time", "ratio_table", "spectra", "step_scores"]
-
 
 def bands(
     x: Array,

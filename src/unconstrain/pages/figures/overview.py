@@ -13,8 +13,6 @@ from ...recordings import Demonstration
 from ...risks import unit_actions
 from .style import COLOURS, INK
 
-__all__ = ["overview"]
-
 WORST = 60.0
 """Angular errors are coloured up to here, degrees."""
 

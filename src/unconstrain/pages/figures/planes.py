@@ -11,8 +11,6 @@ import numpy as np
 from ...base.arrays import Array
 from .style import COLOURS, DASHES, figure, legend, plotly
 
-__all__ = ["Quad", "arrow_lines", "broken", "clipped", "known_map", "paths", "vector_field"]
-
 # In the order in which they are drawn, with their widths: what lies below shows at the edges.
 _ARROWS = {"inconsistency": 1.4, "direct": 3.2, "hybrid": 1.9, "truth": 0.9, "observed": 0.9}
 

@@ -11,8 +11,6 @@ from ...base.arrays import Array
 from .planes import Quad, broken
 from .style import COLOURS, INK, PALETTE, RULE, figure, legend
 
-__all__ = ["movements"]
-
 
 def movements(
     tracks: Sequence[tuple[str, str, Array]],

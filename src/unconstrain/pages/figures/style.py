@@ -7,8 +7,6 @@ from typing import Any
 
 from ...base.arrays import require_extra
 
-__all__ = ["COLOURS", "DASHES", "LABELS", "MARKERS", "METHODS", "PALETTE", "figure", "legend", "plotly", "translucent"]
-
 METHODS = ("direct", "inconsistency", "hybrid")
 
 # Okabe and Ito's palette: told apart with any colour vision, and by lightness in print.

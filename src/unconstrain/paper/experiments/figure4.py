@@ -11,8 +11,6 @@ from . import toy
 from .table1 import CONSTRAINTS
 from .trials import Progress, Result, errors, row
 
-__all__ = ["Settings", "headlines", "run"]
-
 
 @dataclass(frozen=True)
 class Settings(toy.ToySettings):

@@ -10,8 +10,6 @@ from . import toy
 from .journal import Journal
 from .trials import LABELS, Progress, Result, errors, row, run_trials
 
-__all__ = ["Settings", "headlines", "ratios", "run"]
-
 
 @dataclass(frozen=True)
 class Settings(toy.ToySettings):

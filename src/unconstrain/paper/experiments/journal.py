@@ -9,8 +9,6 @@ from typing import Any, ClassVar, Protocol
 
 from ...base import files
 
-__all__ = ["DataClass", "Journal"]
-
 VERSION = 2
 """To be raised when trials change."""
 

@@ -36,8 +36,6 @@ from . import toy
 from .journal import Journal
 from .trials import Progress, Result, row, run_trials
 
-__all__ = ["ARM", "DEFAULT", "PLANAR", "Settings", "demonstrate", "headlines", "run", "with_noise"]
-
 PLANAR = ("none", "random", "half", "quarter free", "0.1", "0.3", "0.6", "1", "1.5")
 """Constraints of the two systems in the plane. Numbers are the θ_max of eq. 20, rad; "half" and "quarter free"
 say which share of the demonstrations nothing constrains, while the others are constrained at random (eq. 19)."""

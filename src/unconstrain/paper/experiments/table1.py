@@ -11,8 +11,6 @@ from . import toy
 from .journal import Journal
 from .trials import LABELS, Progress, Result, errors, row, run_trials
 
-__all__ = ["PAPER", "Settings", "headlines", "run"]
-
 PAPER: dict[tuple[str, str], dict[str, tuple[float, float]]] = {
     ("direct", "none"): {"nupe": (0.034, 0.044), "ncpe": (0.034, 0.044), "ninc": (0.026, 0.039)},
     ("direct", "random"): {"nupe": (58.338, 9.556), "ncpe": (8.596, 2.813), "ninc": (8.596, 2.813)},

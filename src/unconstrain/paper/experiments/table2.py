@@ -17,8 +17,6 @@ from ..systems.arm import LWR3, JointLimitAvoidance
 from .journal import Journal
 from .trials import Progress, Result, errors, row, run_trials
 
-__all__ = ["CONSTRAINTS", "PAPER", "Settings", "headlines", "run"]
-
 CONSTRAINTS = ("1", "1-2", "1-2-3", "1-...-4", "1-...-5", "1-...-6")
 """Which coordinates of the hand are held; rows of the Jacobian."""
 

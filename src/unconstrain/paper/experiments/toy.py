@@ -16,8 +16,6 @@ from ...recordings import Demonstration
 from ...training import Folds
 from ..systems.limit_cycle import LimitCycle
 
-__all__ = ["ToySettings", "demonstrate", "free", "learners", "policy", "policy_aligned", "random_lines", "split"]
-
 Draw = Callable[["ToySettings", np.random.Generator], Constraint | None]
 
 

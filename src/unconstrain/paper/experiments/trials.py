@@ -16,8 +16,6 @@ from ...policies import Policy
 from ...recordings import Demonstration
 from .journal import DataClass, Journal
 
-__all__ = ["LABELS", "METRICS", "Progress", "Result", "errors", "row", "run_trials"]
-
 METRICS = ("nupe", "ncpe", "ninc")
 """Normalised unconstrained and constrained policy error, and inconsistency."""
 

@@ -10,8 +10,6 @@ from ...pages import figures, html
 from ..experiments.trials import METRICS, Result
 from .table1 import TITLES
 
-__all__ = ["page"]
-
 WORDS = {"none": "Unconstrained demonstrations", "random": "Randomly constrained demonstrations"}
 
 

@@ -10,8 +10,6 @@ from ..experiments import figure5
 from ..experiments.trials import LABELS, Result
 from . import table1
 
-__all__ = ["page"]
-
 TITLES = {metric: LABELS[metric] for metric in ("nupe", "ncpe")}
 ANGLE = "how far constraints vary, θ<sub>max</sub> (rad)"
 

@@ -7,8 +7,6 @@ from typing import Any
 from ...pages import html
 from ..experiments.trials import Result
 
-__all__ = ["page"]
-
 
 def page(result: Result) -> str:
     """All rows as one table."""

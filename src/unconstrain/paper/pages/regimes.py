@@ -10,8 +10,6 @@ from ...pages import figures, html
 from ..experiments.regimes import DEFAULT, KNOWN, ORACLE, PAPER
 from ..experiments.trials import Result
 
-__all__ = ["page"]
-
 TOP = 10.0
 
 

@@ -10,8 +10,6 @@ from ...base.arrays import Array
 from ...pages import figures, html
 from ..experiments.trials import METRICS, Result
 
-__all__ = ["Curves", "curves", "dots", "page", "table"]
-
 WORDS = {"none": "free", "random": "constrained"}
 TITLES = {"nupe": "nUPE", "ncpe": "nCPE", "ninc": "inconsistency"}
 

@@ -9,8 +9,6 @@ from ..experiments import table2
 from ..experiments.trials import Result
 from . import table1
 
-__all__ = ["page"]
-
 HELD = "coordinates of the hand that are held"
 
 

@@ -16,8 +16,6 @@ from ..systems.wiping import WipingPolicy
 from .washing_arm import on_the_arm
 from .washing_scores import bars, scores
 
-__all__ = ["page"]
-
 ARROWS = 11
 """Fields are drawn on so many points along each axis of a plate."""
 

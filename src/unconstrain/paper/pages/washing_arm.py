@@ -14,8 +14,6 @@ from ..simulation import BACKENDS, Wipe
 from ..simulation.pictures import animation, film, strip
 from ..systems.arm import LWR3
 
-__all__ = ["on_the_arm"]
-
 STATEMENT = (
     "The hybrid policy gives a velocity at every position; projected onto the plate it becomes joint velocities, "
     "together with standing upright on the plate and an admittance that holds the pressing force; what that leaves "

@@ -9,8 +9,6 @@ import numpy as np
 from ...pages import figures, html
 from ..experiments.trials import Result
 
-__all__ = ["bars", "scores"]
-
 Row = dict[str, Any]
 KINDS = {"plane": "normal of the plane", "tool": "axis of the tool"}
 

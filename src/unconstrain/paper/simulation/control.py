@@ -13,8 +13,6 @@ from .engine import engine
 from .postures import Reach
 from .scene import Scene
 
-__all__ = ["Controller", "Gains"]
-
 MOMENT = 0.1
 """The controller looks ahead by this: a joint may not go so fast that it would be at its limit sooner, s."""
 

@@ -10,8 +10,6 @@ from types import ModuleType
 
 from ...base.arrays import require_extra
 
-__all__ = ["BACKENDS", "backend", "engine"]
-
 BACKENDS = {"egl": "libegl1", "osmesa": "libosmesa6"}
 """What draws without a screen, and the Debian package that brings it."""
 

@@ -10,8 +10,6 @@ from ..systems.wiping import Plate, Strokes, WipingPolicy, observed, slow_noise
 from .engine import engine
 from .scene import TIME_STEP, Scene, hand_scene
 
-__all__ = ["demonstrate"]
-
 FOLLOWING = 200.0
 """How hard the hand follows what it wants, N per m/s."""
 

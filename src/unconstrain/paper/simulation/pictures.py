@@ -24,8 +24,6 @@ from .engine import backend, engine
 from .reproduction import Wipe
 from .scene import Scene, arm_scene, hand_scene
 
-__all__ = ["animation", "film", "strip"]
-
 FRAMES_A_SECOND = 12.5
 
 _TRAIL = (0.86, 0.2, 0.45, 1.0)

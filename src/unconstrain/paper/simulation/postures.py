@@ -10,8 +10,6 @@ from ..systems.arm import LWR3
 from ..systems.wiping import Plate
 from .scene import arm_alone
 
-__all__ = ["READY", "Reach", "postures_along"]
-
 READY = np.radians([0.0, -30.0, 0.0, 80.0, 0.0, -75.0, 0.0])
 """Elbow up and hand down, far from the joint limits: where the search begins, rad."""
 

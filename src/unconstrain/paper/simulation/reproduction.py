@@ -20,8 +20,6 @@ from .engine import engine
 from .postures import postures_along
 from .scene import HALF_PLATE, TIME_STEP, Scene, arm_scene
 
-__all__ = ["Wipe", "centres", "turning", "wipe"]
-
 RECORD_EVERY = 5
 """The sponge is recorded every so many steps of the physics: 100 times a second."""
 

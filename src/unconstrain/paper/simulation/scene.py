@@ -18,8 +18,6 @@ from ..systems.arm import LWR3, Arm
 from ..systems.wiping import Plate
 from .engine import engine
 
-__all__ = ["TIME_STEP", "TOOL", "Scene", "arm_alone", "arm_scene", "hand_scene"]
-
 TIME_STEP = 0.002
 """Of the physics and of the torque controller, s."""
 

@@ -14,8 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from ...base.arrays import Array, as_vector, require_extra
 from ...base.errors import ReadError, SettingError
 
-__all__ = ["LWR3", "Arm", "JointLimitAvoidance"]
-
 _HINGES = {"revolute": False, "continuous": False, "prismatic": True}
 
 

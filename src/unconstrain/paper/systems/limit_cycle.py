@@ -8,8 +8,6 @@ import numpy as np
 
 from ...base.arrays import Array
 
-__all__ = ["LimitCycle"]
-
 
 @dataclass(frozen=True)
 class LimitCycle:

@@ -8,8 +8,6 @@ import numpy as np
 
 from ...base.arrays import Array, check_at_least
 
-__all__ = ["Pendulum"]
-
 
 @dataclass(frozen=True)
 class Pendulum:

@@ -19,8 +19,6 @@ from ...motion import rollout
 from ...recordings import Demonstration, Recipe, Recording, Truth, prepare, stack
 from ...risks import null_space_projection
 
-__all__ = ["HELD_OUT", "PLATES", "Plate", "Strokes", "WipingPolicy", "demonstrate", "observed", "slow_noise"]
-
 
 @dataclass(frozen=True)
 class WipingPolicy:

@@ -19,8 +19,6 @@ from ...base.errors import InvalidDataError, SettingError
 from ..demonstration import Demonstration, Recording
 from .recipes import Recipe, complete_recipe
 
-__all__ = ["Gap", "PreparationWarning", "differentiate", "find_gaps", "prepare", "resample", "stamps", "trim"]
-
 GAP_INTERVALS = 5.0
 """An interval of this many median ones is a gap, where nothing else is said."""
 

@@ -11,8 +11,6 @@ from ...base.arrays import check_at_least
 from ...base.errors import SettingError
 from ..demonstration import Recording
 
-__all__ = ["METHODS", "Recipe", "complete_recipe", "guess_recipe"]
-
 METHODS = ("savgol", "central")
 """Ways to differentiate: Savitzky-Golay smoothing, central differences."""
 

@@ -13,8 +13,6 @@ from ..demonstration import Recording
 from .movements import Gap, find_gaps, stamps
 from .recipes import Recipe, complete_recipe
 
-__all__ = ["Survey", "survey"]
-
 
 @dataclass(frozen=True)
 class Survey:

@@ -20,9 +20,6 @@ from ...base.errors import ReadError
 from ..demonstration import Recording
 from .table import Format, find_roles, listed, seconds, split_by_group
 
-__all__ = ["FORMAT", "read_hdf5", "read_hdf5_blocks"]
-
-
 _SHORT = {"states": "x", "actions": "u"}
 _ROLES = {"groups": "group", "times": "time"}
 

@@ -15,8 +15,6 @@ from ...base.errors import ReadError
 from ..demonstration import Recording
 from .table import Format, seconds, split_by_group
 
-__all__ = ["FORMAT", "read_npz"]
-
 Contents = dict[str, NDArray[np.generic]]
 
 _MAGIC = b"PK\x03\x04"

@@ -16,8 +16,6 @@ from ...base.errors import ReadError
 from ..demonstration import Recording
 from .table import Format, find_roles, listed, seconds, split_by_group, unique_names
 
-__all__ = ["FORMAT", "read_parquet", "read_parquet_blocks"]
-
 
 def read_parquet(path: Path, *, group: str | None = None, time: str | None = None) -> list[Recording]:
     """Read one file whole.

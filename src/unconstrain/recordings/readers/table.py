@@ -13,19 +13,6 @@ from ...base.arrays import Array
 from ...base.errors import ReadError
 from ..demonstration import Recording
 
-__all__ = [
-    "GROUP_NAMES",
-    "TIME_NAME",
-    "Format",
-    "ReadBlocks",
-    "ReadFile",
-    "find_roles",
-    "listed",
-    "seconds",
-    "split_by_group",
-    "unique_names",
-]
-
 CLOCKS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
 """Above these magnitudes a stamp counts nano-, micro- or milliseconds since 1970; the length of one in seconds."""
 

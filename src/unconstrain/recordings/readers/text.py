@@ -26,8 +26,6 @@ from ...base.errors import ReadError
 from ..demonstration import Recording
 from .table import Format, find_roles, listed, seconds, split_by_group, unique_names
 
-__all__ = ["FORMAT", "read_text"]
-
 DELIMITERS = ",\t;"
 _ROWS_AT_ONCE = 20_000  # bounds the memory: a cell of text takes ten times the space of a number
 _QUOTED = re.compile(r'"[^"]*"')

@@ -22,7 +22,6 @@ from .surfaces import Surface
 if TYPE_CHECKING:
     from . import Settings
 
-__all__ = ["Reproduction", "check_reach", "jobs", "plates", "reproduce"]
 
 SEEN = PLATES[3]
 """Of the plates that are learnt from, the arm wipes this one."""

@@ -22,8 +22,6 @@ from .surfaces import Surface, simulated_split
 if TYPE_CHECKING:
     from . import Settings
 
-__all__ = ["Split", "fitted", "learn", "recorded_rows", "simulate_and_learn", "simulated_rows"]
-
 
 @dataclass(frozen=True, eq=False)
 class Split:

@@ -18,8 +18,6 @@ from ...systems.wiping import HELD_OUT, PLATES, Plate, Strokes
 if TYPE_CHECKING:
     from . import Settings
 
-__all__ = ["Surface", "has_physics", "recorded_splits", "simulated_split"]
-
 
 @dataclass(frozen=True, eq=False)
 class Surface:
