@@ -25,8 +25,8 @@ from .base.errors import ModelFileError
 from .learners import Belief, Direct, Hybrid, Inconsistency, Likelihood, NoiseCorrected, Robust, Segments, Solution
 from .models import Affine, Everywhere, KMeansRBF, Model, NormalisedRBF, ReceptiveFields
 from .policies import LocallyLinearPolicy, ParametricPolicy, Policy
-from .risks import Moments
-from .training import FoldedMoments, Folds, HeldOut, Split, Training
+from .risks import FoldedMoments, Moments
+from .training import Folds, HeldOut, Split, Training
 
 __all__ = ["VERSION", "load", "load_notes", "register", "save"]
 
@@ -196,7 +196,7 @@ def _pack(value: Any, arrays: dict[str, np.ndarray[Any, Any]]) -> Any:
             f"code. Known are {', '.join(sorted(_KNOWN))}; add a dataclass of your own with storage.register."
         )
     parts = (
-        {field.name: getattr(value, field.name) for field in fields(value)}
+        {field.name: getattr(value, field.name) for field in fields(value) if field.init}
         if is_dataclass(value)
         else value.__getstate__()
     )

@@ -24,6 +24,9 @@ from .errors import InvalidDataError, MissingExtraError, SettingError
 
 Array = NDArray[np.float64]
 
+Groups = Sequence[Hashable] | NDArray[np.generic]
+"""Which demonstration each sample is from: a name or number for each."""
+
 LARGEST = 1e30
 """Numbers beyond this are refused: fillers for missing values are, and products of several must stay finite."""
 

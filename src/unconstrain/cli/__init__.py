@@ -256,7 +256,7 @@ def export(policy: str, output: str, name: str | None) -> None:
         raise SettingError(f"--name: belongs to C source, got {output}.")
     learnt = _fitted(policy)
     if kind == ".c":
-        learnt.export_c(output, name)
+        learnt.export_c(output, name or "policy")
     else:
         learnt.export_onnx(output)
     click.echo(f"{'C source' if kind == '.c' else 'ONNX graph'}: {output}")

@@ -5,6 +5,6 @@ All are made from a :class:`~unconstrain.ClosedForm`; a new target is one more f
 
 from .c99 import c_source, export_c
 from .onnx_graph import export_onnx, onnx_model
-from .stepping import Step, stepper, stepper_on
+from .stepping import Step, stepper
 
-__all__ = ["Step", "c_source", "export_c", "export_onnx", "onnx_model", "stepper", "stepper_on"]
+__all__ = ["Step", "c_source", "export_c", "export_onnx", "onnx_model", "stepper"]

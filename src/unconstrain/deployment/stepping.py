@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 
 from ..base.arrays import Array
 from ..base.errors import InvalidDataError
-from ..models import ClosedForm
+from ..models import ClosedForm, Model
 
 Step: TypeAlias = Callable[[ArrayLike, Array | None], Array]
 """From a state (n,) to an action (d,), written into the second argument if that is given."""
 
 
-def stepper(form: ClosedForm) -> Step:
+def stepper(model: Model, weights: Array, n: int) -> Step:
     """Prepare a policy for single states.
 
     Each thread has its own buffers, made on its first call; after that only
@@ -25,34 +25,32 @@ def stepper(form: ClosedForm) -> Step:
 
     Parameters
     ----------
-    form : ClosedForm
+    model : Model
+        Without a formula (:class:`~unconstrain.ClosedForm`) a step has the price of the features.
+    weights : ndarray, shape (M, d, p)
+    n : int
+        Dimension of the states.
 
     Returns
     -------
     callable
         Raises InvalidDataError for a state of another shape than (n,).
     """
+    form = model.fields.formula(model.features, weights)
+    if form is None:
+        return _without_formula(model, weights[0], n)
     if form.exponents is None:
         return _affine(form)
     return _blended_maps(form, form.exponents) if form.is_affine else _blended_constants(form, form.exponents)
 
 
-def stepper_on(features: Callable[[Array], Array], weights: Array, n: int) -> Step:
-    """Do the same, at the price of the features, for a policy ``W φ(x)`` that has no formula.
-
-    Parameters
-    ----------
-    features : callable
-        States (N, n) to features (N, p).
-    weights : ndarray, shape (d, p)
-    n : int
-    """
+def _without_formula(model: Model, weights: Array, n: int) -> Step:
     relative, dot = _relative_to(np.zeros(n)), np.dot
 
     def step(state: ArrayLike, out: Array | None = None) -> Array:
         row = np.empty((1, n))
         relative(state, row[0])
-        return dot(weights, features(row)[0], out)
+        return dot(weights, model.design(row)[0], out)
 
     return step
 

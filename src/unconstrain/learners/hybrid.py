@@ -11,6 +11,7 @@ import numpy as np
 from ..base.arrays import check_at_least
 from ..base.errors import SettingError
 from ..risks import (
+    FoldedMoments,
     Moments,
     Path,
     Quadratic,
@@ -19,7 +20,7 @@ from ..risks import (
     softened_minima,
     standard_risk,
 )
-from ..training import FoldedMoments, Training
+from ..training import Training
 from .learner import Learner
 from .solution import Solution
 from .thresholds import Averaging, check_settings, judged, solve_at_threshold, within_errors

@@ -29,9 +29,8 @@ def named(learner: Learner | str | None) -> Learner:
         return Hybrid()
     if isinstance(learner, str) and learner in BY_NAME:
         return BY_NAME[learner]()
-    if not callable(getattr(learner, "learn", None)):
+    if not isinstance(learner, Learner):
         raise SettingError(
-            f"learner: got {learner!r}, expected one of {', '.join(map(repr, BY_NAME))}, or an object with a method "
-            "learn(training) such as Hybrid()."
+            f"learner: got {learner!r}, expected one of {', '.join(map(repr, BY_NAME))}, or a Learner such as Hybrid()."
         )
-    return learner  # type: ignore[return-value]
+    return learner

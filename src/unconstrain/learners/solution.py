@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..base.errors import SettingError
-from ..models import Model
+
+if TYPE_CHECKING:
+    from ..models import Model
 
 
 class Uncertainty(NamedTuple):

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Array, check_at_least
 from ..base.errors import SettingError
 from ..base.threads import workers
-from ..risks import Moments, Path, Quadratic, unvec, vec
-from ..training import FoldedMoments
+from ..risks import FoldedMoments, Moments, Path, Quadratic, unvec, vec
 from .solution import Solution
 
 Averaging = Literal["geometric", "arithmetic"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -26,10 +26,19 @@ class Model:
         φ, states (N, n) to features (N, p).
     fields : ReceptiveFields or Everywhere
         Where each of the M models counts.
+
+    Attributes
+    ----------
+    centring : ndarray, shape (M, p, p), or None
+        ``T_m``: model m is solved on the features ``T_m φ``, for the sake of rounding; None for φ itself.
     """
 
     features: FeatureMap
     fields: ReceptiveFields | Everywhere
+    centring: Array | None = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centring", self.fields.centring(self.features))
 
     def design(self, states: Array) -> Array:
         """Features of states (N, n), finite, shape (N, p).
@@ -63,11 +72,6 @@ class Model:
         if measure is None:
             raise SettingError(f"support: {type(self.features).__name__} does not say where its data was.")
         return np.asarray(measure(states))
-
-    @property
-    def centring(self) -> Array | None:
-        """``T_m`` (M, p, p): model m is solved on features ``T_m φ``, for the sake of rounding; None for φ itself."""
-        return self.fields.centring(self.features)
 
     def roughness(self, models: int, size: int) -> Array:
         """``R_m`` (M, p, p): ``wᵀ R_m w`` tells how rough a policy of weights w is; zero where it is not known."""

@@ -19,11 +19,8 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from ..base.arrays import (
     BLOCK_ROWS,
     Array,
-    as_groups,
+    Groups,
     as_matrix,
-    as_table,
-    as_vector,
-    as_weights,
     beside,
     check_at_least,
     is_foreign,
@@ -32,12 +29,12 @@ from ..base.arrays import (
     slices,
 )
 from ..base.errors import InvalidDataError, SettingError
-from ..deployment import Step, export_c, export_onnx, stepper, stepper_on
-from ..learners import Learner, Solution, Uncertainty, named
+from ..deployment import Step, export_c, export_onnx, stepper
+from ..learners import Belief, Learner, Solution, Uncertainty, named
 from ..models import ClosedForm, FeatureMap, Model
-from ..recordings import Batch, Demonstration, Groups, stack, times_of
-from ..risks import Moments, inconsistency, unit_actions, vec
-from ..training import FirstLook, Folds, Split, Training, Validation
+from ..recordings import Demonstration, stack, times_of
+from ..risks import Moments, unit_actions
+from ..training import Batch, FirstLook, Folds, Split, Training, Validation
 
 _ROWS = 4096
 """Rows that are predicted together, so that what is made of them stays in cache."""
@@ -73,7 +70,7 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
     def fit(
         self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, groups: Groups | None = None
     ) -> Self:
-        """Learn the unconstrained policy.
+        """Learn the unconstrained policy. If anything fails, this policy is as it was.
 
         Parameters
         ----------
@@ -88,11 +85,6 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
             Which demonstration each sample is from, so that whole
             demonstrations can be held out.
 
-        Returns
-        -------
-        self
-            As it was, if anything fails.
-
         Raises
         ------
         InvalidDataError
@@ -101,9 +93,9 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         return self._fit(X, y, sample_weight, groups)
 
     def _fit(self, *batch: Any) -> Self:
-        draft = self._draft(*_FITTED)
+        learner, draft = named(self.learner), self._draft(*_FITTED)
         checked = draft._checked(*batch, reset=True)
-        return self._become(draft._began(FirstLook.at(checked), more=False)._learnt([checked]))
+        return self._become(draft._began(FirstLook.at(checked), learner, more=False)._learnt([checked], learner))
 
     def partial_fit(
         self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, groups: Groups | None = None
@@ -118,15 +110,14 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         The solution is found anew each time. Where only the last counts,
         :meth:`fit_batches` is faster.
         """
-        first = not hasattr(self, "solution_")
-        draft = self._draft()
+        first, learner, draft = not hasattr(self, "solution_"), named(self.learner), self._draft()
         batch = draft._checked(X, y, sample_weight, groups, reset=first)
-        waiting: tuple[Batch, ...] = getattr(self, "_waiting", ())
+        waiting = tuple(Batch(*one) for one in getattr(self, "_waiting", ()))
         if not first and not waiting:
-            return self._become(draft._learnt([batch]))
+            return self._become(draft._learnt([batch], learner))
         seen = (*waiting, batch)
         look = FirstLook.total(map(FirstLook.at, seen))
-        draft._began(look, more=True)._learnt(seen)
+        draft._began(look, learner, more=True)._learnt(seen, learner)
         draft._waiting = () if look is None or look.is_typical else (*waiting, deepcopy(batch))
         return self._become(draft)
 
@@ -137,8 +128,8 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         :class:`unconstrain.Stream`, is: first to choose features, fields and
         folds, then to sum. The result is that of :meth:`fit` on everything,
         to rounding, however the samples are cut into batches. A generator
-        is walked through once; as in :meth:`partial_fit` its first batch
-        then fixes what would have been chosen, and should be typical.
+        is walked through once; its first batches fix what would have been
+        chosen, as in :meth:`partial_fit`.
 
         Parameters
         ----------
@@ -146,27 +137,22 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
             Each ``(X, y)``, ``(X, y, sample_weight)`` or ``(X, y, sample_weight, groups)``,
             as :meth:`fit` takes them.
 
-        Returns
-        -------
-        self
-            As it was, if anything fails.
-
         Raises
         ------
         InvalidDataError
             As :meth:`fit` does, and if there is no batch.
         """
-        self._check_speed_power(getattr(batches, "speed_power", 0.0))
+        learner = self._check_speed_power(getattr(batches, "speed_power", 0.0))
         if iter(batches) is not batches:
-            return self._fit_parts([batches], lambda function, parts: function(*parts))
-        draft = self._draft(*_FITTED)
-        checked, first, look = draft._each_checked(batches), [], None
+            return self._fit_parts([batches], lambda function, parts: function(*parts), learner)
+        draft, first, look = self._draft(*_FITTED), [], None
+        checked = draft._each_checked(batches)
         for batch in checked:
             first.append(deepcopy(batch))  # the caller may use a buffer again
             look = FirstLook.total([look, FirstLook.at(batch)])
             if look is not None and look.is_typical:
                 break
-        return self._become(draft._began(look, more=True)._learnt(chain(first, checked)))
+        return self._become(draft._began(look, learner, more=True)._learnt(chain(first, checked), learner))
 
     def fit_parts(self, parts: Sequence[Any], summed: Callable[..., Any]) -> Self:
         """Learn from parts wherever they are; see :mod:`unconstrain.cluster`.
@@ -194,15 +180,15 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
             )
         if not parts:
             raise InvalidDataError("got no part to learn from, expected at least one.")
-        return self._fit_parts(parts, summed)
+        return self._fit_parts(parts, summed, learner)
 
-    def _fit_parts(self, parts: Sequence[Any], summed: Callable[..., Any]) -> Self:
+    def _fit_parts(self, parts: Sequence[Any], summed: Callable[..., Any], learner: Learner) -> Self:
         draft = self._draft(*_FITTED)
         seen = summed(partial(_seen, draft), parts)
         draft.__dict__.update(seen.noted)
-        draft._began(seen.look, more=False)
+        draft._began(seen.look, learner, more=False)
         draft.training_ = summed(partial(_gathered, draft), parts)
-        return self._become(draft._solved())
+        return self._become(draft._solved(learner))
 
     def fit_demonstrations(
         self, demonstrations: Demonstration | Sequence[Demonstration], speed_power: float = 0.0
@@ -216,11 +202,6 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
             Samples count by this power of their speed. 0 is the paper; 2
             helps on noisy recordings, since the direction of a slow movement
             is mostly noise.
-
-        Returns
-        -------
-        self
-            As it was, if anything fails.
         """
         self._check_speed_power(speed_power)
         demos = [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
@@ -240,7 +221,7 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         check_is_fitted(self, "solution_")
         other = copy(self)
         other.learner = learner
-        return other._solved()
+        return other._solved(named(learner))
 
     # What was learnt.
 
@@ -290,25 +271,13 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         return 1.0 - missed / moved if moved > 0 else 0.0
 
     def held_out_score(self) -> float:
-        """:meth:`score` on each fold by what is learnt from the others, from the moments alone.
+        """:meth:`score` on each fold by what is learnt from the others; NaN where there is nothing to hold out.
 
-        Of local models each is judged by itself in its own field. NaN where
-        there is nothing to hold out.
+        From the moments alone, each local model by itself in its own field; by samples where the learner looks at them.
         """
         check_is_fitted(self, "solution_")
-        learner, training = named(self.learner), self.training_
-        if self.solution_.belief is not None:
-            return self.solution_.belief.held_out_score
-        filled = training.gathered.filled
-        if learner.needs_samples or len(filled) < 2:
-            return float("nan")
-        missed = moved = 0.0
-        for i in filled:
-            part, rest = training.gathered.parts[i], training.of_folds([j for j in filled if j != i])
-            weights = vec(learner.learn(rest).over(training.model).weights)
-            missed += float(np.clip(inconsistency(part)(weights), 0.0, None).sum())
-            moved += float(part.energy.sum())
-        return 1.0 - missed / moved if moved > 0 else float("nan")
+        belief = self.solution_.belief
+        return belief.held_out_score if belief is not None else named(self.learner).held_out_score(self.training_)
 
     def uncertainty(self, X: ArrayLike) -> Uncertainty:
         """How far the unconstrained policy may be from :meth:`predict`, and why.
@@ -329,16 +298,18 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         SettingError
             If the learner does not look at samples; :class:`~unconstrain.Robust` does.
         """
-        check_is_fitted(self, "solution_")
-        return self.solution_.believed.uncertainty(self.training_.model, on_host(self._checked_states(X)))
+        return self._believed().uncertainty(self.training_.model, on_host(self._checked_states(X)))
 
     def covariances(self, X: ArrayLike) -> Array:
         """Covariance of the predicted actions due to what the data does not say, shape (N, d, d).
 
         Its diagonal is the square of ``uncertainty(X).undetermined``. Raises as :meth:`uncertainty` does.
         """
+        return self._believed().covariances(self.training_.model, on_host(self._checked_states(X)))
+
+    def _believed(self) -> Belief:
         check_is_fitted(self, "solution_")
-        return self.solution_.believed.covariances(self.training_.model, on_host(self._checked_states(X)))
+        return self.solution_.believed
 
     def support(self, states: ArrayLike) -> Array:
         """How near to the data each state is, from 1 to 0 far from all of it, shape (N,).
@@ -348,14 +319,16 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         SettingError
             If neither fields nor features have a place in state space.
         """
+        return self._fitted_model().support(self._checked_states(states))
+
+    def _fitted_model(self) -> Model:
         check_is_fitted(self, "solution_")
-        return self.training_.model.support(self._checked_states(states))
+        return self.training_.model
 
     @property
     def features_(self) -> FeatureMap:
         """The features in use."""
-        check_is_fitted(self, "solution_")
-        return self.training_.model.features
+        return self._fitted_model().features
 
     @property
     def moments_(self) -> Moments:
@@ -398,9 +371,8 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
     def _prepare_step(self, known: dict[str, Any]) -> _Prepared:
         check_is_fitted(self, "solution_")
         # What another thread has learnt meanwhile is prepared at the next step: the solution is then another.
-        solution, model = known["solution_"], known["training_"].model
-        form = model.fields.formula(model.features, solution.weights)
-        step = stepper(form) if form else stepper_on(model.design, solution.weights[0], known["n_features_in_"])
+        solution = known["solution_"]
+        step = stepper(known["training_"].model, solution.weights, known["n_features_in_"])
         prepared = known["_prepared"] = _Prepared(solution, step)
         return prepared
 
@@ -412,38 +384,22 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         SettingError
             If the features are a callable that does not say its formula.
         """
-        check_is_fitted(self, "solution_")
-        return self.training_.model.formula(self.solution_.weights)
+        return self._fitted_model().formula(self.solution_.weights)
 
-    def export_c(self, path: str | os.PathLike[str], name: str | None = None) -> None:
+    def export_c(self, path: str | os.PathLike[str], name: str = "policy") -> None:
         """Write the policy as one C99 file that needs only ``exp`` of the standard library.
 
         It defines ``void NAME_step(const double state[n], double action[d])``
         and, with ``NAME_SELF_TEST`` (in capitals) defined, a ``main`` that
-        compares itself with :meth:`predict`.
-
-        Parameters
-        ----------
-        path : str or path-like
-        name : str, optional
-            A C identifier; ``"policy"`` by default.
-
-        Raises
-        ------
-        SettingError
-            If the features cannot be exported (:meth:`closed_form`), or the name is none in C.
+        compares itself with :meth:`predict`. The name is a C identifier.
+        Raises as :meth:`closed_form` does, and for another name.
         """
-        export_c(self.closed_form(), self, path, "policy" if name is None else name)
+        export_c(self.closed_form(), self, path, name)
 
     def export_onnx(self, path: str | os.PathLike[str]) -> None:
         """Write the policy as an ONNX graph, ``states`` (N, n) to ``actions`` (N, d), in float64.
 
-        Raises
-        ------
-        MissingExtraError
-            If ``onnx`` is not installed; it comes with ``unconstrain[onnx]``.
-        SettingError
-            If the features cannot be exported (:meth:`closed_form`).
+        Needs the extra ``onnx``. Raises as :meth:`closed_form` does.
         """
         export_onnx(self.closed_form(), path)
 
@@ -460,62 +416,40 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         self.__dict__ = draft.__dict__  # at once: another thread sees the old policy or the new one
         return self
 
-    def _began(self, look: FirstLook | None, *, more: bool) -> Self:
+    def _began(self, look: FirstLook | None, learner: Learner, *, more: bool) -> Self:
         """Choose all that has to be chosen before the first sample is summed."""
         if look is None:
             raise InvalidDataError("got no sample that counts, expected at least one.")
-        validation = self.validation if self.validation is not None else Folds()
-        split, keep = Split.begin(validation, look, more), named(self.learner).needs_samples
-        self.training_ = Training.begin(look, self.place(look), split, keep=keep)
+        split = Split.begin(self.validation if self.validation is not None else Folds(), look, more)
+        self.training_ = Training.begin(look, self.place(look), split, keep=learner.needs_samples)
         return self
 
-    def _learnt(self, batches: Iterable[Batch]) -> Self:
+    def _learnt(self, batches: Iterable[Batch], learner: Learner) -> Self:
         self.training_ = self.training_.with_batches(batches)
-        return self._solved()
+        return self._solved(learner)
 
-    def _solved(self) -> Self:
-        self.solution_ = named(self.learner).learn(self.training_).over(self.training_.model)
+    def _solved(self, learner: Learner) -> Self:
+        self.solution_ = learner.solve(self.training_)
         return self
 
-    def _check_speed_power(self, speed_power: float) -> None:
+    def _check_speed_power(self, speed_power: float) -> Learner:
+        learner = named(self.learner)
         check_at_least("speed_power", speed_power, 0.0)
-        if speed_power and named(self.learner).needs_samples:
+        if speed_power and learner.needs_samples:
             raise SettingError("speed_power: learners that look at the samples weigh speed themselves, expected 0.")
+        return learner
 
     def _each_checked(self, batches: Iterable[Sequence[Any]], *, reset: bool = True) -> Iterator[Batch]:
         return (self._checked(*batch, reset=reset and number == 0) for number, batch in enumerate(batches))
 
-    def _checked(
-        self,
-        X: ArrayLike,
-        y: ArrayLike,
-        sample_weight: ArrayLike | None = None,
-        groups: Groups | None = None,
-        times: ArrayLike | None = None,
-        *,
-        reset: bool,
-    ) -> Batch:
-        states = self._checked_states(X, reset=reset, convert=False)
-        if y is None:
-            raise InvalidDataError("requires y to be passed, but the target y is None: expected the observed actions.")
-        if is_foreign(y) != is_foreign(states):
-            y = beside(on_host(y), states)
-        actions, flat = as_table(y, "actions", convert=False)
-        samples = states.shape[0]
-        if actions.shape[0] != samples:
-            raise InvalidDataError(
-                f"got {samples} states and {actions.shape[0]} actions (inconsistent numbers of samples), "
-                "expected one action for each state."
-            )
+    def _checked(self, X: ArrayLike, *rest: Any, reset: bool) -> Batch:
+        batch, flat = Batch.checked(self._checked_states(X, reset=reset, convert=False), *rest)
+        columns = batch.actions.shape[1]
         if reset:
-            self._flat, self.n_outputs_ = flat, actions.shape[1]
-        elif actions.shape[1] != self.n_outputs_:
-            raise InvalidDataError(f"actions: got {actions.shape[1]} columns, expected {self.n_outputs_} as before.")
-        weights = None if sample_weight is None else as_weights(sample_weight, samples)
-        if weights is not None and not weights.any():
-            raise InvalidDataError("sample_weight: all weights are zero, expected at least one that counts.")
-        names = None if groups is None else as_groups(groups, samples)
-        return Batch(states, actions, weights, names, None if times is None else as_vector(times, "times", samples))
+            self._flat, self.n_outputs_ = flat, columns
+        elif columns != self.n_outputs_:
+            raise InvalidDataError(f"actions: got {columns} columns, expected {self.n_outputs_} as before.")
+        return batch
 
     def _checked_states(self, X: ArrayLike, *, reset: bool = False, convert: bool = True) -> Array:
         if isinstance(X, list | tuple):

@@ -6,7 +6,6 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
-from sklearn.utils.validation import check_is_fitted
 
 from ..base.arrays import as_matrix
 from ..learners import Learner
@@ -71,5 +70,4 @@ class LocallyLinearPolicy(Policy):
     @property
     def fields_(self) -> ReceptiveFields:
         """The fields in use."""
-        check_is_fitted(self, "solution_")
-        return cast(ReceptiveFields, self.training_.model.fields)
+        return cast(ReceptiveFields, self._fitted_model().fields)

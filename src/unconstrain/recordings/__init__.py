@@ -1,6 +1,5 @@
 """From files to demonstrations: readers, preparation, batches."""
 
-from .batches import Batch, Groups
 from .demonstration import Demonstration, Recording, Truth, stack, times_of
 from .preparation import Recipe, complete_recipe, prepare, survey
 from .readers import expand, read, read_blocks
@@ -8,9 +7,7 @@ from .readers.table import unique_names
 from .streams import Stream
 
 __all__ = [
-    "Batch",
     "Demonstration",
-    "Groups",
     "Recipe",
     "Recording",
     "Stream",

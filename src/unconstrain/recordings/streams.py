@@ -10,15 +10,19 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.arrays import BLOCK_ROWS, Array, check_at_least
-from .batches import Batch
 from .demonstration import Demonstration, Recording
 from .preparation import Recipe, complete_recipe, prepare
 from .readers import expand, read_blocks
 
 HELD_BYTES = 2**25
 """Demonstrations that take no more than this in all are kept after the first walk, so that files are read once."""
+
+
+Samples = tuple[Array, Array, Array | None, NDArray[Any]]
+"""States (N, n), actions (N, d), weights (N,) if they are not ones, and names of the demonstrations (N,)."""
 
 
 class Stream:
@@ -79,7 +83,7 @@ class Stream:
         actions = prepare(self.first, self.recipe)[0].actions if self.speed_power else np.zeros((1, 1))
         return float(np.linalg.norm(actions, axis=1).max()) or 1.0
 
-    def __iter__(self) -> Iterator[Batch]:
+    def __iter__(self) -> Iterator[Samples]:
         """Batches of at least :data:`~unconstrain.base.arrays.BLOCK_ROWS` samples, but for the last."""
         waiting: list[tuple[str, Demonstration]] = []
         for named in self.named_demonstrations():
@@ -139,9 +143,9 @@ class Stream:
                     [demonstration] = prepare(recording, self.recipe)
                 yield f"{number}/{recording.name}", replace(demonstration, times=None)
 
-    def _batch(self, named: list[tuple[str, Demonstration]]) -> Batch:
+    def _batch(self, named: list[tuple[str, Demonstration]]) -> Samples:
         actions = np.concatenate([demo.actions for _, demo in named])
-        return Batch(
+        return (
             np.concatenate([demo.states for _, demo in named]),
             actions,
             self._counts(actions),

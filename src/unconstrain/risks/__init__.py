@@ -1,5 +1,6 @@
 """The mathematics: projections, moments, quadratics and their minima."""
 
+from .folded_moments import FoldedMoments
 from .moments import Moments, Sums, gather, total
 from .objectives import inconsistency, standard_risk, unvec, vec
 from .projection import action_projection, null_space_projection, project, unit_actions
@@ -17,6 +18,7 @@ from .quadratic import (
 __all__ = [
     "NOISE",
     "SECONDARY_NOISE",
+    "FoldedMoments",
     "Moments",
     "Path",
     "Quadratic",

@@ -16,7 +16,7 @@ from typing import Any, Protocol, Self, TypeVar
 
 from ..base.arrays import require_extra
 from ..base.errors import InvalidDataError, SettingError
-from ..recordings import Batch
+from .batches import Batch
 
 FAN_IN = 8
 """So many results are added in one task."""

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array, on_host
+from ..base.arrays import Array, Groups, on_host
 from ..base.errors import InvalidDataError
-from ..recordings import Batch, Groups
+from .batches import Batch
 
 PLACING_SAMPLES = 20_000
 """Features and fields are placed on at most this many different states."""

@@ -9,9 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array, check_at_least
+from ..base.arrays import Array, Groups, check_at_least
 from ..base.errors import SettingError
-from ..recordings import Groups
 from .first_look import FirstLook, in_order, mixed
 
 Unit = Literal["auto", "demonstration", "sample"]

@@ -15,10 +15,9 @@ from ..base.arrays import Array, beside, is_foreign, on_host
 from ..base.errors import SettingError
 from ..base.threads import Workers, workers
 from ..models import Model
-from ..recordings import Batch
-from ..risks import Sums
+from ..risks import FoldedMoments, Sums
+from .batches import Batch
 from .first_look import FirstLook
-from .folded_moments import FoldedMoments
 from .folds import Split
 from .samples import Samples
 

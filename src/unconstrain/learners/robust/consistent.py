@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...base.arrays import Array
 from ...risks import (
     NOISE,
+    FoldedMoments,
     Moments,
     Quadratic,
     eigensystem,
@@ -23,7 +24,7 @@ from ...risks import (
     unvec,
     vec,
 )
-from ...training import FoldedMoments, Samples
+from ...training import Samples
 from ..hybrid import SOFTNESSES, chosen_softness
 from ..thresholds import judged, within_errors
 from .candidate import Candidate

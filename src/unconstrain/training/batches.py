@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import BLOCK_ROWS, Array, beside, is_foreign, namespace, slices
-
-Groups = Sequence[Hashable] | NDArray[np.generic]
+from ..base.arrays import (
+    BLOCK_ROWS,
+    Array,
+    Groups,
+    as_groups,
+    as_table,
+    as_vector,
+    as_weights,
+    beside,
+    is_foreign,
+    namespace,
+    on_host,
+    slices,
+)
+from ..base.errors import InvalidDataError
 
 FOREIGN_BLOCK_ROWS = 2**20
 """Rows of an array of another library that are summed together: its device may want much to do at once."""
@@ -28,6 +40,39 @@ class Batch(NamedTuple):
     weights: Array | None = None
     groups: NDArray[np.generic] | None = None
     times: Array | None = None
+
+    @classmethod
+    def checked(
+        cls,
+        states: Array,
+        actions: ArrayLike,
+        sample_weight: ArrayLike | None = None,
+        groups: Groups | None = None,
+        times: ArrayLike | None = None,
+    ) -> tuple[Batch, bool]:
+        """Check what goes with some states (N, n), and say whether the actions were a vector (N,).
+
+        Raises
+        ------
+        InvalidDataError
+            If lengths differ, a number is not finite, or no sample counts.
+        """
+        if actions is None:
+            raise InvalidDataError("requires y to be passed, but the target y is None: expected the observed actions.")
+        if is_foreign(actions) != is_foreign(states):
+            actions = beside(on_host(actions), states)
+        table, flat = as_table(actions, "actions", convert=False)
+        samples = states.shape[0]
+        if table.shape[0] != samples:
+            raise InvalidDataError(
+                f"got {samples} states and {table.shape[0]} actions (inconsistent numbers of samples), "
+                "expected one action for each state."
+            )
+        weights = None if sample_weight is None else as_weights(sample_weight, samples)
+        if weights is not None and not weights.any():
+            raise InvalidDataError("sample_weight: all weights are zero, expected at least one that counts.")
+        names = None if groups is None else as_groups(groups, samples)
+        return cls(states, table, weights, names, None if times is None else as_vector(times, "times", samples)), flat
 
     def blocks(self) -> Iterator[Batch]:
         """Go through it by some rows at a time, without those of no weight."""

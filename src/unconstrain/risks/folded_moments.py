@@ -7,7 +7,7 @@ from itertools import accumulate
 from operator import add
 
 from ..base.arrays import Array
-from ..risks import Moments, total
+from .moments import Moments, total
 
 
 @dataclass(frozen=True, eq=False)
