@@ -146,7 +146,7 @@ def test_a_constraint_that_reads_times_is_no_error_only_where_there_are_some(con
     uc.cpe(np.sin, uc.Demonstration(states, states, [0, 1, 1]), constraint)
     with pytest.raises(InvalidDataError, match=r"'log' has no times, and the constraint depends on them: expected one"):
         uc.ncpe(np.sin, uc.Demonstration(states, states, name="log"), constraint)
-    with pytest.raises(InvalidDataError, match="^a demonstration has no times, and"):
+    with pytest.raises(InvalidDataError, match=r"^a demonstration has no times, and"):
         uc.cpe(np.sin, uc.Demonstration(states, states), constraint)
 
 
