@@ -89,8 +89,9 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     for found in surveys:
         if found.non_increasing:
             click.echo(f"'{found.name}': time does not increase at row {found.non_increasing[0]}.")
+    if first is None:
+        raise ReadError(f"{', '.join(files)}: holds no recording.")
     try:
-        assert first is not None
         click.echo(f"fit takes {said_recipe(complete(recipe, first))}.")
     except UnconstrainError as error:
         click.echo(f"fit needs to know more: {error}")
@@ -229,14 +230,13 @@ def rollout(
         support = learnt.support(path.states)
     except SettingError:  # an affine policy, say, is at home everywhere
         support = None
-    assert path.times is not None
     with click.open_file(output, "w") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(["t", *states, *(f"v{name}" for name in states)])
         writer.writerows([f"{value:.9g}" for value in row] for row in _columns(path))
     if support is not None and support.min() < 1e-3:
         click.echo(
-            f"Note: from {path.times[int((support < 1e-3).argmax())]:.2f} s on the movement is far from all data.",
+            f"Note: from {dt * int((support < 1e-3).argmax()):.2f} s on the movement is far from all data.",
             err=True,
         )
 
@@ -378,5 +378,4 @@ def _plane(normal: tuple[float, ...] | None, dimensions: int, meaning: str) -> P
 def _columns(path: Demonstration) -> Any:
     import numpy as np
 
-    assert path.times is not None
-    return np.column_stack([path.times, path.states, path.actions])
+    return np.column_stack([*([] if path.times is None else [path.times]), path.states, path.actions])

@@ -178,7 +178,7 @@ def diagnose(policy: Policy, demonstrations: Sequence[Demonstration]) -> Diagnos
         directions_determined=solution.determined_share,
         states_determined=float(known.mean()),
         free_share=solution.free_share,
-        regions=_regions(policy, demos, undetermined, known, typical),
+        regions=_regions(policy, solution, demos, undetermined, known, typical),
         movements=_movements(demos, undetermined, known, free),
         undetermined=undetermined,
         from_noise=from_noise,
@@ -204,7 +204,12 @@ def _typical(actions: Array, solution: RobustSolution) -> float:
 
 
 def _regions(
-    policy: Policy, demos: list[Demonstration], undetermined: Array, known: Array, typical: float
+    policy: Policy,
+    solution: RobustSolution,
+    demos: list[Demonstration],
+    undetermined: Array,
+    known: Array,
+    typical: float,
 ) -> tuple[Region, ...]:
     states, _, groups = stack(demos)
     fields = policy.fields_ if hasattr(policy, "fields_") else cover(states, choose_variance(states))
@@ -214,7 +219,7 @@ def _regions(
     ]
     found.sort(key=lambda one: -undetermined[one[1]].max())
     worst = [int(rows[undetermined[rows].argmax()]) for _, rows in found]
-    directions, along = _least_known(policy, states[worst])
+    directions, along = _least_known(policy, solution, states[worst])
     names = _names(demos)
     return tuple(
         Region(
@@ -231,10 +236,9 @@ def _regions(
     )
 
 
-def _least_known(policy: Policy, states: Array) -> tuple[Array, Array]:
+def _least_known(policy: Policy, solution: RobustSolution, states: Array) -> tuple[Array, Array]:
     """Direction of the actions (K, d) of which least is known, towards the prediction, and the spread along it (K,)."""
-    assert isinstance(policy.solution_, RobustSolution)
-    values, vectors = np.linalg.eigh(covariances(policy.solution_.undetermined, *policy._in_models(states)))
+    values, vectors = np.linalg.eigh(covariances(solution.undetermined, *policy._in_models(states)))
     directions = vectors[:, :, -1]
     ahead = (directions * policy(states)).sum(axis=1) >= 0
     return np.where(ahead[:, None], directions, -directions), np.sqrt(np.maximum(values[:, -1], 0.0))

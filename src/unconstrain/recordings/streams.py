@@ -84,11 +84,13 @@ class Stream:
     def __iter__(self) -> Iterator[Batch]:
         """Batches of at least :data:`~unconstrain.base.arrays.BLOCK_ROWS` samples, but for the last."""
         waiting: list[tuple[str, Demonstration]] = []
+        samples = 0
         for named in self.named_demonstrations():
             waiting.append(named)
-            if sum(len(demo) for _, demo in waiting) >= BLOCK_ROWS:
+            samples += len(named[1])
+            if samples >= BLOCK_ROWS:
                 yield self._batch(waiting)
-                waiting = []
+                waiting, samples = [], 0
         if waiting:
             yield self._batch(waiting)
 
