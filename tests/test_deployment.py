@@ -331,3 +331,24 @@ def test_units_and_offsets_do_not_matter_to_a_step(unit, offset, scale):
         one.fit(at, scale * DATA.actions)
         found = np.stack([one.step(x) for x in at[:5]])
         assert_allclose(found, one(at[:5]), rtol=0, atol=1e-9 * scale)
+
+
+@needs_gcc
+def test_several_policies_go_into_one_program(arm, policy, tmp_path):
+    arm.export_c(tmp_path / "wipe.c", "wipe")
+    policy.export_c(tmp_path / "polish.c", "polish")
+    both = tmp_path / "both.c"
+    both.write_text('#include "wipe.c"\n#include "polish.c"\n')
+    strict = "gcc -std=c99 -Wall -Wextra -pedantic -Werror -c both.c"
+    subprocess.run(strict.split(), cwd=tmp_path, check=True)
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="needs the C++ compiler g++")
+def test_a_policy_compiled_as_cpp_is_called_from_c(policy, tmp_path):
+    policy.export_c(tmp_path / "wipe.cpp", "wipe")
+    (tmp_path / "main.c").write_text(
+        "void wipe_step(const double state[2], double action[2]);\n"
+        "int main(void) { double both[2] = {0.0, 0.0}; wipe_step(both, both); return 0; }\n"
+    )
+    for command in ("g++ -std=c++17 -c wipe.cpp", "gcc -std=c99 -c main.c", "g++ main.o wipe.o -lm -o main"):
+        subprocess.run(command.split(), cwd=tmp_path, check=True)

@@ -14,10 +14,10 @@ import unconstrain as uc
 from conftest import POLICIES
 from samples import draw
 from unconstrain.base.errors import InvalidDataError, MissingExtraError, ReadError, SettingError
-from unconstrain.recordings import Batch, batches, streams
+from unconstrain.recordings import streams
 from unconstrain.recordings.preparation import Recipe
 from unconstrain.recordings.readers import hdf5, parquet, read_blocks
-from unconstrain.training import FirstLook, first_look
+from unconstrain.training import Batch, FirstLook, batches, first_look
 
 DATA = draw(samples=400, groups=7)
 
@@ -392,3 +392,21 @@ def test_damaged_files_and_missing_extras_are_said(tmp_path, monkeypatch, suffix
 def test_a_stream_of_nothing_is_refused():
     with pytest.raises(SettingError, match="got no file to read"):
         uc.Stream([])
+
+
+def test_what_a_walk_looks_at_grows_with_the_demonstrations_and_not_with_their_square(tmp_path, monkeypatch):
+    looked = []
+
+    class Counted(uc.Demonstration):
+        def __len__(self):
+            looked.append(1)
+            return super().__len__()
+
+    path = tmp_path / "one.csv"
+    path.write_text("x,y,vx,vy\n1,2,3,4\n")
+    many = [(f"0/{i}", Counted(np.ones((3, 2)), np.ones((3, 2)))) for i in range(300)]
+    looked.clear()
+    stream = uc.Stream(path)
+    monkeypatch.setattr(stream, "named_demonstrations", lambda: iter(many))
+    assert sum(len(batch.states) for batch in stream) == 900
+    assert len(looked) <= 4 * len(many)
