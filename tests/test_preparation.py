@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from recorded import DATA, needs_data
 from unconstrain.base.errors import InvalidDataError, SettingError, UnconstrainError
 from unconstrain.recordings.demonstration import Demonstration, Recording
 from unconstrain.recordings.preparation import (
@@ -28,11 +27,6 @@ from unconstrain.recordings.preparation import (
     trim,
 )
 from unconstrain.recordings.readers import read
-
-DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))
-needs_data = pytest.mark.skipif(
-    not DATA.is_dir(), reason=f"no real recordings in {DATA}; set UNCONSTRAIN_DATA to a folder that holds them"
-)
 
 TURN = 3.0  # rad/s
 RADIUS = 0.06  # m
