@@ -438,15 +438,16 @@ def test_on_the_arm_the_sponge_stays_on_the_plate_and_keeps_the_beat(simulated):
     for row in rows:
         assert row["failed"] == ""
         assert row["contact_share"] >= 0.995
-        assert row["force_sd"] <= 0.15 * row["force_mean"]
+        assert row["force_mean"] == pytest.approx(15.0, rel=0.05)
+        assert row["force_sd"] <= 0.05 * row["force_mean"]
         assert row["frequency"] == pytest.approx(row["frequency_demonstrated"], rel=0.05)
         assert row["drift_m"] <= 0.01
         assert row["cycles"] >= 10
-        assert row["torque_share"] < 1.5
+        assert 0.1 < row["torque_share"] < 1.0  # of what its joint can
 
 
 def test_without_physics_the_stand_in_demonstrates_and_says_so():
-    result = washing.run(washing.Settings(simulator="kinematic", steps=20, trials=2))
+    result = washing.run(washing.Settings(simulator="kinematic", duration=8.0, steps=20, trials=2))
     assert result.tables["reproduction"] == []
     assert washing.headlines(result)[0] == washing.WITHOUT_PHYSICS
     error = {method: mean_of(result, method, "ncpe", seen=False) for method in METHODS}
