@@ -3,12 +3,12 @@
 import copy
 import ctypes
 import pickle
-import shutil
 import subprocess
 import sys
 import threading
 
 import numpy as np
+import onnxruntime
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -23,7 +23,6 @@ from unconstrain.base.errors import InvalidDataError, MissingExtraError, Setting
 from unconstrain.deployment import c_source
 
 DATA = draw(noise=0.02)
-needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs the C compiler gcc")
 FAR = [1.0, 3.0, 30.0, 1e3, 1e8]
 """Half-widths of the boxes that states are drawn from; the data is in the first."""
 
@@ -198,16 +197,17 @@ def compiled(policy, folder, name="policy", flags=()):
     return call
 
 
-@needs_gcc
-def test_the_c_file_says_what_the_policy_says_inside_and_far_outside(policy, tmp_path):
+def test_the_c_file_says_what_the_policy_says_inside_and_far_outside_and_tests_itself(policy, tmp_path):
     step = compiled(policy, tmp_path)
+    done = subprocess.run([tmp_path / "self_test"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert done.stdout.startswith("largest error ")
     for width in FAR:
         at = states(2, width)
         assert_same(np.stack([step(x) for x in at]), policy, at, width)
     assert np.isnan(step([np.nan, 0.0])).all()
 
 
-@needs_gcc
 def test_the_c_file_of_an_arm(arm, tmp_path):
     step = compiled(arm, tmp_path, "left_arm", flags=["-Wconversion", "-Wmissing-prototypes", "-Wshadow"])
     for width in FAR:
@@ -215,15 +215,6 @@ def test_the_c_file_of_an_arm(arm, tmp_path):
         assert_same(np.stack([step(x) for x in at]), arm, at, width)
 
 
-@needs_gcc
-def test_the_c_file_tests_itself(policy, tmp_path):
-    compiled(policy, tmp_path)
-    done = subprocess.run([tmp_path / "self_test"], capture_output=True, text=True, check=False)
-    assert done.returncode == 0
-    assert done.stdout.startswith("largest error ")
-
-
-@needs_gcc
 def test_the_self_test_of_a_c_file_finds_a_wrong_digit(arm, tmp_path):
     form = arm.closed_form()
     at = states(7, 1.0, count=4)
@@ -254,12 +245,10 @@ def test_a_name_that_c_does_not_know_is_refused(arm, tmp_path, name):
 
 
 def session(path):
-    runtime = pytest.importorskip("onnxruntime")
-    return runtime.InferenceSession(path, providers=["CPUExecutionProvider"])
+    return onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
 
 
 def test_the_onnx_graph_says_what_the_policy_says_inside_and_far_outside(policy, arm, tmp_path):
-    pytest.importorskip("onnx")
     for one in (policy, arm):
         one.export_onnx(tmp_path / "policy.onnx")
         graph = session(tmp_path / "policy.onnx")
