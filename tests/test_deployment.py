@@ -3,6 +3,7 @@
 import copy
 import ctypes
 import pickle
+import shutil
 import subprocess
 import sys
 import threading
@@ -322,7 +323,6 @@ def test_units_and_offsets_do_not_matter_to_a_step(unit, offset, scale):
         assert_allclose(found, one(at[:5]), rtol=0, atol=1e-9 * scale)
 
 
-@needs_gcc
 def test_several_policies_go_into_one_program(arm, policy, tmp_path):
     arm.export_c(tmp_path / "wipe.c", "wipe")
     policy.export_c(tmp_path / "polish.c", "polish")
