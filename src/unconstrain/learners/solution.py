@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
-from ..base.errors import SettingError
+from ..base.errors import MissingBeliefError
 
 if TYPE_CHECKING:
     from ..models import Model
@@ -133,11 +133,14 @@ class Solution:
 
         Raises
         ------
-        SettingError
+        MissingBeliefError
             If the learner has none, since it does not look at the samples.
         """
         if self.belief is None:
-            raise SettingError(f"{self.method or 'this learner'} does not tell it. Fit with learner=Robust().")
+            raise MissingBeliefError(
+                f"learner: {self.method or 'this one'} works on sums alone and does not tell it. "
+                "Fit with learner=Robust()."
+            )
         return self.belief
 
     @property
