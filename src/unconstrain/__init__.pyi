@@ -14,6 +14,7 @@ from .evaluation import upe as upe
 from .learners import Direct as Direct
 from .learners import Hybrid as Hybrid
 from .learners import Inconsistency as Inconsistency
+from .learners import Learner as Learner
 from .learners import Likelihood as Likelihood
 from .learners import NoiseCorrected as NoiseCorrected
 from .learners import Robust as Robust
@@ -51,6 +52,7 @@ from .storage import load as load
 from .storage import save as save
 from .training import Folds as Folds
 from .training import HeldOut as HeldOut
+from .training import Training as Training
 from .training import cluster as cluster
 
 __version__: str

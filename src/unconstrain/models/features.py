@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from ..base.arrays import SMALLEST_VARIANCE, Array, as_matrix, beside, check_at_least, namespace
 from ..base.errors import InvalidDataError, SettingError
+from ..base.parameters import Parameters
 from .formula import ClosedForm, exponents
 
 _LEAST_SPREAD = 1e10 * np.sqrt(SMALLEST_VARIANCE)
@@ -249,7 +250,7 @@ class NormalisedRBF:
 
 
 @dataclass(frozen=True)
-class KMeansRBF:
+class KMeansRBF(Parameters):
     """Normalised RBFs whose centres k-means lays on the first data it is shown.
 
     Parameters

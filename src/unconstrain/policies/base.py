@@ -29,6 +29,7 @@ from ..base.arrays import (
     slices,
 )
 from ..base.errors import InvalidDataError, SettingError
+from ..base.parameters import Parameters
 from ..deployment import Step, export_c, export_onnx, stepper
 from ..learners import Belief, Learner, Solution, Uncertainty, named
 from ..models import ClosedForm, FeatureMap, Model
@@ -42,7 +43,7 @@ _ROWS = 4096
 _FITTED = ("training_", "solution_", "n_features_in_", "feature_names_in_", "n_outputs_", "_flat", "_waiting")
 
 
-class Policy(RegressorMixin, BaseEstimator, ABC):
+class Policy(Parameters, RegressorMixin, BaseEstimator, ABC):
     """A policy that learns: a :class:`~unconstrain.models.Model`, what was seen, and the solution found.
 
     Attributes
