@@ -10,8 +10,9 @@ from samples import draw
 from unconstrain import Folds, HeldOut, Hybrid, ParametricPolicy
 from unconstrain.base.errors import SettingError
 from unconstrain.recordings import Batch
+from unconstrain.risks import FoldedMoments
 from unconstrain.risks.moments import gather
-from unconstrain.training import FirstLook, FoldedMoments, Split
+from unconstrain.training import FirstLook, Split
 
 
 def splitter(validation, states, groups=None, weights=None):
