@@ -1,5 +1,7 @@
 """What must hold whatever the learner and whatever the policy."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,11 +11,28 @@ from sklearn.base import clone
 
 import naive
 import unconstrain as uc
+from conftest import LEARNERS, POLICIES, ROBUST
 from samples import draw, rotation, seen
 from unconstrain.risks import FoldedMoments
 from unconstrain.risks.moments import Moments, gather
 from unconstrain.risks.objectives import inconsistency, standard_risk
 from unconstrain.risks.quadratic import lexicographic_path
+
+EVERY = ROBUST | LEARNERS
+
+
+@pytest.fixture(params=EVERY.values(), ids=EVERY)
+def learner(request):
+    """Each learner in turn, the default first; those of the robust ones look at samples."""
+    return request.param
+
+
+@pytest.fixture(params=product(EVERY, POLICIES), ids="-".join)
+def policy(request):
+    """Each policy with each learner, not fitted."""
+    name, kind = request.param
+    return POLICIES[kind](EVERY[name])
+
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -25,7 +25,7 @@ from ..base.arrays import (
 from ..base.errors import InvalidDataError, SettingError
 from ..base.parameters import Parameters
 from ..deployment import Deployable
-from ..learners import Belief, Learner, Uncertainty, named
+from ..learners import Belief, Learner, Solution, Uncertainty, named
 from ..models import FeatureMap, Model
 from ..recordings import Demonstration, stack, times_of
 from ..risks import Moments, unit_actions
@@ -47,6 +47,8 @@ class Policy(Parameters, Deployable, RegressorMixin, BaseEstimator, ABC):
 
     learner: Learner | str | None
     validation: Validation | None
+    training_: Training
+    solution_: Solution
     n_outputs_: int
     _flat: bool
 
