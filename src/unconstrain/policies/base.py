@@ -22,6 +22,7 @@ from ..base.arrays import (
     namespace,
     on_host,
 )
+from ..base.display import ShownWithSolution
 from ..base.errors import InvalidDataError, SettingError
 from ..base.parameters import Parameters
 from ..deployment import Deployable
@@ -34,7 +35,7 @@ from ..training import Batch, FirstLook, Folds, Seen, Split, Training, Validatio
 _FITTED = ("training_", "solution_", "n_features_in_", "feature_names_in_", "n_outputs_", "_flat", "_waiting")
 
 
-class Policy(Parameters, Deployable, RegressorMixin, BaseEstimator, ABC):
+class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEstimator, ABC):
     """A policy that learns: a :class:`~unconstrain.models.Model`, what was seen, and the solution found.
 
     Attributes
