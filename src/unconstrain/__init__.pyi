@@ -1,10 +1,15 @@
 """The public names and where they live: what a type checker sees, and what is imported on first use."""
 
 from . import constraints as constraints
+from . import learners as learners
+from . import models as models
+from . import motion as motion
+from . import policies as policies
 from . import storage as storage
 from .base import errors as errors
 from .base.errors import UnconstrainError as UnconstrainError
 from .evaluation import cpe as cpe
+from .evaluation import diagnosis as diagnosis
 from .evaluation import inconsistency as inconsistency
 from .evaluation import metrics as metrics
 from .evaluation import ncpe as ncpe

@@ -10,6 +10,7 @@ __all__ = [
     "Diagnosis",
     "cpe",
     "diagnose",
+    "diagnosis",
     "inconsistency",
     "metrics",
     "named",
