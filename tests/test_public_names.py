@@ -50,7 +50,6 @@ ROOMS = {
         "cluster": "training.cluster",
         "constraints": "constraints",
         "datasets": "paper.datasets",
-        "diagnosis": "evaluation.diagnosis",
         "errors": "base.errors",
         "experiments": "paper.experiments",
         "learners": "learners",

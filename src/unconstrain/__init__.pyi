@@ -9,7 +9,6 @@ from . import storage as storage
 from .base import errors as errors
 from .base.errors import UnconstrainError as UnconstrainError
 from .evaluation import cpe as cpe
-from .evaluation import diagnosis as diagnosis
 from .evaluation import inconsistency as inconsistency
 from .evaluation import metrics as metrics
 from .evaluation import ncpe as ncpe

@@ -10,7 +10,6 @@ __all__ = [
     "Diagnosis",
     "cpe",
     "diagnose",
-    "diagnosis",
     "inconsistency",
     "metrics",
     "named",

@@ -14,14 +14,7 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
-from ..base.arrays import (
-    Array,
-    Groups,
-    beside,
-    check_at_least,
-    namespace,
-    on_host,
-)
+from ..base.arrays import Array, Groups, beside, check_at_least, namespace, on_host
 from ..base.display import ShownWithSolution
 from ..base.errors import InvalidDataError, SettingError
 from ..base.parameters import Parameters
