@@ -13,8 +13,7 @@ import naive
 import unconstrain as uc
 from conftest import LEARNERS, POLICIES, ROBUST
 from samples import draw, rotation, seen
-from unconstrain.risks import FoldedMoments
-from unconstrain.risks.moments import Moments, gather
+from unconstrain.risks import FoldedMoments, Moments, gather
 from unconstrain.risks.objectives import inconsistency, standard_risk
 from unconstrain.risks.quadratic import lexicographic_path
 

@@ -3,5 +3,5 @@
 import lazy_loader
 
 __getattr__, __dir__, __all__ = lazy_loader.attach(
-    __name__, ["arrays", "display", "errors", "files", "parameters", "threads"]
+    __name__, ["arrays", "display", "errors", "estimators", "files", "parameters", "threads"]
 )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..base.display import Shown, counted
-from ..base.errors import SettingError
+from ..base.errors import MissingBeliefError
 
 if TYPE_CHECKING:
     from ..models import Model
@@ -139,11 +139,14 @@ class Solution(Shown):
 
         Raises
         ------
-        SettingError
+        MissingBeliefError
             If the learner has none, since it does not look at the samples.
         """
         if self.belief is None:
-            raise SettingError(f"{self.method or 'this learner'} does not tell it. Fit with learner=Robust().")
+            raise MissingBeliefError(
+                f"learner: {self.method or 'this one'} works on sums alone and does not tell it. "
+                "Fit with learner=Robust()."
+            )
         return self.belief
 
     @property

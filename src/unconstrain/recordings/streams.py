@@ -5,15 +5,14 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import BLOCK_ROWS, Array, check_at_least
-from .demonstration import Demonstration, Recording
+from .demonstration import Demonstration, Recording, times_of
 from .preparation import Recipe, complete_recipe, prepare
 from .readers import expand, read_blocks
 
@@ -21,8 +20,17 @@ HELD_BYTES = 2**25
 """Demonstrations that take no more than this in all are kept after the first walk, so that files are read once."""
 
 
-Samples = tuple[Array, Array, Array | None, NDArray[Any]]
-"""States (N, n), actions (N, d), weights (N,) if they are not ones, and names of the demonstrations (N,)."""
+class Block(NamedTuple):
+    """Samples to learn from: ``states`` (N, n), ``actions`` (N, d), ``weights`` (N,) if not ones, ``groups`` (N,).
+
+    ``times`` (N,), seconds, where all demonstrations have them.
+    """
+
+    states: Array
+    actions: Array
+    weights: Array | None
+    groups: NDArray[Any]
+    times: Array | None = None
 
 
 class Stream:
@@ -83,14 +91,16 @@ class Stream:
         actions = prepare(self.first, self.recipe)[0].actions if self.speed_power else np.zeros((1, 1))
         return float(np.linalg.norm(actions, axis=1).max()) or 1.0
 
-    def __iter__(self) -> Iterator[Samples]:
+    def __iter__(self) -> Iterator[Block]:
         """Batches of at least :data:`~unconstrain.base.arrays.BLOCK_ROWS` samples, but for the last."""
         waiting: list[tuple[str, Demonstration]] = []
+        samples = 0
         for named in self.named_demonstrations():
             waiting.append(named)
-            if sum(len(demo) for _, demo in waiting) >= BLOCK_ROWS:
+            samples += len(named[1])
+            if samples >= BLOCK_ROWS:
                 yield self._batch(waiting)
-                waiting = []
+                waiting, samples = [], 0
         if waiting:
             yield self._batch(waiting)
 
@@ -141,15 +151,16 @@ class Stream:
                     if self._walked:  # it was said on the first walk
                         warnings.simplefilter("ignore", UserWarning)
                     [demonstration] = prepare(recording, self.recipe)
-                yield f"{number}/{recording.name}", replace(demonstration, times=None)
+                yield f"{number}/{recording.name}", demonstration
 
-    def _batch(self, named: list[tuple[str, Demonstration]]) -> Samples:
+    def _batch(self, named: list[tuple[str, Demonstration]]) -> Block:
         actions = np.concatenate([demo.actions for _, demo in named])
-        return (
+        return Block(
             np.concatenate([demo.states for _, demo in named]),
             actions,
             self._counts(actions),
             np.repeat([name for name, _ in named], [len(demo) for _, demo in named]),
+            times_of([demo for _, demo in named]),
         )
 
     def _counts(self, actions: Array) -> Array | None:
