@@ -15,10 +15,12 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
 from ..base.arrays import Array, Groups, beside, check_at_least, namespace, on_host
+from ..base.display import ShownWithSolution
 from ..base.errors import InvalidDataError, SettingError
 from ..base.estimators import checked_states
+from ..base.parameters import Parameters
 from ..deployment import Deployable
-from ..learners import Belief, Learner, Uncertainty, named
+from ..learners import Belief, Learner, Solution, Uncertainty, named
 from ..models import FeatureMap, Model
 from ..recordings import Demonstration, stack, times_of
 from ..risks import Moments, unit_actions
@@ -27,7 +29,7 @@ from ..training import Batch, FirstLook, Folds, Seen, Split, Training, Validatio
 _FITTED = ("training_", "solution_", "n_features_in_", "feature_names_in_", "n_outputs_", "_flat", "_waiting")
 
 
-class Policy(Deployable, RegressorMixin, BaseEstimator, ABC):
+class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEstimator, ABC):
     """A policy that learns: a :class:`~unconstrain.models.Model`, what was seen, and the solution found.
 
     Attributes
@@ -40,6 +42,8 @@ class Policy(Deployable, RegressorMixin, BaseEstimator, ABC):
 
     learner: Learner | str | None
     validation: Validation | None
+    training_: Training
+    solution_: Solution
     n_outputs_: int
     _flat: bool
 
