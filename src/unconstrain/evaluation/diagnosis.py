@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InvalidDataError
-from ..learners import HIDDEN, Solution, noise_by_differences
+from ..learners import SPHERE_HIDDEN_BY_NOISE, Solution, noise_by_differences
 from ..models import choose_variance, cover
 from ..policies import Policy
 from ..recordings import Demonstration, stack, unique_names
@@ -280,7 +280,7 @@ def sentences(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -
 
 def _about_noise(found: Diagnosis) -> str:
     verdict = "little" if found.noise_share < SMALL else "some" if found.noise_share < 3 * SMALL else "much"
-    hidden = " That hides most of what follows." if found.noise_share > HIDDEN else ""
+    hidden = " That hides most of what follows." if found.noise_share > SPHERE_HIDDEN_BY_NOISE else ""
     said = (
         f"Noise: {verdict}, {found.noise:.3g} on each action coordinate, {found.noise_share:.1%} of a typical action "
         f"({found.typical:.3g}) in all.{hidden}"
@@ -304,7 +304,7 @@ def _about_method(found: Diagnosis) -> str:
     corrected = found.method == "noise-corrected"
     kind = "on moments without the noise" if corrected else "as what it misses goes on in time and is no noise"
     why = "or it tells no more than consistency does"
-    if found.noise_share > HIDDEN:
+    if found.noise_share > SPHERE_HIDDEN_BY_NOISE:
         why = "and so much noise hides how samples lie about their spheres"
     elif found.refuted:
         why = "so constraints do not seem to vary at random"
@@ -314,7 +314,7 @@ def _about_method(found: Diagnosis) -> str:
 def _about_variability(found: Diagnosis) -> str:
     share = found.states_determined
     verdict = "rich enough" if share > 0.95 else "rich enough in most places" if share > 0.7 else "not rich enough"
-    if found.noise_share > HIDDEN:
+    if found.noise_share > SPHERE_HIDDEN_BY_NOISE:
         verdict = "cannot be told under so much noise"
     return (
         f"Variability of the constraints: {verdict}. The data determines {found.directions_determined:.0%} of "
