@@ -22,7 +22,7 @@ demo: $(USER_STAMP) ## learn a wiping movement end to end and write a report to 
 	@echo "The report is in $(CURDIR)/$(DEMO_DIR); open its .html file in a browser."
 
 test: $(DEV_STAMP) ## run all tests, in parallel, with coverage
-	@scripts/install-system browser graphics || echo "make test: going on; tests that need them will fail." >&2
+	@scripts/install-system browser graphics compiler || echo "make test: going on; tests that need them will fail." >&2
 	@$(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --cov --cov-report=term-missing:skip-covered
 
 check: $(DEV_STAMP) ## lint, formatting, types, import order

@@ -1,10 +1,19 @@
-"""What all tests share: every learner, every policy, and data for them."""
+"""What all tests share: every learner, every policy, data for them, and what takes long to make."""
 
+import os
+import pickle
+import shutil
 from itertools import product
 
 import pytest
+from coverage import Coverage
+from filelock import FileLock
 from hypothesis import HealthCheck, Phase, settings
 
+# Before NumPy comes in: the tests themselves run side by side, and at their sizes threads mostly wait for each other.
+os.environ |= {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
+
+import recorded
 import samples
 import unconstrain as uc
 
@@ -59,3 +68,92 @@ def policy_of(request):
 def data():
     """Noisy actions, each behind a random constraint, in six groups."""
     return samples.draw()
+
+
+@pytest.fixture(scope="session")
+def once(tmp_path_factory):
+    """``once(name, make)`` is ``make()``, called by the first process of the run that asks and kept for the others."""
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
+    loaded = {}
+
+    def of(name, make):
+        path = folder / f"{name}.pickle"
+        with FileLock(f"{path}.lock"):
+            if not path.exists():
+                content = pickle.dumps(make())
+                path.write_bytes(content)
+        if name not in loaded:
+            loaded[name] = pickle.loads(path.read_bytes())
+        return loaded[name]
+
+    return of
+
+
+def washing_unwatched(settings):
+    """The washing experiment, without measuring coverage: its loops of many thousand short steps take twice as long.
+
+    What it runs counts as covered only where shorter tests run it, too.
+    """
+    from unconstrain.paper.experiments import washing
+
+    measuring = Coverage.current()
+    if measuring is None:
+        return washing.run(washing.Settings(**settings))
+    measuring.stop()
+    try:
+        return washing.run(washing.Settings(**settings))
+    finally:
+        measuring.start()
+
+
+@pytest.fixture(scope="session")
+def washed(once):
+    """What ``unconstrain demo`` finds with a seed."""
+    return lambda seed=0: once(f"washing {seed}", lambda: washing_unwatched({"trials": 1, "seed": seed}))
+
+
+@pytest.fixture(scope="session")
+def washed_rim(once):
+    """What ``unconstrain demo --real`` finds."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("UNCONSTRAIN_DATA", str(recorded.DATA))
+        return once("washing of the rim", lambda: washing_unwatched({"trials": 1, "real": True}))
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory):
+    """Chromium without a window."""
+    if os.environ.get("UNCONSTRAIN_NO_BROWSER") == "1":
+        pytest.skip("UNCONSTRAIN_NO_BROWSER is set")
+    chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
+    if chromium is None or driver is None:
+        pytest.fail(
+            "These tests open reports in Chromium, and it or its driver is missing. Install them with "
+            "'apt-get install chromium chromium-driver' (or scripts/install-system browser), or set "
+            "UNCONSTRAIN_NO_BROWSER=1 to leave these tests out."
+        )
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    for argument in (
+        "headless",
+        "no-sandbox",
+        "disable-gpu",
+        "disable-dev-shm-usage",
+        "enable-unsafe-swiftshader",  # WebGL without a graphics card
+        "no-first-run",
+        "disable-background-networking",
+        "disable-component-update",
+        "disable-sync",
+        "window-size=1200,1000",
+        f"user-data-dir={tmp_path_factory.mktemp('chromium')}",
+    ):
+        options.add_argument(f"--{argument}")
+    started = webdriver.Chrome(options=options, service=Service(driver))
+    yield started
+    started.quit()

@@ -196,3 +196,31 @@ def test_an_arm_has_one_angle_for_each_joint():
         LWR3.frames(np.zeros((1, 6)))
     with pytest.raises(InvalidDataError, match="alpha: got 3 values, expected 2"):
         Arm.from_dh([0, 0], [0, 0, 0], [1, 1], [1, 1])
+
+
+GRIPPER = """<robot name="hand"><link name="base"/><link name="palm"/><link name="finger"/><link name="thumb"/>
+<joint name="wrist" type="revolute"><parent link="base"/><child link="palm"/><axis xyz="{axis}"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="close" type="prismatic"><parent link="palm"/><child link="finger"/><axis xyz="0 1 0"/>
+<limit lower="0" upper="0.04" effort="1" velocity="1"/></joint>
+<joint name="follow" type="prismatic"><parent link="palm"/><child link="thumb"/><axis xyz="{other}"/>
+<limit lower="0" upper="0.04" effort="1" velocity="1"/><mimic joint="close"/></joint></robot>"""
+
+
+def hand_file(folder, axis="0 0 1", other="0 -1 0"):
+    path = folder / "hand.urdf"
+    path.write_text(GRIPPER.format(axis=axis, other=other))
+    return path
+
+
+def test_what_is_not_on_the_way_to_the_tip_does_not_matter(tmp_path):
+    path = hand_file(tmp_path, other="0 0 0")
+    assert Arm.from_urdf(path, "palm").names == ("wrist",)
+    assert Arm.from_urdf(path, "finger").names == ("wrist", "close")
+    with pytest.raises(SettingError, match="joint 'follow' on the way to 'thumb' mimics another one"):
+        Arm.from_urdf(path, "thumb")
+
+
+def test_a_joint_without_an_axis_is_refused_and_gives_no_nan(tmp_path):
+    with pytest.raises(ReadError, match=r"joint 'wrist' on the way to 'palm' has the axis \[0.0, 0.0, 0.0\], expected"):
+        Arm.from_urdf(hand_file(tmp_path, axis="0 0 0"), "palm")

@@ -11,29 +11,22 @@ import sys
 from functools import partial
 from pathlib import Path
 
+import h5py
 import numpy as np
+import pyarrow.parquet
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
 
 import unconstrain as uc
+from recorded import needs_rim
 from unconstrain import cli, storage
 from unconstrain.base.errors import MissingExtraError
 from unconstrain.cli import fitting
 from unconstrain.paper import experiments
 from unconstrain.paper import pages as report
 from unconstrain.paper.experiments import table1, washing
-
-DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))
-RIM = DATA / "lasa_rim_wiping" / "demos_rim_processed_data.mat"
-needs_data = pytest.mark.skipif(
-    not RIM.is_file(),
-    reason=f"no car-rim recordings in {RIM.parent}; set UNCONSTRAIN_DATA to a folder that holds lasa_rim_wiping/",
-)
-needs_plotly = pytest.mark.skipif(
-    "plotly" not in sys.modules and not __import__("importlib.util").util.find_spec("plotly"),
-    reason="plotly is not installed; it comes with unconstrain[viz]",
-)
+from unconstrain.paper.pages import washing_arm
 
 A = np.array([[-0.5, 2.0], [-1.5, -0.3]])
 b = np.array([0.2, -0.1])
@@ -443,7 +436,6 @@ def test_what_was_repaired_is_said_in_a_note(tmp_path):
     assert note.startswith("Note: 'circle_0': 1 gap in the time stamps, the longest 3.01 s after 5.99 s; ")
 
 
-@needs_plotly
 def test_fit_writes_a_report_too(files, tmp_path):
     said = run("fit", *files, "--model", "linear", "-o", tmp_path / "p.npz", "--report", tmp_path / "p.html")
     assert f"report: {tmp_path / 'p.html'}" in said
@@ -451,11 +443,9 @@ def test_fit_writes_a_report_too(files, tmp_path):
 
 
 def test_fit_and_inspect_read_parquet_and_hdf5(folder, policy, tmp_path):
-    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
-    h5py = pytest.importorskip("h5py")
     for number, start in enumerate(STARTS):
         table = dict(zip(("t", "x", "y", "vx", "vy"), record(start, seed=number).T, strict=True))
-        parquet.write_table(arrow.table(table), tmp_path / f"swing_{number}.parquet")
+        pyarrow.parquet.write_table(pyarrow.table(table), tmp_path / f"swing_{number}.parquet")
         with h5py.File(tmp_path / f"swing_{number}.h5", "w") as file:
             for name, values in table.items():
                 file[name] = values
@@ -595,7 +585,6 @@ def test_a_movement_far_from_the_data_is_noted(files, tmp_path):
 
 @pytest.mark.parametrize("name", ["swing.c", "swing.ONNX"])
 def test_export_writes_what_its_suffix_says(policy, tmp_path, name):
-    pytest.importorskip("onnx")
     said = run("export", policy, "-o", tmp_path / name)
     assert said.strip().endswith(str(tmp_path / name))
     exported = (tmp_path / name).read_bytes()
@@ -896,7 +885,6 @@ def test_tables_do_not_wrap_in_a_terminal_of_80_columns(folder):
 @pytest.fixture(scope="module")
 def table1_of_two(tmp_path_factory):
     """The JSON of two trials of table 1, and what was printed."""
-    pytest.importorskip("plotly")
     out = tmp_path_factory.mktemp("table1")
     said = run("reproduce", "table1", "--trials", 2, "--workers", 1, "--out", out)
     return (out / "table1.json").read_text(), said, out
@@ -976,14 +964,12 @@ def test_an_interrupted_run_goes_on_where_it_stopped(table1_of_two, tmp_path, mo
     assert sorted(path.name for path in tmp_path.iterdir()) == ["table1.html", "table1.json"]
 
 
-@needs_plotly
 @pytest.mark.parametrize("name", ["figure4"])
 def test_an_experiment_of_a_single_data_set_takes_no_trials(name, tmp_path):
     assert refused("reproduce", name, "--trials", 3, "--out", tmp_path) == f"--trials: {name} is a single data set."
     assert not list(tmp_path.iterdir())
 
 
-@needs_plotly
 def test_figure4_writes_its_rows(tmp_path):
     run("reproduce", "figure4", "--workers", 1, "--out", tmp_path)
     assert len(json.loads((tmp_path / "figure4.json").read_text())["rows"]) == 6
@@ -1013,12 +999,25 @@ def test_results_cannot_go_into_a_file(tmp_path):
         assert said == f"Invalid value for '--out': Directory '{tmp_path / 'taken'}' is a file."
 
 
+def demonstrated_with(result, *options):
+    """What the demo says of an experiment that ran with its settings, and with a short film."""
+
+    def known(settings, workers, progress):
+        assert (settings, workers) == (result.settings, 1)
+        progress(1, 1)
+        return result
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(washing, "run", known)
+        patch.setattr(washing_arm, "film", partial(washing_arm.film, seconds=0.5))
+        return run("demo", *options)
+
+
 @pytest.fixture(scope="module")
-def demonstrated(tmp_path_factory):
+def demonstrated(tmp_path_factory, washed):
     """What the demo says and writes."""
-    pytest.importorskip("plotly")
     out = tmp_path_factory.mktemp("demo")
-    return run("demo", "--out", out), out
+    return demonstrated_with(washed(), "--out", out), out
 
 
 @pytest.mark.slow
@@ -1052,13 +1051,10 @@ def test_demo_writes_a_row_for_each_method_and_surface(demonstrated):
     assert all(row["ncpe"] <= row["nupe"] for row in found["rows"])
 
 
-@needs_data
-@needs_plotly
+@needs_rim
 @pytest.mark.slow
-def test_demo_learns_from_real_recordings(tmp_path, monkeypatch):
-    monkeypatch.setenv("UNCONSTRAIN_DATA", str(DATA))
-    monkeypatch.setattr(washing, "Settings", partial(washing.Settings, steps=20))  # only the picture needs more
-    said = run("demo", "--real", "--out", tmp_path)
+def test_demo_learns_from_real_recordings(washed_rim, tmp_path):
+    said = demonstrated_with(washed_rim, "--real", "--out", tmp_path)
     assert "nCPE on unseen surfaces with the plane normals, mean: direct " in said
     rows = json.loads((tmp_path / "washing.json").read_text())["rows"]
     assert {(row["surface"], row["normal"]) for row in rows} == {

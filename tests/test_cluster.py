@@ -5,19 +5,18 @@ import signal
 import sys
 import time
 
+import dask
+import distributed
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from dask import array
 from numpy.testing import assert_allclose, assert_array_equal
 
 import unconstrain as uc
 from samples import draw
 from unconstrain import cli, cluster
 from unconstrain.base.errors import InvalidDataError, MissingExtraError, SettingError
-
-dask = pytest.importorskip("dask")
-distributed = pytest.importorskip("distributed")
-array = pytest.importorskip("dask.array")
 
 # What the cluster says while its processes come and go is not ours.
 pytestmark = pytest.mark.filterwarnings("ignore")

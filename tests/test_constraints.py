@@ -44,6 +44,16 @@ def test_a_line_that_never_switches_is_a_plane():
     assert_allclose(N, null_space_projection(Plane([3, 4])(np.zeros((2, 2)), np.zeros(2))))
 
 
+@pytest.mark.parametrize(
+    "constraint",
+    [SwitchingLine([[1, 0], [0, 1]], [0.3]), PolicyAligned(circle, [0.1, 0.2], 0.02)],
+    ids=["line", "aligned"],
+)
+def test_no_stretch_holds_at_a_time_that_is_none(constraint):
+    with pytest.raises(InvalidDataError, match="times: found nan at row 1, and the constraint depends on them"):
+        constraint(np.ones((3, 2)), np.array([0.0, np.nan, 1.0]))
+
+
 def test_random_lines_switch_at_regular_intervals():
     line = SwitchingLine.random(np.random.default_rng(0), duration=0.9, switches=2, dimensions=4)
     assert_array_equal(line.directions, np.random.default_rng(0).standard_normal((3, 4)))

@@ -6,31 +6,24 @@ import csv
 import functools
 import hashlib
 import http.server
-import os
 import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import pooch
 import pytest
 
+from recorded import DATA, RIM, needs_rim
 from unconstrain.base.errors import MissingExtraError, ReadError
 from unconstrain.paper import datasets
 from unconstrain.paper.datasets import WipingBout, load_rim_wiping
-
-DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))
-RIM = DATA / "lasa_rim_wiping"
-needs_data = pytest.mark.skipif(
-    not (RIM / datasets.RIM_FILE).is_file(),
-    reason=f"no car-rim recordings in {RIM}; set UNCONSTRAIN_DATA to a folder that holds lasa_rim_wiping/",
-)
 
 
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty cache, and no local copy."""
-    pooch = pytest.importorskip("pooch")
     monkeypatch.setattr(pooch, "os_cache", lambda name: tmp_path / "cache" / name)
     monkeypatch.delenv(datasets.DATA_VARIABLE, raising=False)
     return tmp_path / "cache" / "unconstrain"
@@ -101,7 +94,7 @@ def test_a_download_that_is_not_there_is_one_clear_error(cache: Path, published:
         load_rim_wiping(download=True)
 
 
-@needs_data
+@needs_rim
 def test_a_download_is_kept_and_used_without_asking_again(cache: Path, published: Path) -> None:
     (published / datasets.RIM_FILE).write_bytes((RIM / datasets.RIM_FILE).read_bytes())
     first = load_rim_wiping(download=True)
@@ -131,7 +124,7 @@ def numbers(row: dict[str, str], *names: str) -> list[float]:
     return [float(row[name]) for name in names]
 
 
-@needs_data
+@needs_rim
 def test_the_recordings_are_those_of_the_converted_tables() -> None:
     tracks = datasets._load_rim(RIM / datasets.RIM_FILE)
     assert len(tracks) == 6
@@ -141,7 +134,7 @@ def test_the_recordings_are_those_of_the_converted_tables() -> None:
         assert track.interval == pytest.approx(np.diff(table[:, 0]).mean(), rel=1e-6)
 
 
-@needs_data
+@needs_rim
 def test_rows_and_tilts_are_those_annotated(annotations: dict[str, dict[str, str]]) -> None:
     for bout in datasets.RIM_BOUTS:
         row = annotations[bout.name]
@@ -150,7 +143,7 @@ def test_rows_and_tilts_are_those_annotated(annotations: dict[str, dict[str, str
     assert len(annotations) == len(datasets.RIM_BOUTS)
 
 
-@needs_data
+@needs_rim
 def test_both_normals_are_those_annotated(bouts: dict[str, WipingBout], annotations: dict[str, dict[str, str]]) -> None:
     for name, bout in bouts.items():
         row = annotations[name]
@@ -160,7 +153,7 @@ def test_both_normals_are_those_annotated(bouts: dict[str, WipingBout], annotati
         assert angle == pytest.approx(float(row["angle_plane_tool_deg"]), abs=1e-4)
 
 
-@needs_data
+@needs_rim
 def test_all_bouts_go_round_the_same_way(bouts: dict[str, WipingBout]) -> None:
     for bout in bouts.values():
         demonstration = bout.demonstration
@@ -168,7 +161,7 @@ def test_all_bouts_go_round_the_same_way(bouts: dict[str, WipingBout]) -> None:
         assert (np.cross(arms, demonstration.actions) @ bout.plane_normal).mean() > 0
 
 
-@needs_data
+@needs_rim
 def test_velocities_are_tangent_to_the_flat_rim_and_add_up_to_the_way(bouts: dict[str, WipingBout]) -> None:
     for name, bout in bouts.items():
         demonstration = bout.demonstration
@@ -181,14 +174,14 @@ def test_velocities_are_tangent_to_the_flat_rim_and_add_up_to_the_way(bouts: dic
             assert off < 0.04
 
 
-@needs_data
+@needs_rim
 def test_the_bout_wiped_backwards_is_turned_round(bouts: dict[str, WipingBout]) -> None:
     states = bouts["C1"].demonstration.states
     track = datasets._load_rim(RIM / datasets.RIM_FILE)[3]
     np.testing.assert_array_equal(states[-1], track.positions[350])
 
 
-@needs_data
+@needs_rim
 def test_rate_and_centring_can_be_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(datasets.DATA_VARIABLE, str(DATA))
     for bout in load_rim_wiping(rate=10, centre=True):

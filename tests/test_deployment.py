@@ -9,6 +9,7 @@ import sys
 import threading
 
 import numpy as np
+import onnxruntime
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -23,7 +24,6 @@ from unconstrain.base.errors import InvalidDataError, MissingExtraError, Setting
 from unconstrain.deployment import c_source
 
 DATA = draw(noise=0.02)
-needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs the C compiler gcc")
 FAR = [1.0, 3.0, 30.0, 1e3, 1e8]
 """Half-widths of the boxes that states are drawn from; the data is in the first."""
 
@@ -198,16 +198,17 @@ def compiled(policy, folder, name="policy", flags=()):
     return call
 
 
-@needs_gcc
-def test_the_c_file_says_what_the_policy_says_inside_and_far_outside(policy, tmp_path):
+def test_the_c_file_says_what_the_policy_says_inside_and_far_outside_and_tests_itself(policy, tmp_path):
     step = compiled(policy, tmp_path)
+    done = subprocess.run([tmp_path / "self_test"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert done.stdout.startswith("largest error ")
     for width in FAR:
         at = states(2, width)
         assert_same(np.stack([step(x) for x in at]), policy, at, width)
     assert np.isnan(step([np.nan, 0.0])).all()
 
 
-@needs_gcc
 def test_the_c_file_of_an_arm(arm, tmp_path):
     step = compiled(arm, tmp_path, "left_arm", flags=["-Wconversion", "-Wmissing-prototypes", "-Wshadow"])
     for width in FAR:
@@ -215,15 +216,6 @@ def test_the_c_file_of_an_arm(arm, tmp_path):
         assert_same(np.stack([step(x) for x in at]), arm, at, width)
 
 
-@needs_gcc
-def test_the_c_file_tests_itself(policy, tmp_path):
-    compiled(policy, tmp_path)
-    done = subprocess.run([tmp_path / "self_test"], capture_output=True, text=True, check=False)
-    assert done.returncode == 0
-    assert done.stdout.startswith("largest error ")
-
-
-@needs_gcc
 def test_the_self_test_of_a_c_file_finds_a_wrong_digit(arm, tmp_path):
     form = arm.closed_form()
     at = states(7, 1.0, count=4)
@@ -254,12 +246,10 @@ def test_a_name_that_c_does_not_know_is_refused(arm, tmp_path, name):
 
 
 def session(path):
-    runtime = pytest.importorskip("onnxruntime")
-    return runtime.InferenceSession(path, providers=["CPUExecutionProvider"])
+    return onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
 
 
 def test_the_onnx_graph_says_what_the_policy_says_inside_and_far_outside(policy, arm, tmp_path):
-    pytest.importorskip("onnx")
     for one in (policy, arm):
         one.export_onnx(tmp_path / "policy.onnx")
         graph = session(tmp_path / "policy.onnx")
@@ -331,3 +321,23 @@ def test_units_and_offsets_do_not_matter_to_a_step(unit, offset, scale):
         one.fit(at, scale * DATA.actions)
         found = np.stack([one.step(x) for x in at[:5]])
         assert_allclose(found, one(at[:5]), rtol=0, atol=1e-9 * scale)
+
+
+def test_several_policies_go_into_one_program(arm, policy, tmp_path):
+    arm.export_c(tmp_path / "wipe.c", "wipe")
+    policy.export_c(tmp_path / "polish.c", "polish")
+    both = tmp_path / "both.c"
+    both.write_text('#include "wipe.c"\n#include "polish.c"\n')
+    strict = "gcc -std=c99 -Wall -Wextra -pedantic -Werror -c both.c"
+    subprocess.run(strict.split(), cwd=tmp_path, check=True)
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="needs the C++ compiler g++")
+def test_a_policy_compiled_as_cpp_is_called_from_c(policy, tmp_path):
+    policy.export_c(tmp_path / "wipe.cpp", "wipe")
+    (tmp_path / "main.c").write_text(
+        "void wipe_step(const double state[2], double action[2]);\n"
+        "int main(void) { double both[2] = {0.0, 0.0}; wipe_step(both, both); return 0; }\n"
+    )
+    for command in ("g++ -std=c++17 -c wipe.cpp", "gcc -std=c99 -c main.c", "g++ main.o wipe.o -lm -o main"):
+        subprocess.run(command.split(), cwd=tmp_path, check=True)

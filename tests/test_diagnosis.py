@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 import unconstrain as uc
 from test_cli import call, refused, run, write
-from test_report import References, browser, opened  # noqa: F401 - a fixture
+from test_report import References, opened
 from unconstrain.base.errors import InvalidDataError, SettingError
 from unconstrain.evaluation.diagnosis import Diagnosis, diagnose, sentences
 from unconstrain.pages import diagnosis, fit
@@ -215,7 +215,7 @@ class TestCommand:
 
 
 class TestPage:
-    def test_a_page_draws_all_its_pictures(self, fitted, browser, tmp_path):  # noqa: F811
+    def test_a_page_draws_all_its_pictures(self, fitted, browser, tmp_path):
         policy, demos = fitted
         evil = "<script>alert(1)</script>"
         named = [replace(demo, name=evil) for demo in demos]
@@ -223,7 +223,7 @@ class TestPage:
         assert evil not in page
         assert len(opened(browser, page, tmp_path)) == 2
 
-    def test_a_page_fits_on_a_phone(self, fitted, browser, tmp_path):  # noqa: F811
+    def test_a_page_fits_on_a_phone(self, fitted, browser, tmp_path):
         policy, demos = fitted
         page = diagnosis.diagnosis_page(diagnose(policy, demos), demos, "A diagnosis", ["x", "y"], ["vx", "vy"])
         metrics = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
@@ -234,7 +234,7 @@ class TestPage:
         finally:
             browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
-    def test_the_page_of_a_robust_fit_says_what_is_not_known(self, fitted, browser, tmp_path):  # noqa: F811
+    def test_the_page_of_a_robust_fit_says_what_is_not_known(self, fitted, browser, tmp_path):
         page = fit.policy_page(*fitted, "A policy")
         assert "What is not known" in page
         assert [one["id"] for one in opened(browser, page, tmp_path)][-1] == "known-1"

@@ -271,8 +271,8 @@ def test_of_affine_functions_there_is_none_whatever_the_unit(seed, unit):
     measure = NormalisedRBF(centres, unit**2).roughness()
     affine = centres @ [0.7, -1.3] / unit + 0.4
     bent = (centres[:, 0] / unit) ** 2
-    assert affine @ measure @ affine < 1e-8
-    assert bent @ measure @ bent > 1e-5
+    assert affine @ measure @ affine < 1e-6  # a thousandth, squared: what the ridge of its regressions leaves
+    assert bent @ measure @ bent > 1e-4
     assert_allclose(measure, NormalisedRBF(centres / unit, 1.0).roughness(), rtol=1e-6, atol=1e-9)
 
 

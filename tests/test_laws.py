@@ -10,10 +10,9 @@ from sklearn.base import clone
 import naive
 import unconstrain as uc
 from samples import draw, rotation, seen
-from unconstrain.risks.moments import Moments, gather
+from unconstrain.risks import FoldedMoments, Moments, gather
 from unconstrain.risks.objectives import inconsistency, standard_risk
 from unconstrain.risks.quadratic import lexicographic_path
-from unconstrain.training import FoldedMoments
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -9,8 +9,7 @@ from samples import draw, seen
 from unconstrain import Direct, Hybrid, Inconsistency
 from unconstrain.base.errors import SettingError
 from unconstrain.learners import Solution
-from unconstrain.risks.moments import Moments, gather
-from unconstrain.training import FoldedMoments
+from unconstrain.risks import FoldedMoments, Moments, gather
 
 AVERAGES = {
     "arithmetic": lambda each, weight: sum(w * e for e, w in zip(each, weight, strict=True)) / sum(weight),

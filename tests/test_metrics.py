@@ -106,9 +106,56 @@ def test_a_constraint_goes_by_the_demonstration_s_clock():
         return np.zeros((len(states), 1, 2))
 
     states = np.random.default_rng(0).standard_normal((3, 2))
-    demos = [uc.Demonstration(states, states, [1, 2, 3]), uc.Demonstration(states, states)]
-    uc.cpe(lambda x: x, demos, constraint)
-    assert_allclose(seen, [[1, 2, 3], [0, 0, 0]])
+    uc.cpe(
+        lambda x: x,
+        [uc.Demonstration(states, states, [1, 2, 3]), uc.Demonstration(states, states, [4, 5, 6])],
+        constraint,
+    )
+    assert_allclose(seen, [[1, 2, 3], [4, 5, 6]])
+
+
+TIMELESS = {
+    "plane": uc.constraints.Plane([1.0, 2.0]),
+    "as many as there are times": lambda states, times: np.ones((len(times), 1, 2)),
+    "by shape": lambda states, times: np.ones((*times.shape, 1, 2)),
+}
+
+TIMED = {
+    "switching line": uc.constraints.SwitchingLine([[1.0, 0.0], [0.0, 1.0]], [0.5]),
+    "aligned": uc.constraints.PolicyAligned(lambda states: states, [0.1, 0.2], 0.02),
+    "comparison": lambda states, times: np.where((times < 1)[:, None, None], [[1.0, 0.0]], [[0.0, 1.0]]),
+    "arithmetic": lambda states, times: np.stack([0.5 * times, 1 - times], axis=-1)[:, None, :],
+    "function": lambda states, times: np.stack([np.sin(times), np.cos(times)], axis=-1)[:, None, :],
+    "conversion": lambda states, times: np.eye(2)[(np.asarray(times) > 1).astype(int)][:, None, :],
+    "method": lambda states, times: np.eye(2)[times.astype(int)][:, None, :],
+    "loop": lambda states, times: np.array([[[1.0, time]] for time in times]),
+    "first": lambda states, times: np.full((len(states), 1, 2), float(times[0])),
+}
+
+
+@pytest.mark.parametrize("constraint", TIMELESS.values(), ids=TIMELESS)
+def test_a_constraint_that_does_not_read_times_needs_none(constraint):
+    states = np.random.default_rng(0).standard_normal((3, 2))
+    timed, untimed = uc.Demonstration(states, states, [0, 1, 2]), uc.Demonstration(states, states)
+    assert uc.cpe(np.sin, untimed, constraint) == uc.cpe(np.sin, timed, constraint)
+
+
+@pytest.mark.parametrize("constraint", TIMED.values(), ids=TIMED)
+def test_a_constraint_that_reads_times_is_no_error_only_where_there_are_some(constraint):
+    states = np.random.default_rng(0).standard_normal((3, 2))
+    uc.cpe(np.sin, uc.Demonstration(states, states, [0, 1, 1]), constraint)
+    with pytest.raises(InvalidDataError, match=r"'log' has no times, and the constraint depends on them: expected one"):
+        uc.ncpe(np.sin, uc.Demonstration(states, states, name="log"), constraint)
+    with pytest.raises(InvalidDataError, match=r"^a demonstration has no times, and"):
+        uc.cpe(np.sin, uc.Demonstration(states, states), constraint)
+
+
+def test_a_constraint_of_another_shape_is_refused():
+    demo = uc.Demonstration(np.ones((3, 2)), np.ones((3, 2)))
+    with pytest.raises(
+        SettingError, match=r"constraint: got A of shape \(3, 1, 3\) for 3 states, expected \(3, k, 2\)"
+    ):
+        uc.cpe(np.sin, demo, uc.constraints.Plane([0, 0, 1]))
 
 
 def test_a_policy_of_one_dimension_may_be_flat():

@@ -1,5 +1,9 @@
 """The sums over samples."""
 
+import ctypes
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -177,3 +181,39 @@ def test_pieces_are_all_rows_once():
     assert len(pieces) > 1
     assert_array_equal(np.concatenate([np.arange(30_001)[rows] for rows in pieces]), np.arange(30_001))
     assert list(Sums(1, 2, 3).pieces(table[:0])) == []
+
+
+def test_one_feature_and_one_action_in_several_models_can_be_summed():
+    weights = np.array([[1.0, 0.5], [2.0, 0.0]])
+    found = gather(np.array([[2.0], [3.0]]), np.array([[1.0], [-1.0]]), weights)
+    assert_allclose(found.cross[:, 0, 0], [2 - 6, 1])
+
+
+@pytest.mark.skipif(
+    sys.platform != "linux" or not hasattr(ctypes.CDLL(None), "mallinfo2"), reason="of the GNU C library only"
+)
+def test_summing_changes_nothing_about_where_the_process_gets_its_memory():
+    # The library maps large arrays, and keeps to itself what is small or was once freed at that size.
+    code = """
+import ctypes, numpy as np
+from unconstrain.risks import Sums
+class Said(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_size_t) for name in ("a", "b", "c", "d", "mapped", "f", "g", "h", "i", "j")]
+library = ctypes.CDLL(None)
+library.mallinfo2.restype = Said
+Sums(1, 2, 3).add(np.ones((50, 3)), np.ones((50, 2)), np.ones((50, 1)))
+before = library.mallinfo2().mapped
+large = np.empty(20 * 2**20, dtype=np.uint8)
+assert library.mallinfo2().mapped - before >= len(large)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_who_adds_at_the_same_time_writes_to_other_memory():
+    workspace = module._Workspace()
+    with workspace.room((4, 3)) as first, workspace.room((2, 3), order="F") as second:
+        assert not np.shares_memory(first, second)
+        assert first.flags.c_contiguous
+        assert second.flags.f_contiguous
+    with workspace.room((2, 2)) as third:
+        assert np.shares_memory(third, first) or np.shares_memory(third, second)

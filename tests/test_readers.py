@@ -14,15 +14,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from recorded import DATA, needs_data
 from unconstrain.base.errors import ReadError, SettingError, UnconstrainError
 from unconstrain.recordings.demonstration import Recording
 from unconstrain.recordings.readers import read
 from unconstrain.recordings.readers.table import seconds, unique_names
 
-DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))
-needs_data = pytest.mark.skipif(
-    not DATA.is_dir(), reason=f"no real recordings in {DATA}; set UNCONSTRAIN_DATA to a folder that holds them"
-)
 one_folder = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 
 Write = Callable[..., Path]

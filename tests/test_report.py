@@ -3,36 +3,37 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import shutil
 import sys
 from dataclasses import dataclass, replace
 from html.parser import HTMLParser
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
 
 import unconstrain as uc
+from recorded import needs_rim
 from unconstrain.base.errors import MissingExtraError, SettingError
 from unconstrain.pages import fit, html
 from unconstrain.paper import pages as report
-from unconstrain.paper.experiments import figure4, figure5, table1, table2, toy, washing
+from unconstrain.paper.experiments import figure4, figure5, table1, table2, toy
 from unconstrain.paper.experiments.trials import Result
 from unconstrain.paper.pages import washing_arm
 from unconstrain.paper.systems.wiping import PLATES, Strokes, demonstrate
 
-DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))
 SMALL = {"demonstrations": 8, "steps": 10, "per_axis": 4, "folds": 4}
-RESULTS = {
+MADE_HERE = {
     "table1": lambda: table1.run(table1.Settings(**SMALL, trials=2)),
     "table2": lambda: table2.run(table2.Settings(trials=2, demonstrations=6, steps=20, test_demonstrations=2, folds=2)),
     "figure4": lambda: figure4.run(figure4.Settings(**SMALL, arrows=5)),
     "figure5": lambda: figure5.run(figure5.Settings(**SMALL, widest=(0.0, 0.5, 1.5), trials=2)),
-    "washing": lambda: washing.run(washing.Settings(duration=8.0, steps=40, trials=1, cycles=2)),
     "of another kind": lambda: Result("else", Odd(), [{"method": "direct", "seen": True, "ncpe": 0.1, "nupe": None}]),
 }
+
+
+RESULTS = [*MADE_HERE, "washing"]
 
 
 @dataclass(frozen=True)
@@ -79,17 +80,28 @@ FITS = {
 }
 
 
-@pytest.fixture(scope="module")
-def results():
+@pytest.fixture(scope="session")
+def results(once, washed):
     """Each result, computed when first asked for."""
-    found = {}
+    return lambda name: washed() if name == "washing" else once(f"result {name}", MADE_HERE[name])
 
-    def of(name):
-        if name not in found:
-            found[name] = RESULTS[name]()
-        return found[name]
 
-    return of
+@pytest.fixture(scope="session")
+def files(once, results):
+    """Name and text of each file that is written of a result."""
+
+    def written(name):
+        with TemporaryDirectory() as folder:
+            report.write(results(name), Path(folder) / "new" / "folder")
+            return {path.name: path.read_text("utf-8") for path in (Path(folder) / "new" / "folder").iterdir()}
+
+    return lambda name: once(f"files {name}", lambda: written(name))
+
+
+@pytest.fixture(scope="session")
+def pages(results, files):
+    """The page of each result."""
+    return lambda name: files(name)[f"{results(name).name}.html"]
 
 
 def fit_page(name, title="A policy"):
@@ -99,17 +111,17 @@ def fit_page(name, title="A policy"):
 
 class TestFiles:
     @pytest.mark.parametrize("name", RESULTS)
-    def test_json_and_html_are_written(self, results, name, tmp_path):
+    def test_json_and_html_are_written(self, results, files, name):
         result = results(name)
-        data, page = report.write(result, tmp_path / "new" / "folder")
-        assert (data.name, page.name) == (f"{result.name}.json", f"{result.name}.html")
-        assert {one.name for one in data.parent.iterdir()} == {data.name, page.name}
-        assert json.loads(data.read_text("utf-8")) == json.loads(json.dumps(result.to_json()))
-        assert page.stat().st_size < 8e6
+        data, page = f"{result.name}.json", f"{result.name}.html"
+        assert files(name).keys() == {data, page}
+        assert json.loads(files(name)[data]) == json.loads(json.dumps(result.to_json()))
+        assert len(files(name)[page].encode()) < 8e6
 
     def test_a_second_time_replaces_the_first(self, results, tmp_path):
         for _ in range(2):
             data, page = report.write(results("of another kind"), tmp_path)
+            assert (data.name, page.name) == ("else.json", "else.html")
         assert sorted(tmp_path.iterdir()) == sorted([data, page])
 
     def test_what_is_not_finite_becomes_null(self, results, tmp_path):
@@ -147,27 +159,27 @@ class TestRows:
 
     ERRORS = {f"{metric}_{what}" for metric in ("nupe", "ncpe", "ninc") for what in ("mean", "sd")}
 
-    def rows(self, results, name, tmp_path):
-        return json.loads(report.write(results(name), tmp_path)[0].read_text("utf-8"))["rows"]
+    def rows(self, files, name):
+        return json.loads(files(name)[f"{name}.json"])["rows"]
 
-    def test_table1_has_a_row_for_each_method_and_constraint(self, results, tmp_path):
-        rows = self.rows(results, "table1", tmp_path)
+    def test_table1_has_a_row_for_each_method_and_constraint(self, files):
+        rows = self.rows(files, "table1")
         assert len({(row["method"], row["constraint"]) for row in rows}) == len(rows) == 6
         for row in rows:
             assert row.keys() >= self.ERRORS | {f"paper_{name}" for name in self.ERRORS}
 
-    def test_table1_is_in_plain_units(self, results, tmp_path):
-        rows = self.rows(results, "table1", tmp_path)
+    def test_table1_is_in_plain_units(self, files):
+        rows = self.rows(files, "table1")
         [row] = [row for row in rows if (row["method"], row["constraint"]) == ("hybrid", "random")]
         assert row["paper_nupe_mean"] == pytest.approx(0.00373)
 
-    def test_figure5_has_a_row_for_each_method_and_angle(self, results, tmp_path):
-        rows = self.rows(results, "figure5", tmp_path)
+    def test_figure5_has_a_row_for_each_method_and_angle(self, files):
+        rows = self.rows(files, "figure5")
         assert {row["theta_max"] for row in rows} == {0.0, 0.5, 1.5}
         assert all(row.keys() >= self.ERRORS for row in rows)
 
-    def test_washing_says_which_surfaces_were_seen(self, results, tmp_path):
-        rows = self.rows(results, "washing", tmp_path)
+    def test_washing_says_which_surfaces_were_seen(self, files):
+        rows = self.rows(files, "washing")
         assert all(row.keys() >= {"method", "surface", "seen", "ncpe", "nupe"} for row in rows)
         assert sum(row["seen"] for row in rows) == 20
         assert sum(not row["seen"] for row in rows) == 8
@@ -188,8 +200,8 @@ class References(HTMLParser):
 
 class TestPages:
     @pytest.mark.parametrize("name", RESULTS)
-    def test_a_page_refers_to_nothing_outside_itself(self, results, name):
-        page = report.page(results(name))
+    def test_a_page_refers_to_nothing_outside_itself(self, pages, name):
+        page = pages(name)
         references = References()
         references.feed(page)
         assert references.found == []
@@ -197,8 +209,8 @@ class TestPages:
         assert "url(" not in style
         assert "@import" not in style
 
-    def test_plotly_is_embedded_once(self, results):
-        page = report.page(results("figure5"))
+    def test_plotly_is_embedded_once(self, pages):
+        page = pages("figure5")
         assert page.count("* plotly.js v") == 1
         assert page.count("Plotly.newPlot(") >= 5
 
@@ -228,13 +240,13 @@ class TestPages:
         assert "as lines" in page
         assert "<code>apt-get install libosmesa6</code>" in page
 
-    def test_settings_are_explained_by_their_docstring(self, results):
-        page = report.page(results("of another kind"))
+    def test_settings_are_explained_by_their_docstring(self, pages):
+        page = pages("of another kind")
         assert "Something with a Hybrid and &lt;angles&gt;, over two lines." in page
         assert '<td class="left">yes, a</td>' in page
 
-    def test_ours_is_beside_the_papers(self, results):
-        page = report.page(results("table1"))
+    def test_ours_is_beside_the_papers(self, pages):
+        page = pages("table1")
         assert "58.3 ± 9.6" in page  # direct, random constraint, nUPE × 10⁻²
         assert "0.373 ± 1.1" in page
 
@@ -250,7 +262,8 @@ class TestPages:
         run = split.rollouts["direct"]
         away = replace(run, states=run.states + np.linspace(0, 10, len(run))[:, None])
         changed = replace(split, rollouts=split.rollouts | {"direct": away})
-        page = report.page(replace(result, details=result.details | {"splits": [changed]}))
+        details = {"splits": [changed], "reproductions": []}  # pictures of the arm take long
+        page = report.page(replace(result, details=details))
         assert re.search(r"These left the picture: [^.]*direct after [\d.]+ s on \+16° about y", page)
 
 
@@ -280,43 +293,6 @@ class TestNumbers:
     def test_mean_and_deviation_are_scaled_together(self):
         assert html.mean_sd(0.00131, 0.00028) == "0.131 ± 0.028"
         assert html.mean_sd(None, None) == "–"
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    """Chromium without a window."""
-    if os.environ.get("UNCONSTRAIN_NO_BROWSER") == "1":
-        pytest.skip("UNCONSTRAIN_NO_BROWSER is set")
-    chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
-    if chromium is None or driver is None:
-        pytest.fail(
-            "These tests open reports in Chromium, and it or its driver is missing. Install them with "
-            "'apt-get install chromium chromium-driver' (or scripts/install-system browser), or set "
-            "UNCONSTRAIN_NO_BROWSER=1 to leave these tests out."
-        )
-    from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = chromium
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    for argument in (
-        "headless",
-        "no-sandbox",
-        "disable-gpu",
-        "disable-dev-shm-usage",
-        "enable-unsafe-swiftshader",  # WebGL without a graphics card
-        "no-first-run",
-        "disable-background-networking",
-        "disable-component-update",
-        "disable-sync",
-        "window-size=1200,1000",
-        f"user-data-dir={tmp_path_factory.mktemp('chromium')}",
-    ):
-        options.add_argument(f"--{argument}")
-    started = webdriver.Chrome(options=options, service=Service(driver))
-    yield started
-    started.quit()
 
 
 GRAPHS = """
@@ -353,21 +329,19 @@ class TestInABrowser:
         ("name", "count"),
         [("table1", 2), ("table2", 4), ("figure4", 2), ("figure5", 5), ("washing", 14), ("of another kind", 0)],
     )
-    def test_a_page_draws_all_its_pictures(self, results, browser, tmp_path, name, count):
-        assert len(opened(browser, report.page(results(name)), tmp_path)) == count
+    def test_a_page_draws_all_its_pictures(self, pages, browser, tmp_path, name, count):
+        assert len(opened(browser, pages(name), tmp_path)) == count
 
-    @pytest.mark.skipif(not DATA.is_dir(), reason=f"no real recordings in {DATA}; set UNCONSTRAIN_DATA")
-    def test_the_page_of_real_recordings_draws_all_its_pictures(self, browser, tmp_path, monkeypatch):
-        monkeypatch.setenv("UNCONSTRAIN_DATA", str(DATA))
-        result = washing.run(washing.Settings(real=True, steps=40))
-        assert len(opened(browser, report.page(result), tmp_path)) == 2 + 2 + 1 + 4 * 4
+    @needs_rim
+    def test_the_page_of_real_recordings_draws_all_its_pictures(self, washed_rim, browser, tmp_path):
+        assert len(opened(browser, report.page(washed_rim), tmp_path)) == 2 + 2 + 1 + 4 * 4
 
     @pytest.mark.parametrize("name", FITS)
     def test_the_page_of_a_fit_draws_all_its_pictures(self, browser, tmp_path, name):
         assert len(opened(browser, fit_page(name), tmp_path)) >= 2
 
-    def test_a_key_hides_its_traces_in_all_panels(self, results, browser, tmp_path):
-        opened(browser, report.page(results("figure4")), tmp_path)
+    def test_a_key_hides_its_traces_in_all_panels(self, pages, browser, tmp_path):
+        opened(browser, pages("figure4"), tmp_path)
         hidden = (
             "return [...document.querySelectorAll('.js-plotly-plot')].map(g => g.data.filter(t => "
             "t.legendgroup === 'direct' && t.visible === false).length)"
@@ -378,11 +352,11 @@ class TestInABrowser:
         assert browser.execute_script(hidden) == [0, 0]
 
     @pytest.mark.parametrize("name", ["table1", "figure5", "washing"])
-    def test_a_page_fits_on_a_phone(self, results, browser, tmp_path, name):
+    def test_a_page_fits_on_a_phone(self, pages, browser, tmp_path, name):
         metrics = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         try:
-            graphs = opened(browser, report.page(results(name)), tmp_path)
+            graphs = opened(browser, pages(name), tmp_path)
             assert browser.execute_script("return document.documentElement.scrollWidth") <= 400
             assert all(graph["wide"] <= 400 for graph in graphs)
         finally:

@@ -133,7 +133,6 @@ def test_the_arm_keeps_contact_and_follows_the_plan(wiped):
     normal = wiped.plate.rotation[:, 2]
     assert found["frequency"] == pytest.approx(simulation.turning(planned, normal), rel=0.02)
     assert np.abs(wiped.positions @ normal).max() < 0.003
-    assert wiped.speed > 0
     assert ((wiped.postures > LWR3.lower) & (wiped.postures < LWR3.upper)).all()
 
 
@@ -231,3 +230,37 @@ def test_contained_changes_nothing_near_the_data_and_comes_back_from_afar():
         Contained(outwards, states, reach=0.0)
     with pytest.raises(SettingError):
         Contained(outwards, states, reach=0.1, gain=-1.0)
+
+
+def test_contained_comes_back_wherever_no_demonstrated_state_is_within_reach():
+    along = np.linspace(-1, 1, 41)
+    strands = np.concatenate([np.column_stack([along, np.full(41, side)]) for side in (-0.25, 0.25)])
+
+    def still(at):
+        return np.zeros_like(at)
+
+    kept = Contained(still, strands, reach=0.1, speed=1.0)
+    grid = np.stack(np.meshgrid(np.linspace(-1.5, 1.5, 31), np.linspace(-1, 1, 41)), axis=-1).reshape(-1, 2)
+    distance = np.linalg.norm(grid[:, None] - strands, axis=2).min(axis=1)
+    moving = np.linalg.norm(kept(grid), axis=1) > 0
+    assert_array_equal(moving, distance / 0.1 > 1.0)
+    midway = kept(np.array([[0.0, 0.0], [0.3, 0.0]]))
+    assert (np.abs(midway[:, 1]) > 0.1).all()
+
+
+def test_the_way_back_is_no_faster_than_the_policy_or_than_told():
+    states = np.column_stack([np.cos(np.linspace(0, 6, 200)), np.sin(np.linspace(0, 6, 200))])
+
+    def turning(at):
+        return 0.3 * np.column_stack([-at[:, 1], at[:, 0]]) / np.linalg.norm(at, axis=1, keepdims=True)
+
+    def leaving(at):
+        return 0.2 * at
+
+    far = np.array([[50.0, 3.0], [0.0, -1e6]])
+    away = far / np.linalg.norm(far, axis=1, keepdims=True)
+    for policy, speed, limit in ((turning, None, 0.3), (turning, 0.7, 0.7), (leaving, None, 0.2)):
+        found = Contained(policy, states, reach=0.1, speed=speed)(far)
+        assert_allclose((found * away).sum(axis=1), -limit, rtol=0.05)
+    with pytest.raises(SettingError, match="speed: got 0, expected a number above 0"):
+        Contained(turning, states, reach=0.1, speed=0)

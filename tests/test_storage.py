@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -145,8 +146,7 @@ def test_a_policy_that_has_learnt_nothing_can_be_stored(tmp_path):
 
 
 def test_names_of_columns_come_back(data, tmp_path):
-    pandas = pytest.importorskip("pandas")
-    table = pandas.DataFrame(data.states, columns=["x", "y"])
+    table = pd.DataFrame(data.states, columns=["x", "y"])
     policy = uc.ParametricPolicy(uc.Affine()).fit(table, data.actions)
     loaded = saved(policy, tmp_path)
     assert list(loaded.feature_names_in_) == ["x", "y"]

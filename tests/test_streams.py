@@ -4,7 +4,9 @@ import pickle
 import sys
 import tracemalloc
 
+import h5py
 import numpy as np
+import pyarrow.parquet
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,10 +16,10 @@ import unconstrain as uc
 from conftest import POLICIES
 from samples import draw
 from unconstrain.base.errors import InvalidDataError, MissingExtraError, ReadError, SettingError
-from unconstrain.recordings import Batch, batches, streams
+from unconstrain.recordings import streams
 from unconstrain.recordings.preparation import Recipe
 from unconstrain.recordings.readers import hdf5, parquet, read_blocks
-from unconstrain.training import FirstLook, first_look
+from unconstrain.training import Batch, FirstLook, batches, first_look
 
 DATA = draw(samples=400, groups=7)
 
@@ -196,13 +198,12 @@ def table():
 
 
 def write_parquet(path, table, **options):
-    arrow = pytest.importorskip("pyarrow")
-    pytest.importorskip("pyarrow.parquet").write_table(arrow.table(table), path, **options)
+    pyarrow.parquet.write_table(pyarrow.table(table), path, **options)
     return path
 
 
 def write_hdf5(path, table):
-    with pytest.importorskip("h5py").File(path, "w") as file:
+    with h5py.File(path, "w") as file:
         for name, values in table.items():
             file[name] = values.astype("S") if values.dtype.kind == "U" else values
     return path
@@ -339,7 +340,7 @@ def test_what_parquet_cannot_say_is_refused(tmp_path, columns, sentence):
 
 
 def test_groups_of_hdf5_are_recordings(tmp_path):
-    with pytest.importorskip("h5py").File(tmp_path / "a.h5", "w") as file:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
         for number in (0, 1):
             group = file.create_group(f"data/demo_{number}")
             group["states"], group["actions"] = DATA.states[DATA.groups == number], DATA.actions[DATA.groups == number]
@@ -377,7 +378,6 @@ def test_what_hdf5_cannot_say_is_refused(tmp_path, sets, sentence):
 
 @pytest.mark.parametrize(("suffix", "module"), [("parquet", "pyarrow"), ("h5", "h5py")])
 def test_damaged_files_and_missing_extras_are_said(tmp_path, monkeypatch, suffix, module):
-    pytest.importorskip(module)
     path = tmp_path / f"a.{suffix}"
     path.write_bytes(b"PAR1 or not" * 20)
     with pytest.raises(ReadError, match=rf"a\.{suffix}: cannot be read"):
@@ -392,3 +392,21 @@ def test_damaged_files_and_missing_extras_are_said(tmp_path, monkeypatch, suffix
 def test_a_stream_of_nothing_is_refused():
     with pytest.raises(SettingError, match="got no file to read"):
         uc.Stream([])
+
+
+def test_what_a_walk_looks_at_grows_with_the_demonstrations_and_not_with_their_square(tmp_path, monkeypatch):
+    looked = []
+
+    class Counted(uc.Demonstration):
+        def __len__(self):
+            looked.append(1)
+            return super().__len__()
+
+    path = tmp_path / "one.csv"
+    path.write_text("x,y,vx,vy\n1,2,3,4\n")
+    many = [(f"0/{i}", Counted(np.ones((3, 2)), np.ones((3, 2)))) for i in range(300)]
+    looked.clear()
+    stream = uc.Stream(path)
+    monkeypatch.setattr(stream, "named_demonstrations", lambda: iter(many))
+    assert sum(len(batch.states) for batch in stream) == 900
+    assert len(looked) <= 4 * len(many)

@@ -69,6 +69,52 @@ def test_several_at_once_leave_blas_as_it_was():
     assert blas_threads() == before
 
 
+def test_whoever_ends_first_leaves_the_limit_to_the_other_and_the_last_one_takes_it_back():
+    with threadpool_limits(2):
+        first, second = workers(), workers()
+        first.__enter__()
+        second.__enter__()
+        first.__exit__(None, None, None)
+        assert blas_threads() == {1}
+        second.__exit__(None, None, None)
+        assert blas_threads() == {2}
+
+
+def test_two_at_once_share_the_threads():
+    together = threading.Barrier(2, timeout=30)
+
+    def program(_):
+        with workers() as threads:
+            together.wait()
+            return threads.run([threading.get_ident] * 20, WORTH_A_THREAD)
+
+    with threadpool_limits(2), ThreadPoolExecutor(2) as others:
+        found = list(others.map(program, range(2)))
+    assert len({ident for idents in found for ident in idents}) <= 2
+
+
+def test_work_within_work_does_not_wait_for_its_own_thread():
+    def within():
+        return side_by_side([lambda: 1, lambda: 2], WORTH_A_THREAD)
+
+    with threadpool_limits(2):
+        assert side_by_side([within] * 4, WORTH_A_THREAD) == [[1, 2]] * 4
+
+
+def test_a_generator_of_batches_may_use_blas_as_it_likes():
+    seen = []
+
+    def batches():
+        for seed in range(3):
+            data = samples.draw(seed)
+            seen.append(blas_threads())
+            yield data.states, data.actions
+
+    with threadpool_limits(2):
+        uc.ParametricPolicy(uc.Affine()).fit_batches(batches())
+    assert seen == [{2}] * 3
+
+
 def test_threads_know_what_numpy_was_told_about_errors():
     def divide():
         return float(np.float64(1.0) / np.float64(0.0))

@@ -9,9 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from samples import draw
 from unconstrain import Folds, HeldOut, Hybrid, ParametricPolicy
 from unconstrain.base.errors import SettingError
-from unconstrain.recordings import Batch
-from unconstrain.risks.moments import gather
-from unconstrain.training import FirstLook, FoldedMoments, Split
+from unconstrain.risks import FoldedMoments, gather
+from unconstrain.training import Batch, FirstLook, Split
 
 
 def splitter(validation, states, groups=None, weights=None):

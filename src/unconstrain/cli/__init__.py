@@ -91,8 +91,9 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     for found in surveys:
         if found.non_increasing:
             click.echo(f"'{found.name}': time does not increase at row {found.non_increasing[0]}.")
+    if first is None:
+        raise ReadError(f"{', '.join(files)}: holds no recording.")
     try:
-        assert first is not None
         click.echo(f"fit uses {said_recipe(complete(recipe, first))}.")
     except UnconstrainError as error:
         click.echo(f"fit needs to know more: {error}")
@@ -230,7 +231,6 @@ def rollout(
         support = learnt.support(path.states)
     except SettingError:  # an affine policy has no support
         support = None
-    assert path.times is not None
     table = _csv(["t", *states, *(f"v{name}" for name in states)], path)
     if output == "-":
         click.echo(table, nl=False)
@@ -238,7 +238,7 @@ def rollout(
         write(output, table)
     if support is not None and support.min() < 1e-3:
         click.echo(
-            f"Note: from {path.times[int((support < 1e-3).argmax())]:.2f} s on the movement is far from all data.",
+            f"Note: from {dt * int((support < 1e-3).argmax()):.2f} s on the movement is far from all data.",
             err=True,
         )
 
@@ -380,10 +380,9 @@ def _plane(normal: tuple[float, ...] | None, dimensions: int, meaning: str) -> P
 def _csv(header: Sequence[str], path: Demonstration) -> str:
     import numpy as np
 
-    assert path.times is not None
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(header)
-    rows = np.column_stack([path.times, path.states, path.actions])
+    rows = np.column_stack([*([] if path.times is None else [path.times]), path.states, path.actions])
     writer.writerows([f"{value:.9g}" for value in row] for row in rows)
     return text.getvalue()

@@ -2,6 +2,8 @@
 
 A constraint is any callable that maps states (T, n) and times (T,) to
 matrices (T, k, d). Rows may be zero, and so where there are fewer constraints.
+Times are in seconds; one that does not read them holds at demonstrations
+without times too.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Array, as_matrix, as_vector, check_at_least
-from ..base.errors import SettingError
+from ..base.errors import InvalidDataError, SettingError
 from ..risks import unit_actions
 
 Constraint = Callable[[Array, Array], Array]
@@ -68,9 +70,9 @@ class SwitchingLine:
             raise SettingError(f"switches: got {self.switches.tolist()}, expected ascending times.")
 
     def __call__(self, states: Array, times: Array) -> Array:
-        """Return A, shape (T, 1, d)."""
+        """Return A, shape (T, 1, d); InvalidDataError if a time is NaN."""
         # A switch is due when the clock reads it to rounding: times are sums of steps.
-        stretch = np.searchsorted(self.switches, np.asarray(times) + 1e-9, side="right")
+        stretch = np.searchsorted(self.switches, _clock(times) + 1e-9, side="right")
         return self.directions[stretch][:, None, :]
 
     @classmethod
@@ -103,9 +105,9 @@ class PolicyAligned:
         check_at_least("dt", self.dt, 0.0, strict=True)
 
     def __call__(self, states: Array, times: Array) -> Array:
-        """Return A, shape (T, 2, 2)."""
-        steps = np.rint(np.asarray(times) / self.dt).astype(np.intp)
-        theta = self.angles[np.clip(steps, 0, len(self.angles) - 1)]
+        """Return A, shape (T, 2, 2); InvalidDataError if a time is NaN."""
+        steps = np.clip(np.rint(_clock(times) / self.dt), 0, len(self.angles) - 1)
+        theta = self.angles[steps.astype(np.intp)]
         cosine, sine = np.cos(theta), np.sin(theta)
         turn = np.stack([np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)], axis=-2)
         direction, _ = unit_actions(np.einsum("tij,tj->ti", turn, self.policy(states)))
@@ -140,3 +142,11 @@ class JacobianRows:
         if any(not 0 <= row < jacobian.shape[1] for row in self.rows):
             raise SettingError(f"rows: got {self.rows}, expected rows of the Jacobian, 0 to {jacobian.shape[1] - 1}.")
         return jacobian[:, list(self.rows), :]
+
+
+def _clock(times: Array) -> Array:
+    clock = np.asarray(times, dtype=np.float64)
+    if np.isnan(clock).any():
+        row = int(np.isnan(clock).argmax())
+        raise InvalidDataError(f"times: found nan at row {row}, and the constraint depends on them: expected seconds.")
+    return clock

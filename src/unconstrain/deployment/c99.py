@@ -57,6 +57,7 @@ def c_source(form: ClosedForm, name: str, states: Array, actions: Array) -> str:
     n, d, models = form.sizes
     fill = {
         "name": name,
+        "NAME": name.upper(),
         "macro": f"{name.upper()}_SELF_TEST",
         "version": _version(),
         "what": f"{n} states to {d} actions, {models} model{'s' * (models > 1)}",
@@ -72,7 +73,7 @@ def c_source(form: ClosedForm, name: str, states: Array, actions: Array) -> str:
         "tolerance": float(TOLERANCE * np.abs(actions).max()).hex(),
     }
     body = _AFFINE if form.exponents is None else _BLENDED_MAPS if form.is_affine else _BLENDED_CONSTANTS
-    return re.sub(r"@(\w+)@", lambda found: fill[found[1]], _HEAD + body + _SELF_TEST)
+    return re.sub(r"@([a-z_]+|NAME)@", lambda found: fill[found[1]], _HEAD + body + _SELF_TEST)
 
 
 def _probes(form: ClosedForm) -> Array:
@@ -110,29 +111,32 @@ _HEAD = """\
  */
 #include <math.h>
 
-enum { STATES = @n@, ACTIONS = @d@, MODELS = @models@ };
+enum { @NAME@_STATES = @n@, @NAME@_ACTIONS = @d@, @NAME@_MODELS = @models@ };
 
+#ifdef __cplusplus
+extern "C"
+#endif
 void @name@_step(const double state[@n@], double action[@d@]);
 
-static const double ORIGIN[STATES] = @origin@;
+static const double @NAME@_ORIGIN[@NAME@_STATES] = @origin@;
 
 """
 
 _AFFINE = """\
 /* The map, its constant in the last column. */
-static const double MAP[MODELS][ACTIONS][STATES + 1] = @maps@;
+static const double @NAME@_MAP[@NAME@_MODELS][@NAME@_ACTIONS][@NAME@_STATES + 1] = @maps@;
 
 void @name@_step(const double state[@n@], double action[@d@])
 {
-    double z[STATES];
+    double z[@NAME@_STATES];
     int i, k;
 
-    for (i = 0; i < STATES; i++)
-        z[i] = state[i] - ORIGIN[i];
-    for (k = 0; k < ACTIONS; k++) {
-        double sum = MAP[0][k][STATES];
-        for (i = 0; i < STATES; i++)
-            sum += MAP[0][k][i] * z[i];
+    for (i = 0; i < @NAME@_STATES; i++)
+        z[i] = state[i] - @NAME@_ORIGIN[i];
+    for (k = 0; k < @NAME@_ACTIONS; k++) {
+        double sum = @NAME@_MAP[0][k][@NAME@_STATES];
+        for (i = 0; i < @NAME@_STATES; i++)
+            sum += @NAME@_MAP[0][k][i] * z[i];
         action[k] = sum;
     }
 }
@@ -140,25 +144,25 @@ void @name@_step(const double state[@n@], double action[@d@])
 
 _SHARES = """\
 /* Exponents of the kernels are affine in the state; the constant is in the last column. */
-static const double SLOPES[MODELS][STATES + 1] = @slopes@;
+static const double @NAME@_SLOPES[@NAME@_MODELS][@NAME@_STATES + 1] = @slopes@;
 
 /* Shares of the models, not yet divided by their sum, which is returned. Relative to the largest: none overflows. */
-static double shares(const double z[STATES], double share[MODELS])
+static double @name@_shares(const double z[@NAME@_STATES], double share[@NAME@_MODELS])
 {
     double largest, sum = 0.0;
     int i, m;
 
-    for (m = 0; m < MODELS; m++) {
-        double exponent = SLOPES[m][STATES];
-        for (i = 0; i < STATES; i++)
-            exponent += SLOPES[m][i] * z[i];
+    for (m = 0; m < @NAME@_MODELS; m++) {
+        double exponent = @NAME@_SLOPES[m][@NAME@_STATES];
+        for (i = 0; i < @NAME@_STATES; i++)
+            exponent += @NAME@_SLOPES[m][i] * z[i];
         share[m] = exponent;
     }
     largest = share[0];
-    for (m = 1; m < MODELS; m++)
+    for (m = 1; m < @NAME@_MODELS; m++)
         if (share[m] > largest)
             largest = share[m];
-    for (m = 0; m < MODELS; m++) {
+    for (m = 0; m < @NAME@_MODELS; m++) {
         share[m] = exp(share[m] - largest);
         sum += share[m];
     }
@@ -171,22 +175,22 @@ _BLENDED_CONSTANTS = (
     _SHARES
     + """\
 /* What each model says. */
-static const double CONSTANTS[MODELS][ACTIONS] = @maps@;
+static const double @NAME@_CONSTANTS[@NAME@_MODELS][@NAME@_ACTIONS] = @maps@;
 
 void @name@_step(const double state[@n@], double action[@d@])
 {
-    double z[STATES], share[MODELS], sum;
+    double z[@NAME@_STATES], share[@NAME@_MODELS], sum;
     int i, k, m;
 
-    for (i = 0; i < STATES; i++)
-        z[i] = state[i] - ORIGIN[i];
-    sum = shares(z, share);
-    for (k = 0; k < ACTIONS; k++)
+    for (i = 0; i < @NAME@_STATES; i++)
+        z[i] = state[i] - @NAME@_ORIGIN[i];
+    sum = @name@_shares(z, share);
+    for (k = 0; k < @NAME@_ACTIONS; k++)
         action[k] = 0.0;
-    for (m = 0; m < MODELS; m++)
-        for (k = 0; k < ACTIONS; k++)
-            action[k] += share[m] * CONSTANTS[m][k];
-    for (k = 0; k < ACTIONS; k++)
+    for (m = 0; m < @NAME@_MODELS; m++)
+        for (k = 0; k < @NAME@_ACTIONS; k++)
+            action[k] += share[m] * @NAME@_CONSTANTS[m][k];
+    for (k = 0; k < @NAME@_ACTIONS; k++)
         action[k] /= sum;
 }
 """
@@ -196,26 +200,26 @@ _BLENDED_MAPS = (
     _SHARES
     + """\
 /* The map of each model, its constant in the last column. */
-static const double MAPS[MODELS][ACTIONS][STATES + 1] = @maps@;
+static const double @NAME@_MAPS[@NAME@_MODELS][@NAME@_ACTIONS][@NAME@_STATES + 1] = @maps@;
 
 void @name@_step(const double state[@n@], double action[@d@])
 {
-    double z[STATES], share[MODELS], blend[ACTIONS][STATES + 1], sum;
+    double z[@NAME@_STATES], share[@NAME@_MODELS], blend[@NAME@_ACTIONS][@NAME@_STATES + 1], sum;
     int i, k, m;
 
-    for (i = 0; i < STATES; i++)
-        z[i] = state[i] - ORIGIN[i];
-    sum = shares(z, share);
-    for (k = 0; k < ACTIONS; k++)
-        for (i = 0; i <= STATES; i++)
-            blend[k][i] = share[0] * MAPS[0][k][i];
-    for (m = 1; m < MODELS; m++)
-        for (k = 0; k < ACTIONS; k++)
-            for (i = 0; i <= STATES; i++)
-                blend[k][i] += share[m] * MAPS[m][k][i];
-    for (k = 0; k < ACTIONS; k++) {
-        double whole = blend[k][STATES];
-        for (i = 0; i < STATES; i++)
+    for (i = 0; i < @NAME@_STATES; i++)
+        z[i] = state[i] - @NAME@_ORIGIN[i];
+    sum = @name@_shares(z, share);
+    for (k = 0; k < @NAME@_ACTIONS; k++)
+        for (i = 0; i <= @NAME@_STATES; i++)
+            blend[k][i] = share[0] * @NAME@_MAPS[0][k][i];
+    for (m = 1; m < @NAME@_MODELS; m++)
+        for (k = 0; k < @NAME@_ACTIONS; k++)
+            for (i = 0; i <= @NAME@_STATES; i++)
+                blend[k][i] += share[m] * @NAME@_MAPS[m][k][i];
+    for (k = 0; k < @NAME@_ACTIONS; k++) {
+        double whole = blend[k][@NAME@_STATES];
+        for (i = 0; i < @NAME@_STATES; i++)
             whole += blend[k][i] * z[i];
         action[k] = whole / sum;
     }
@@ -228,21 +232,21 @@ _SELF_TEST = """\
 #ifdef @macro@
 #include <stdio.h>
 
-enum { TESTS = @tests@ };
+enum { @NAME@_TESTS = @tests@ };
 
-static const double TEST_STATES[TESTS][STATES] = @test_states@;
-static const double TEST_ACTIONS[TESTS][ACTIONS] = @test_actions@;
+static const double @NAME@_TEST_STATES[@NAME@_TESTS][@NAME@_STATES] = @test_states@;
+static const double @NAME@_TEST_ACTIONS[@NAME@_TESTS][@NAME@_ACTIONS] = @test_actions@;
 
 int main(void)
 {
     const double tolerance = @tolerance@;
-    double action[ACTIONS], worst = 0.0;
+    double action[@NAME@_ACTIONS], worst = 0.0;
     int k, t;
 
-    for (t = 0; t < TESTS; t++) {
-        @name@_step(TEST_STATES[t], action);
-        for (k = 0; k < ACTIONS; k++) {
-            const double error = fabs(action[k] - TEST_ACTIONS[t][k]);
+    for (t = 0; t < @NAME@_TESTS; t++) {
+        @name@_step(@NAME@_TEST_STATES[t], action);
+        for (k = 0; k < @NAME@_ACTIONS; k++) {
+            const double error = fabs(action[k] - @NAME@_TEST_ACTIONS[t][k]);
             if (!(error <= worst)) /* NaN, too, is worse */
                 worst = error;
         }

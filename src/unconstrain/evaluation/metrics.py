@@ -18,6 +18,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InvalidDataError, SettingError
+from ..constraints import constraint_matrices
 from ..recordings import Demonstration, stack
 from ..risks import action_projection, null_space_projection, project
 
@@ -61,7 +62,8 @@ def cpe(policy: PolicyLike, demonstrations: Demonstrations, constraint: Constrai
     Raises
     ------
     InvalidDataError
-        If neither a truth nor a constraint tells the projection.
+        If neither a truth nor a constraint tells the projection, or the constraint reads times that a demonstration
+        does not have.
     """
     demos = _listed(demonstrations)
     predicted = _predicted(policy, demos)
@@ -131,8 +133,9 @@ def _true_policy(demos: list[Demonstration]) -> Array:
 
 def _projections(demo: Demonstration, constraint: ConstraintLike | None) -> Array:
     if constraint is not None:
-        times = demo.times if demo.times is not None else np.zeros(len(demo))
-        return null_space_projection(constraint(demo.states, times))
+        return null_space_projection(
+            constraint_matrices(constraint, demo.states, demo.times, demo.actions.shape[1], demo.name)
+        )
     if demo.truth is None:
         raise InvalidDataError(
             f"'{demo.name}' has no truth that tells how it was constrained: expected a constraint A(x, t)."

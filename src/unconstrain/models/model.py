@@ -6,11 +6,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..base.arrays import Array, as_matrix
+from ..base.arrays import BLOCK_ROWS, Array, as_matrix, is_foreign, namespace, slices
 from ..base.errors import SettingError
 from .features import FeatureMap
 from .formula import ClosedForm
 from .receptive_fields import Everywhere, ReceptiveFields
+
+_ROWS = 4096
+"""Rows that are predicted together, so that what is made of them stays in cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +61,8 @@ class Model:
 
     def predict(self, weights: Array, states: Array) -> Array:
         """Predict with weights (M, d, p) at states (N, n), shape (N, d)."""
-        return self.fields.blend(self.design(states), weights, states)
+        blocks = [states[rows, :] for rows in slices(states, BLOCK_ROWS if is_foreign(states) else _ROWS)]
+        return namespace(states).concat([self.fields.blend(self.design(block), weights, block) for block in blocks])
 
     def support(self, states: Array) -> Array:
         """Support of each state by the data, from 1 to 0 far away, shape (N,).

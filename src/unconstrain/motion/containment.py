@@ -8,16 +8,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.arrays import Array, as_matrix, check_at_least
-from ..models import cover
 
 
 class Contained:
     """A policy that is kept near the demonstrations: a robot must not follow it where nobody has been.
 
-    Nothing is changed within ``reach`` of a demonstrated state. Beyond, the
-    way back is added. On a steady cycle that is needed: there a deviation and
-    its rate of change are uncorrelated, so that recordings cannot tell
-    whether the cycle attracts.
+    Nothing is changed within ``reach`` of a demonstrated state. Beyond, what
+    leads away from the nearest one is taken out, and the way back is added. On a steady cycle that is needed:
+    there a deviation and its rate of change are uncorrelated, so that
+    recordings cannot tell whether the cycle attracts.
+
+    Where several are equally near, the way back goes to one of them, and to
+    none between: midway between two strands there is no state to rest at.
 
     Parameters
     ----------
@@ -29,18 +31,37 @@ class Contained:
         In units of the state.
     gain : float
         How fast the way back is taken, 1/s.
+    speed : float, optional
+        The way back is no faster than this, in units of the state per second;
+        by default than the policy is anywhere at the demonstrated states.
     """
 
-    def __init__(self, policy: Callable[[Array], Array], states: ArrayLike, reach: float, gain: float = 3.0) -> None:
+    def __init__(
+        self,
+        policy: Callable[[Array], Array],
+        states: ArrayLike,
+        reach: float,
+        gain: float = 3.0,
+        speed: float | None = None,
+    ) -> None:
+        from scipy.spatial import KDTree
+
         check_at_least("reach", reach, 0.0, strict=True)
         check_at_least("gain", gain, 0.0)
+        if speed is not None:
+            check_at_least("speed", speed, 0.0, strict=True)
+        shown = as_matrix(states, "states")
         self._policy, self._reach, self._gain = policy, reach, gain
-        # Fields that cover the states to half the reach, and blend over it.
-        self._fields = cover(as_matrix(states, "states"), variance=(reach / 2.0) ** 2, at_least=float(np.exp(-0.5)))
+        self._speed = float(np.linalg.norm(policy(shown), axis=1).max()) if speed is None else float(speed)
+        self._shown = KDTree(shown)
 
     def __call__(self, states: Array) -> Array:
         """Velocities (N, n)."""
-        away = states - self._fields.shares(states) @ self._fields.centres
-        distance = np.linalg.norm(away, axis=1, keepdims=True)
+        distance, nearest = self._shown.query(states)
         beyond = np.clip(distance / self._reach - 1.0, 0.0, 1.0)
-        return self._policy(states) - self._gain * beyond * away
+        # Up to the reach, where none of this counts, the direction is allowed to vanish with the distance.
+        away = (states - self._shown.data[nearest]) / np.maximum(distance, self._reach)[:, None]
+        wanted = self._policy(states)
+        outwards = np.maximum((wanted * away).sum(axis=1), 0.0)
+        back = np.minimum(self._gain * distance, self._speed)
+        return wanted - (beyond * (outwards + back))[:, None] * away

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..base.arrays import LARGEST, Array, as_table, check_at_least
 from ..base.errors import InvalidDataError, SettingError
+from ..constraints import constraint_matrices
 from ..recordings import Demonstration, Truth
 from ..risks import null_space_projection, project
 
@@ -83,16 +84,15 @@ def rollout(
     table, single = as_table(start, "start")
     state = table.reshape(1, -1) if single else table
     runs, n = state.shape
-    apart = None if constraint is None or callable(constraint) else list(constraint)
-    if apart is not None and len(apart) != runs:
-        raise SettingError(f"constraint: got {len(apart)} constraints for {runs} starts, expected one for each.")
+    if constraint is not None and not callable(constraint) and len(constraint) != runs:
+        raise SettingError(f"constraint: got {len(constraint)} constraints for {runs} starts, expected one for each.")
     shape = (runs, steps, n)
     states, actions, wanted, projections = (np.empty(s) for s in (shape, shape, shape, (*shape, n)))
     times = dt * np.arange(steps, dtype=np.float64)
     for step in range(steps):
         states[:, step] = state
         wanted[:, step] = _action(policy, state)
-        projections[:, step] = _projections(constraint, apart, state, times[step])
+        projections[:, step] = _projections(constraint, state, times[step])
         actions[:, step] = _without_rounding(project(projections[:, step], wanted[:, step]), wanted[:, step])
         with np.errstate(over="ignore", invalid="ignore"):
             state = state + dt * actions[:, step]
@@ -109,15 +109,15 @@ def rollout(
     return demos[0] if single else demos
 
 
-def _projections(constraint: object, apart: Sequence[ConstraintLike] | None, states: Array, time: float) -> Array:
+def _projections(constraint: ConstraintLike | Sequence[ConstraintLike] | None, states: Array, time: float) -> Array:
     """What the constraint, or that of each run, leaves free, shape (K, n, n)."""
     runs, n = states.shape
     if constraint is None:
         return np.broadcast_to(np.eye(n), (runs, n, n))
     now = np.full(runs, time)
-    if apart is None:
-        return null_space_projection(_matrix(constraint, states, now))
-    rows = [_matrix(one, states[k : k + 1], now[k : k + 1]) for k, one in enumerate(apart)]
+    if callable(constraint):
+        return null_space_projection(constraint_matrices(constraint, states, now, n))
+    rows = [constraint_matrices(one, states[k : k + 1], now[k : k + 1], n) for k, one in enumerate(constraint)]
     return null_space_projection(np.concatenate(rows))
 
 
@@ -135,13 +135,3 @@ def _action(policy: Callable[[Array], Array], state: Array) -> Array:
             "actions that are velocities of the state."
         )
     return action
-
-
-def _matrix(constraint: object, state: Array, time: Array) -> Array:
-    matrix = np.asarray(constraint(state, time))  # type: ignore[operator]
-    if matrix.ndim != 3 or matrix.shape[0] != len(state) or matrix.shape[2] != state.shape[1]:
-        raise SettingError(
-            f"constraint: got A of shape {matrix.shape} for {len(state)} states, "
-            f"expected ({len(state)}, k, {state.shape[1]})."
-        )
-    return matrix

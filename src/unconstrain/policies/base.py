@@ -2,47 +2,38 @@
 
 from __future__ import annotations
 
-import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy, deepcopy
-from dataclasses import dataclass
 from functools import partial
 from itertools import chain
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.utils.validation import check_is_fitted, validate_data
+from sklearn.utils.validation import check_is_fitted
 
 from ..base.arrays import (
-    BLOCK_ROWS,
     Array,
     Groups,
-    as_matrix,
     beside,
     check_at_least,
-    is_foreign,
     namespace,
     on_host,
-    slices,
 )
 from ..base.errors import InvalidDataError, SettingError
-from ..deployment import Step, export_c, export_onnx, stepper
-from ..learners import Belief, Learner, Solution, Uncertainty, named
-from ..models import ClosedForm, FeatureMap, Model
+from ..deployment import Deployable
+from ..learners import Belief, Learner, Uncertainty, named
+from ..models import FeatureMap, Model
 from ..recordings import Demonstration, stack, times_of
 from ..risks import Moments, unit_actions
-from ..training import Batch, FirstLook, Folds, Split, Training, Validation
-
-_ROWS = 4096
-"""Rows that are predicted together, so that what is made of them stays in cache."""
+from ..training import Batch, FirstLook, Folds, Seen, Split, Training, Validation, checked_states
 
 _FITTED = ("training_", "solution_", "n_features_in_", "feature_names_in_", "n_outputs_", "_flat", "_waiting")
 
 
-class Policy(RegressorMixin, BaseEstimator, ABC):
+class Policy(Deployable, RegressorMixin, BaseEstimator, ABC):
     """A policy that learns: a :class:`~unconstrain.models.Model`, what was seen, and the solution found.
 
     Attributes
@@ -55,9 +46,6 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
 
     learner: Learner | str | None
     validation: Validation | None
-    training_: Training
-    solution_: Solution
-    n_features_in_: int
     n_outputs_: int
     _flat: bool
 
@@ -135,12 +123,7 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         ----------
         batches : iterable of tuples
             Each ``(X, y)``, ``(X, y, sample_weight)`` or ``(X, y, sample_weight, groups)``,
-            as :meth:`fit` takes them.
-
-        Raises
-        ------
-        InvalidDataError
-            As :meth:`fit` does, and if there is no batch.
+            as :meth:`fit` takes them; none at all is an error.
         """
         learner = self._check_speed_power(getattr(batches, "speed_power", 0.0))
         if iter(batches) is not batches:
@@ -157,20 +140,9 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
     def fit_parts(self, parts: Sequence[Any], summed: Callable[..., Any]) -> Self:
         """Learn from parts wherever they are; see :mod:`unconstrain.cluster`.
 
-        Parameters
-        ----------
-        parts : sequence
-            Each an iterable of batches as :meth:`fit_batches` takes them, or something that ``summed`` makes one of.
-        summed : callable
-            ``summed(function, parts)`` is the sum of the function at each part, in their order. The function, what it
-            returns, and so this policy can be pickled.
-
-        Raises
-        ------
-        InvalidDataError
-            As :meth:`fit` does, and if there is no part.
-        SettingError
-            If the learner needs the samples: only sums come back.
+        Each is an iterable of batches as :meth:`fit_batches` takes them, or something that ``summed`` makes one of.
+        ``summed(function, parts)`` is the sum of a function at each part, in their order; the function and what it
+        returns can be pickled. Errors are those of :meth:`fit`, and a learner that needs the samples is refused.
         """
         learner = named(self.learner)
         if learner.needs_samples:
@@ -239,9 +211,7 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
             Of the library and on the device of the states.
         """
         check_is_fitted(self, "solution_")
-        states, model, weights = self._checked_states(X), self.training_.model, self.solution_.weights
-        blocks = slices(states, BLOCK_ROWS if is_foreign(states) else _ROWS)
-        actions: Array = namespace(states).concat([model.predict(weights, states[rows, :]) for rows in blocks])
+        actions = self.training_.model.predict(self.solution_.weights, checked_states(self, X))
         return actions[:, 0] if self._flat else actions
 
     def __call__(self, states: ArrayLike) -> Array:
@@ -298,14 +268,14 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         SettingError
             If the learner does not look at samples; :class:`~unconstrain.Robust` does.
         """
-        return self._believed().uncertainty(self.training_.model, on_host(self._checked_states(X)))
+        return self._believed().uncertainty(self.training_.model, on_host(checked_states(self, X)))
 
     def covariances(self, X: ArrayLike) -> Array:
         """Covariance of the predicted actions due to what the data does not say, shape (N, d, d).
 
         Its diagonal is the square of ``uncertainty(X).undetermined``. Raises as :meth:`uncertainty` does.
         """
-        return self._believed().covariances(self.training_.model, on_host(self._checked_states(X)))
+        return self._believed().covariances(self.training_.model, on_host(checked_states(self, X)))
 
     def _believed(self) -> Belief:
         check_is_fitted(self, "solution_")
@@ -319,7 +289,7 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         SettingError
             If neither fields nor features have a place in state space.
         """
-        return self._fitted_model().support(self._checked_states(states))
+        return self._fitted_model().support(checked_states(self, states))
 
     def _fitted_model(self) -> Model:
         check_is_fitted(self, "solution_")
@@ -335,73 +305,6 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         """Moments of all samples so far, over the features as they are summed."""
         check_is_fitted(self, "solution_")
         return self.training_.gathered.whole
-
-    # On a robot.
-
-    def step(self, x: ArrayLike, out: Array | None = None) -> Array:
-        """Predict for one state, without overhead: for control loops.
-
-        The same as :meth:`predict` to rounding. It is prepared on the first
-        call after each fit. Any number of threads may call it at once, also
-        while one of them learns by :meth:`partial_fit`; each step is then by
-        the old or by the new solution, never by half of each.
-
-        Parameters
-        ----------
-        x : array_like, shape (n,)
-            Not checked: NaN gives NaN.
-        out : ndarray, shape (d,), optional
-            Written to and returned; without it the result is a new array.
-
-        Returns
-        -------
-        ndarray, shape (d,)
-
-        Raises
-        ------
-        InvalidDataError
-            If the state is not of shape (n,).
-        """
-        known = self.__dict__
-        prepared = known.get("_prepared")
-        if prepared is None or prepared.solution is not known.get("solution_"):
-            prepared = self._prepare_step(known)
-        return prepared.step(x, out)
-
-    def _prepare_step(self, known: dict[str, Any]) -> _Prepared:
-        check_is_fitted(self, "solution_")
-        # What another thread has learnt meanwhile is prepared at the next step: the solution is then another.
-        solution = known["solution_"]
-        step = stepper(known["training_"].model, solution.weights, known["n_features_in_"])
-        prepared = known["_prepared"] = _Prepared(solution, step)
-        return prepared
-
-    def closed_form(self) -> ClosedForm:
-        """The policy as one formula: what is exported, and what other targets can be made from.
-
-        Raises
-        ------
-        SettingError
-            If the features are a callable that does not say its formula.
-        """
-        return self._fitted_model().formula(self.solution_.weights)
-
-    def export_c(self, path: str | os.PathLike[str], name: str = "policy") -> None:
-        """Write the policy as one C99 file that needs only ``exp`` of the standard library.
-
-        It defines ``void NAME_step(const double state[n], double action[d])``
-        and, with ``NAME_SELF_TEST`` (in capitals) defined, a ``main`` that
-        compares itself with :meth:`predict`. The name is a C identifier.
-        Raises as :meth:`closed_form` does, and for another name.
-        """
-        export_c(self.closed_form(), self, path, name)
-
-    def export_onnx(self, path: str | os.PathLike[str]) -> None:
-        """Write the policy as an ONNX graph, ``states`` (N, n) to ``actions`` (N, d), in float64.
-
-        Needs the extra ``onnx``. Raises as :meth:`closed_form` does.
-        """
-        export_onnx(self.closed_form(), path)
 
     # Inside.
 
@@ -443,7 +346,7 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         return (self._checked(*batch, reset=reset and number == 0) for number, batch in enumerate(batches))
 
     def _checked(self, X: ArrayLike, *rest: Any, reset: bool) -> Batch:
-        batch, flat = Batch.checked(self._checked_states(X, reset=reset, convert=False), *rest)
+        batch, flat = Batch.checked(checked_states(self, X, reset=reset, convert=False), *rest)
         columns = batch.actions.shape[1]
         if reset:
             self._flat, self.n_outputs_ = flat, columns
@@ -451,54 +354,17 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
             raise InvalidDataError(f"actions: got {columns} columns, expected {self.n_outputs_} as before.")
         return batch
 
-    def _checked_states(self, X: ArrayLike, *, reset: bool = False, convert: bool = True) -> Array:
-        if isinstance(X, list | tuple):
-            X = as_matrix(X, "states")  # our words for ragged rows
-        try:
-            # scikit-learn checks names, sparse input and the number of columns; the numbers are ours to check.
-            kind = np.float64 if convert else "numeric"
-            if is_foreign(X):
-                table = as_matrix(X, "states", convert=convert)
-                validate_data(self, table, reset=reset, skip_check_array=True)
-                return table
-            table = validate_data(self, X, reset=reset, dtype=kind, ensure_all_finite=False)
-        except ValueError as error:
-            raise InvalidDataError(str(error)) from error
-        return as_matrix(table, "states", convert=convert)
-
     def __sklearn_tags__(self) -> Any:
         """Say that actions may have several columns."""
         tags = super().__sklearn_tags__()
         tags.target_tags.multi_output = True
         return tags
 
-    def __getstate__(self) -> Any:
-        state: Any = super().__getstate__()
-        return {name: value for name, value in state.items() if name != "_prepared"}  # buffers are made where needed
 
-
-class _Prepared(NamedTuple):
-    """The step of a solution."""
-
-    solution: Solution
-    step: Step
-
-
-@dataclass(frozen=True)
-class _Seen:
-    """First look at a part, and what the policy noted when it checked it."""
-
-    look: FirstLook | None
-    noted: dict[str, Any]
-
-    def __add__(self, other: _Seen) -> _Seen:
-        return _Seen(FirstLook.total([self.look, other.look]), self.noted if self.look is not None else other.noted)
-
-
-def _seen(draft: Policy, part: Iterable[Sequence[Any]]) -> _Seen:
+def _seen(draft: Policy, part: Iterable[Sequence[Any]]) -> Seen:
     mine = copy(draft)
     look = FirstLook.total(map(FirstLook.at, mine._each_checked(part)))
-    return _Seen(look, {name: value for name, value in vars(mine).items() if name not in vars(draft)})
+    return Seen(look, {name: value for name, value in vars(mine).items() if name not in vars(draft)})
 
 
 def _gathered(draft: Policy, part: Iterable[Sequence[Any]]) -> Training:

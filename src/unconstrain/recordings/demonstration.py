@@ -108,7 +108,7 @@ class Demonstration:
         if self.times is not None:
             object.__setattr__(self, "times", as_vector(self.times, f"times{of}", len(self.states)))
         if self.truth is not None:
-            self._check_truth(of)
+            self._check_truth(self.truth, of)
 
     def __len__(self) -> int:
         return len(self.states)
@@ -123,12 +123,11 @@ class Demonstration:
             truth=None if self.truth is None else Truth(self.truth.policy[rows], self.truth.projections[rows]),
         )
 
-    def _check_truth(self, of: str) -> None:
-        assert self.truth is not None
+    def _check_truth(self, truth: Truth, of: str) -> None:
         steps, d = self.actions.shape
         for what, array, shape in (
-            ("policy", self.truth.policy, (steps, d)),
-            ("projections", self.truth.projections, (steps, d, d)),
+            ("policy", truth.policy, (steps, d)),
+            ("projections", truth.projections, (steps, d, d)),
         ):
             if np.shape(array) != shape:
                 raise InvalidDataError(f"truth{of}: got {what} of shape {np.shape(array)}, expected {shape}.")

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,13 @@ HELD_BYTES = 2**25
 """Demonstrations that take no more than this in all are kept after the first walk, so that files are read once."""
 
 
-Samples = tuple[Array, Array, Array | None, NDArray[Any]]
-"""States (N, n), actions (N, d), weights (N,) if they are not ones, and names of the demonstrations (N,)."""
+class Block(NamedTuple):
+    """Samples to learn from: ``states`` (N, n), ``actions`` (N, d), ``weights`` (N,) if not ones, ``groups`` (N,)."""
+
+    states: Array
+    actions: Array
+    weights: Array | None
+    groups: NDArray[Any]
 
 
 class Stream:
@@ -83,14 +88,16 @@ class Stream:
         actions = prepare(self.first, self.recipe)[0].actions if self.speed_power else np.zeros((1, 1))
         return float(np.linalg.norm(actions, axis=1).max()) or 1.0
 
-    def __iter__(self) -> Iterator[Samples]:
+    def __iter__(self) -> Iterator[Block]:
         """Batches of at least :data:`~unconstrain.base.arrays.BLOCK_ROWS` samples, but for the last."""
         waiting: list[tuple[str, Demonstration]] = []
+        samples = 0
         for named in self.named_demonstrations():
             waiting.append(named)
-            if sum(len(demo) for _, demo in waiting) >= BLOCK_ROWS:
+            samples += len(named[1])
+            if samples >= BLOCK_ROWS:
                 yield self._batch(waiting)
-                waiting = []
+                waiting, samples = [], 0
         if waiting:
             yield self._batch(waiting)
 
@@ -143,9 +150,9 @@ class Stream:
                     [demonstration] = prepare(recording, self.recipe)
                 yield f"{number}/{recording.name}", replace(demonstration, times=None)
 
-    def _batch(self, named: list[tuple[str, Demonstration]]) -> Samples:
+    def _batch(self, named: list[tuple[str, Demonstration]]) -> Block:
         actions = np.concatenate([demo.actions for _, demo in named])
-        return (
+        return Block(
             np.concatenate([demo.states for _, demo in named]),
             actions,
             self._counts(actions),

@@ -18,11 +18,12 @@ rounding error would state that the policy is zero along it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
-from functools import cache, reduce
+from functools import reduce
 from itertools import combinations, combinations_with_replacement
 from operator import add, sub
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,14 +176,13 @@ class Sums:
     """
 
     def __init__(self, models: int, actions: int, features: int, at_rest: float = 0.0) -> None:
-        _keep_what_is_freed()
         self.shape, self._at_rest = (models, actions, features), at_rest
         self._sums: list[Array] = []
 
     def pieces(self, table: Array, start: int = 0, stop: int | None = None) -> Iterator[slice]:
         """Slices of a table, or of part of it, to add one at a time, short enough for temporaries to stay in cache."""
         models, d, p = self.shape
-        columns = p if models == 1 else d * d * p * p // 4
+        columns = p if models == 1 else max(1, d * d * p * p // 4)
         numbers, most = (_FOREIGN_BLOCK, 2**20) if is_foreign(table) else (_BLOCK, 8192)
         rows = min(max(512, numbers // columns), most)
         samples = (table.shape[0] if stop is None else stop) - start
@@ -201,7 +201,9 @@ class Sums:
             further += [(w * u).T @ phi, *_products_of_one(xp, phi, directions, moving, w)]
         else:
             directions = xp.where(moving[:, None], directions, 0.0)
-            further += [w.T @ _each_with_each(xp, u, phi), w.T @ _each_with_each(xp, *_metrics(xp, phi, directions))]
+            further += [
+                _sum_of_each_with_each(w, first, second) for first, second in ((u, phi), _metrics(xp, phi, directions))
+            ]
         if not self._sums:
             self._sums = further
         else:
@@ -242,14 +244,30 @@ _FOREIGN_BLOCK = 2**25
 """The same for arrays of another library, which may be on a device that needs larger products."""
 
 
-@cache
-def _keep_what_is_freed() -> None:
-    """Have the C library reuse memory for the next block, up to some 60 MB, rather than hand it back in between.
+class _Workspace:
+    """Memory for the largest temporaries, used again for each block: :data:`_BLOCK` numbers for each thread that adds.
 
-    Faulting it in again took up to half of the time. The GNU library keeps twice the largest array that was freed, of
-    those up to 32 MB; this one is never touched. To other libraries it says nothing.
+    The C library hands the memory of each block back to the system, and faulting
+    it in again for the next took up to half of the time.
     """
-    np.empty(31 * 2**20, dtype=np.uint8)
+
+    def __init__(self) -> None:
+        self._free: list[Array] = []
+
+    @contextmanager
+    def room(self, shape: tuple[int, ...], order: Literal["C", "F"] = "C") -> Iterator[Array]:
+        """An array to write to, of any content; not to be kept."""
+        numbers = int(np.prod(shape))
+        memory = self._free.pop() if self._free else np.empty(numbers)
+        if memory.size < numbers:
+            memory = np.empty(numbers)
+        try:
+            yield memory[:numbers].reshape(shape, order=order)
+        finally:
+            self._free.append(memory)
+
+
+_WORKSPACE = _Workspace()
 
 
 def _products_of_one(
@@ -269,12 +287,13 @@ def _products_of_one(
         still, moves = xp.nonzero(~moving)[0], xp.nonzero(moving)[0]
         resting = _gram(xp.take(features, still, axis=0) * xp.take(root, still, axis=0))
         features, root, pointed = (xp.take(part, moves, axis=0) for part in (features, root, pointed))
-    whole = _gram(features if xp.all(root == 1.0) else features * root)
+    whole = _gram(features) if xp.all(root == 1.0) else _scaled_gram(features, root)
     largest = int(xp.argmax(xp.sum(pointed**2, axis=0)))  # subtracting for a small one would leave rounding
     d = pointed.shape[1]
-    own = {k: _gram(features * pointed[:, k, None]) for k in range(d) if k != largest}
+    own = {k: _scaled_gram(features, pointed[:, k, None]) for k in range(d) if k != largest}
     own[largest] = reduce(sub, own.values(), whole) if d > 1 else whole + 0.0
-    both = [_gram(features * (pointed[:, k] + pointed[:, m])[:, None]) for k, m in combinations(range(d), 2)]
+    pairs = (pointed[:, k, None] + pointed[:, m, None] for k, m in combinations(range(d), 2))
+    both = [_scaled_gram(features, pair) for pair in pairs]
     return [whole + resting, *(own[k] for k in range(d)), *both]
 
 
@@ -291,6 +310,14 @@ def _gram(table: Array) -> Array:
     return table.T @ table
 
 
+def _scaled_gram(table: Array, factors: Array) -> Array:
+    """Gram matrix of a table (N, p) whose rows are multiplied by some factors (N, 1)."""
+    if is_foreign(table):
+        return _gram(table * factors)
+    with _WORKSPACE.room(table.shape, "F" if table.flags.f_contiguous else "C") as room:
+        return _gram(np.multiply(table, factors, out=room))
+
+
 def _metrics(xp: Any, features: Array, directions: Array) -> tuple[Array, Array]:
     """Metrics of each sample, 1 first, and half of its φφᵀ: (N, metrics) and (N, p (p + 1) / 2)."""
     half, other = _halves(xp, directions), _halves(xp, features)
@@ -304,12 +331,15 @@ def _halves(xp: Any, table: Array) -> Array:
     return halves
 
 
-def _each_with_each(xp: Any, first: Array, second: Array) -> Array:
-    """Products of each column of one table with each of another, row by row."""
-    products: Array = xp.reshape(
-        first[:, :, None] * second[:, None, :], (first.shape[0], first.shape[1] * second.shape[1])
-    )
-    return products
+def _sum_of_each_with_each(weights: Array, first: Array, second: Array) -> Array:
+    """Weighted sums (M, a b) of the products of each column of one table (N, a) with each of another (N, b)."""
+    shape = first.shape[0], first.shape[1] * second.shape[1]
+    left, right = first[:, :, None], second[:, None, :]
+    if is_foreign(first):
+        return weights.T @ namespace(first).reshape(left * right, shape)
+    with _WORKSPACE.room(shape) as room:
+        np.multiply(left, right, out=room.reshape(shape[0], first.shape[1], second.shape[1]))
+        return weights.T @ room
 
 
 def _places(size: int) -> NDArray[np.intp]:

@@ -1,8 +1,8 @@
 """What a learner may look at: moments fold by fold, and samples where they are kept."""
 
 from . import cluster
-from .batches import Batch
-from .first_look import PLACING_SAMPLES, FirstLook
+from .batches import Batch, checked_states
+from .first_look import PLACING_SAMPLES, FirstLook, Seen
 from .folds import Folds, HeldOut, Split, Validation
 from .samples import Samples
 from .training import Training
@@ -14,8 +14,10 @@ __all__ = [
     "Folds",
     "HeldOut",
     "Samples",
+    "Seen",
     "Split",
     "Training",
     "Validation",
+    "checked_states",
     "cluster",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,6 +134,18 @@ class FirstLook:
         for look in looks:
             whole = look if whole is None else whole if look is None else whole + look
         return whole
+
+
+@dataclass(frozen=True)
+class Seen:
+    """First look at a part of the data, and what was noted of its columns meanwhile. Parts add, in their order."""
+
+    look: FirstLook | None
+    noted: dict[str, Any]
+
+    def __add__(self, other: Seen) -> Seen:
+        """Both; the columns are those of the first part that holds anything."""
+        return Seen(FirstLook.total([self.look, other.look]), self.noted if self.look is not None else other.noted)
 
 
 def _smallest(keys: NDArray[np.uint64], largest: np.uint64) -> tuple[NDArray[np.uint64], NDArray[np.intp]]:

@@ -30,16 +30,14 @@ def on_the_arm(result: Result) -> list[html.Markup]:
     if not done:
         return [html.paragraph(WITHOUT_PHYSICS)]
     parts = [html.paragraph(STATEMENT.format(reach=100.0 * settings.reach))]
-    wiped = [one for one in done if one.wipe is not None]
+    wiped = [(one, one.wipe) for one in done if one.wipe is not None]
     if wiped:
-        shown = next((one for one in wiped if not one.seen), wiped[0])
-        parts += [_pictures(shown), _tracks(wiped)]
+        shown = next((pair for pair in wiped if not pair[0].seen), wiped[0])
+        parts += [_pictures(*shown), _tracks(wiped)]
     return [*parts, _measures(result.tables["reproduction"])]
 
 
-def _pictures(shown: Reproduction) -> html.Markup:
-    wipe = shown.wipe
-    assert wipe is not None
+def _pictures(shown: Reproduction, wipe: Wipe) -> html.Markup:
     name = f"plate {shown.plate.name}, which nobody {'wiped' if shown.demonstration is None else 'learnt from'}"
     try:
         moving = html.image(
@@ -73,11 +71,9 @@ def _lines(wipe: Wipe) -> bytes:
     return figures.arm_on_plate(np.moveaxis(joints, -1, 0), track, plate)
 
 
-def _tracks(wiped: list[Reproduction]) -> html.Markup:
+def _tracks(wiped: list[tuple[Reproduction, Wipe]]) -> html.Markup:
     panels = []
-    for one in wiped:
-        wipe = one.wipe
-        assert wipe is not None
+    for one, wipe in wiped:
         plate = figures.Quad.around(wipe.positions, wipe.plate.rotation[:, 2], margin=1.6)
         lines = {} if one.demonstration is None else {"observed": plate.flatten(one.demonstration.states)}
         lines["hybrid"] = plate.flatten(wipe.positions)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import Array, require_extra
-from ...base.errors import UnconstrainError
+from ...base.errors import InvalidDataError, UnconstrainError
 from ...recordings import Demonstration
 from ..systems.wiping import Plate
 from .engine import backend, engine
@@ -77,11 +77,12 @@ def strip(demonstration: Demonstration, wipe: Wipe, count: int = 4, width: int =
     UnconstrainError
         If nothing can be drawn here.
     """
+    if demonstration.times is None:
+        raise InvalidDataError(f"'{demonstration.name}' has no times, expected them: a turn is told by its length.")
     image = require_extra("PIL.Image", "sim")
     turn = 1.0 / wipe.measures()["frequency"]
     hand = hand_scene(wipe.plate)
     engine().mj_forward(hand.model, hand.data)
-    assert demonstration.times is not None
     rows = []
     for name, track, postures, times in (
         ("hand", demonstration.states, demonstration.states - hand.face, demonstration.times),

@@ -93,10 +93,10 @@ class Arm:
         Raises
         ------
         ReadError
-            If the file is no URDF.
+            If the file is no URDF, or a joint on the way has no axis to move along.
         SettingError
             If a link does not exist, the base is not on the way to the tip, a
-            joint on the way floats or moves in a plane, or one mimics another.
+            joint on the way floats or moves in a plane, or one of them mimics another.
         """
         links, joints = _urdf(path)
         for link in (tip, base):
@@ -219,6 +219,7 @@ class _Joint:
     axis: Array
     lower: float
     upper: float
+    mimics: bool
 
 
 def _urdf(path: str | os.PathLike[str]) -> tuple[set[str], list[_Joint]]:
@@ -231,14 +232,13 @@ def _urdf(path: str | os.PathLike[str]) -> tuple[set[str], list[_Joint]]:
         raise ReadError(f"{path}: is no URDF that can be read ({type(error).__name__}: {error}).") from error
     joints = []
     for one in robot.joints:
-        if one.mimic is not None:
-            raise SettingError(f"{path}: joint {one.name!r} mimics another one, which a serial chain cannot say.")
         ends = (-np.inf, np.inf)
         if one.limit is not None and one.type != "continuous":
             ends = (one.limit.lower or 0.0, one.limit.upper or 0.0)
         axis = np.array([1.0, 0.0, 0.0]) if one.axis is None else np.asarray(one.axis, dtype=np.float64)
         origin = np.eye(4) if one.origin is None else np.asarray(one.origin, dtype=np.float64)
-        joints.append(_Joint(one.name, one.type, one.parent, one.child, origin, axis, *ends))
+        mimics = one.mimic is not None
+        joints.append(_Joint(one.name, one.type, one.parent, one.child, origin, axis, *ends, mimics))
     return {link.name for link in robot.links}, joints
 
 
@@ -253,6 +253,15 @@ def _from_joints(chain: list[_Joint], path: str | os.PathLike[str], tip: str) ->
             raise SettingError(
                 f"{path}: joint {joint.name!r} on the way to {tip!r} is {joint.kind}; "
                 f"expected only fixed, {', '.join(_HINGES)}."
+            )
+        if joint.mimics:
+            raise SettingError(
+                f"{path}: joint {joint.name!r} on the way to {tip!r} mimics another one: a serial chain cannot."
+            )
+        if not np.linalg.norm(joint.axis) > 0.0:
+            raise ReadError(
+                f"{path}: joint {joint.name!r} on the way to {tip!r} has the axis {joint.axis.tolist()}, "
+                "expected one that is not zero."
             )
         origins.append(origin)
         moving.append(joint)

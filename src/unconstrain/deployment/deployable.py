@@ -1,0 +1,106 @@
+"""What a fitted policy can do without what it learnt from."""
+
+from __future__ import annotations
+
+import os
+from abc import abstractmethod
+from typing import Any, NamedTuple
+
+from numpy.typing import ArrayLike
+from sklearn.utils.validation import check_is_fitted
+
+from ..base.arrays import Array
+from ..models import ClosedForm
+from .c99 import export_c
+from .onnx_graph import export_onnx
+from .stepping import Step, stepper
+
+
+class Deployable:
+    """A model and the weights of a solution, in control loops and on other machines."""
+
+    training_: Any
+    solution_: Any
+    n_features_in_: int
+
+    @abstractmethod
+    def __call__(self, states: ArrayLike) -> Array:
+        """Actions (N, d) at states (N, n)."""
+
+    def step(self, x: ArrayLike, out: Array | None = None) -> Array:
+        """Predict for one state, without overhead: for control loops.
+
+        The same as :meth:`predict` to rounding. It is prepared on the first
+        call after each fit. Any number of threads may call it at once, also
+        while one of them learns by :meth:`partial_fit`; each step is then by
+        the old or by the new solution, never by half of each.
+
+        Parameters
+        ----------
+        x : array_like, shape (n,)
+            Not checked: NaN gives NaN.
+        out : ndarray, shape (d,), optional
+            Written to and returned; without it the result is a new array.
+
+        Returns
+        -------
+        ndarray, shape (d,)
+
+        Raises
+        ------
+        InvalidDataError
+            If the state is not of shape (n,).
+        """
+        known = self.__dict__
+        prepared = known.get("_prepared")
+        if prepared is None or prepared.solution is not known.get("solution_"):
+            prepared = self._prepare_step(known)
+        return prepared.step(x, out)
+
+    def _prepare_step(self, known: dict[str, Any]) -> _Prepared:
+        check_is_fitted(self, "solution_")
+        # What another thread has learnt meanwhile is prepared at the next step: the solution is then another.
+        solution = known["solution_"]
+        step = stepper(known["training_"].model, solution.weights, known["n_features_in_"])
+        prepared = known["_prepared"] = _Prepared(solution, step)
+        return prepared
+
+    def closed_form(self) -> ClosedForm:
+        """The policy as one formula: what is exported, and what other targets can be made from.
+
+        Raises
+        ------
+        SettingError
+            If the features are a callable that does not say its formula.
+        """
+        check_is_fitted(self, "solution_")
+        return self.training_.model.formula(self.solution_.weights)
+
+    def export_c(self, path: str | os.PathLike[str], name: str = "policy") -> None:
+        """Write the policy as one C99 file that needs only ``exp`` of the standard library.
+
+        It defines ``void NAME_step(const double state[n], double action[d])``
+        and, with ``NAME_SELF_TEST`` (in capitals) defined, a ``main`` that
+        compares itself with :meth:`predict`. The name is a C identifier.
+        Raises as :meth:`closed_form` does, and for another name.
+        """
+        export_c(self.closed_form(), self, path, name)
+
+    def export_onnx(self, path: str | os.PathLike[str]) -> None:
+        """Write the policy as an ONNX graph, ``states`` (N, n) to ``actions`` (N, d), in float64.
+
+        Needs the extra ``onnx``. Raises as :meth:`closed_form` does.
+        """
+        export_onnx(self.closed_form(), path)
+
+    def __getstate__(self) -> Any:
+        """Leave out buffers, which are made again where they are needed."""
+        state: Any = super().__getstate__()
+        return {name: value for name, value in state.items() if name != "_prepared"}
+
+
+class _Prepared(NamedTuple):
+    """The step of a solution."""
+
+    solution: Any
+    step: Step

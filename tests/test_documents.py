@@ -1,0 +1,126 @@
+"""Every block of the documents does what it says, in the order of the page, as a reader would paste it."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import unconstrain as uc
+
+ROOT = Path(__file__).parent.parent
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.rst"))]
+MARKS = re.compile(
+    r"^```(?P<md>python|console)\n(?P<fenced>.*?)^```"
+    r"|^\.\. code-block:: (?P<rst>python|console)\n\n(?P<indented>(?:(?: {4}[^\n]*)?\n)+)",
+    re.MULTILINE | re.DOTALL,
+)
+
+LEFT_OUT = {
+    # What a block says: why it is not run.
+    "class FixedSplit": "rewritten with the learners",
+    "class Trimmed": "rewritten with the learners",
+    "states.cuda()": "needs a GPU",
+    "load_rim_wiping(download=True": "needs the network",
+    'Client("tcp://': "needs a cluster",
+    "--scheduler tcp://": "needs a cluster",
+    "make demo": "is a target of the Makefile, and installs",
+    "$ pip install": "installs",
+    "unconstrain reproduce": "takes minutes to hours; the experiments have tests of their own",
+    "cc -std=c99": "is run with the exported file in the tests of deployment",
+}
+
+
+def blocks(page):
+    """Language and text of each block of a page."""
+    for found in MARKS.finditer(page.read_text()):
+        text = found["fenced"] or re.sub(r"^ {4}", "", found["indented"], flags=re.MULTILINE)
+        yield found["md"] or found["rst"], text.strip() + "\n"
+
+
+def reason(text):
+    return next((why for what, why in LEFT_OUT.items() if what in text), None)
+
+
+def recorded(seed, samples=60):
+    """Wiping of a tilted plane: states and actions (samples, 3)."""
+    rng = np.random.default_rng(seed)
+    states = rng.uniform(-1, 1, (samples, 3))
+    wanted = np.column_stack([states[:, 1], -states[:, 0], -states[:, 2]])
+    normal = np.array([0.0, 0.3 * seed - 0.5, 1.0])
+    normal /= np.linalg.norm(normal)
+    return states, wanted - np.outer(wanted @ normal, normal)
+
+
+@pytest.fixture
+def names(tmp_path, monkeypatch):
+    """What the documents take for granted, and a folder with the files that they read."""
+    monkeypatch.chdir(tmp_path)
+    states, actions = map(np.concatenate, zip(*map(recorded, range(4)), strict=True))
+    groups = np.repeat(np.arange(4), 60)
+    Path("wipes").mkdir()
+    turn = np.linspace(0, 12, 1200)
+    for k in range(3):
+        path = np.column_stack([turn, np.cos(turn), np.sin(turn), 0.1 * k * np.sin(turn + k)])
+        header = "t,x,y,z"
+        for name in (f"wipes/{k}.csv", *(("held_out.csv", "monday.csv", "tuesday.csv") if k == 2 else ())):
+            np.savetxt(name, path, delimiter=",", header=header, comments="")
+        table_of(f"wipes/{k}.parquet", *recorded(k))
+    rows = [f"{t},{x},{y},{z},{'flat' if t < 6 else 'tilted'}" for t, x, y, z in path]
+    Path("wipes.csv").write_text("\n".join(["t,x,y,z,surface", *rows]) + "\n")
+    policy = uc.LocallyLinearPolicy().fit(states, actions, groups=groups)
+    uc.save(policy, "wipe.npz", {"recipe": {"states": ["x", "y", "z"]}})
+    for k in range(2):
+        np.savez(f"batch{k}.npz", states=states[k::2], actions=actions[k::2])
+    turns = iter([True, True, False])
+    robot = SimpleNamespace(read=lambda: states[0], command=lambda action: None)
+    return {
+        "states": states,
+        "actions": actions,
+        "groups": groups,
+        "times": np.tile(0.02 * np.arange(60), 4),
+        "more_states": states + 0.1,
+        "more_actions": actions,
+        "more_groups": groups + 10,
+        "paths": sorted(Path().glob("wipes/*.parquet")),
+        "n": 3,
+        "d": 3,
+        "robot": robot,
+        "running": lambda: next(turns),
+        "simulate": lambda seed: recorded(seed % 4),
+    }
+
+
+def table_of(name, states, actions):
+    pyarrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    columns = dict(zip(("x", "y", "z", "vx", "vy", "vz"), np.column_stack([states, actions]).T, strict=True))
+    parquet.write_table(pyarrow.table(columns), name)
+
+
+def run_console(text):
+    """Each command of a console block, by the command line of this very package."""
+    commands = [line[2:] for line in text.splitlines() if line.startswith("$ ")]
+    ours = f'unconstrain() {{ {shlex.quote(sys.executable)} -m unconstrain "$@"; }}'
+    done = subprocess.run(["bash", "-ec", "\n".join([ours, *commands])], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr + done.stdout
+
+
+@pytest.mark.filterwarnings("ignore::unconstrain.recordings.preparation.PreparationWarning")
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_the_blocks_of_a_page_run(page, names):
+    for number, (language, text) in enumerate(blocks(page), start=1):
+        if reason(text) is not None:
+            continue
+        if language == "console":
+            run_console(text)
+        else:
+            exec(compile(text, f"{page.name}, block {number}", "exec"), names)
+
+
+def test_all_that_is_left_out_is_there():
+    said = "\n".join(text for page in PAGES for _, text in blocks(page))
+    assert [what for what in LEFT_OUT if what not in said] == []
