@@ -47,6 +47,18 @@ class Twice:
         yield halves()[1]
 
 
+class Lost:
+    """Adds up parts once, and then is gone."""
+
+    calls = 0
+
+    def __call__(self, function, parts):
+        self.calls += 1
+        if self.calls > 1:
+            raise OSError("no worker answers")
+        return sum_of(map(function, parts))
+
+
 FAILING = {
     "a batch with NaN": lambda policy: policy.partial_fit(np.full((5, 2), np.nan), np.ones((5, 2))),
     "other columns": lambda policy: policy.partial_fit(np.ones((5, 3)), np.ones((5, 2))),
@@ -60,6 +72,7 @@ FAILING = {
     "no demonstration": lambda policy: policy.fit_demonstrations([]),
     "a learner": lambda policy: policy.set_params(learner=LearnsNothing()).partial_fit(*halves()[0]),
     "a learner in fit": lambda policy: policy.set_params(learner=LearnsNothing()).fit(*halves()[0]),
+    "a cluster that is lost after the first look": lambda policy: policy.fit_parts([halves()], Lost()),
     "parts": lambda policy: policy.fit_parts([halves(), broken()], lambda call, parts: sum_of(map(call, parts))),
 }
 

@@ -451,3 +451,29 @@ def test_one_action_has_an_uncertainty():
     policy = uc.ParametricPolicy(uc.Affine(), uc.Robust()).fit(data.states, data.actions[:, 0])
     assert policy.uncertainty(data.states).total.min() > 1e-3
     assert 0.05 < policy.solution_.noise < 0.4
+
+
+class Looks(uc.Direct):
+    """Learns as direct regression does, and notes what it may look at."""
+
+    needs_samples = True
+    seen = []
+
+    def learn(self, training):
+        self.seen.append(training.samples)
+        return super().learn(training)
+
+
+def test_a_learner_may_look_at_states_times_and_groups(tmp_path):
+    demos = [
+        uc.Demonstration(data.states, data.actions, np.arange(len(data.states)) / 10.0)
+        for data in (draw(seed, samples=30) for seed in (0, 1, 2))
+    ]
+    uc.LocallyLinearPolicy(learner=Looks()).fit_demonstrations(demos)
+    [samples] = Looks.seen
+    assert_array_equal(samples.states, uc.stack(demos).states)
+    assert_array_equal(samples.times, np.tile(np.arange(30) / 10.0, 3))
+    assert_array_equal(samples.groups, np.repeat([0, 1, 2], 30))
+    assert samples[samples.groups == 1].times.shape == (30,)
+    uc.LocallyLinearPolicy(learner=Looks()).fit(*uc.stack(demos)[:2])
+    assert Looks.seen[1].times is None

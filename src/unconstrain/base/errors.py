@@ -6,6 +6,7 @@ Catch :class:`UnconstrainError` to catch them all.
 
 __all__ = [
     "InvalidDataError",
+    "MissingBeliefError",
     "MissingExtraError",
     "ModelFileError",
     "ReadError",
@@ -25,6 +26,10 @@ class InvalidDataError(UnconstrainError, ValueError):
 
 class SettingError(UnconstrainError, ValueError):
     """A parameter outside its range, or a name that does not exist."""
+
+
+class MissingBeliefError(SettingError, AttributeError):
+    """Something that only a learner which looks at the samples can tell."""
 
 
 class ReadError(UnconstrainError):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from math import exp
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,8 +13,10 @@ from ..base.arrays import Array
 from ..base.errors import InvalidDataError
 from ..learners import SPHERE_HIDDEN_BY_NOISE, Solution, noise_by_differences
 from ..models import choose_variance, cover
-from ..policies import Policy
 from ..recordings import Demonstration, stack, unique_names
+
+if TYPE_CHECKING:
+    from ..policies import Policy
 
 SMALL = 0.1
 """An undetermined spread below this share of the typical action is negligible."""

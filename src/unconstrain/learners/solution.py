@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
-from ..base.errors import SettingError
+from ..base.errors import MissingBeliefError
 
 if TYPE_CHECKING:
     from ..models import Model
@@ -135,12 +135,14 @@ class Solution:
 
         Raises
         ------
-        SettingError
+        MissingBeliefError
             If the learner has none, since it does not use the samples.
         """
         if self.belief is None:
-            name = self.method or "a learner"
-            raise SettingError(f"belief: got a solution of {name}, which estimates none. Fit with learner=Robust().")
+            raise MissingBeliefError(
+                f"belief: got a solution of {self.method or 'a learner'} from moments alone, which estimates none. "
+                "Fit with learner=Robust()."
+            )
         return self.belief
 
     @property

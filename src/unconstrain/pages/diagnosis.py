@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.errors import InvalidDataError
 from ..evaluation import CONSTRAINED, FREE, SMALL, Diagnosis, diagnose, named, sentences
-from ..policies import Policy
 from ..recordings import Demonstration, stack
 from . import figures, html
+
+if TYPE_CHECKING:
+    from ..policies import Policy
 
 MOST_POINTS = 4000
 MOST_REGIONS = 8

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import is_dataclass
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,11 +13,13 @@ from ..base.arrays import Array
 from ..base.errors import InvalidDataError, SettingError
 from ..evaluation import ncpe, ninconsistency, nupe
 from ..learners import named
-from ..policies import Policy
 from ..recordings import Demonstration, stack
 from ..risks import action_projection, project
 from . import figures, html
 from .diagnosis import unknown
+
+if TYPE_CHECKING:
+    from ..policies import Policy
 
 MOST_PANELS = 4
 MOST_ROWS = 30

@@ -14,21 +14,15 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
-from ..base.arrays import (
-    Array,
-    Groups,
-    beside,
-    check_at_least,
-    namespace,
-    on_host,
-)
+from ..base.arrays import Array, Groups, beside, check_at_least, namespace, on_host
 from ..base.errors import InvalidDataError, SettingError
+from ..base.estimators import checked_states
 from ..deployment import Deployable
 from ..learners import Belief, Learner, Uncertainty, named
 from ..models import FeatureMap, Model
 from ..recordings import Demonstration, stack, times_of
 from ..risks import Moments, unit_actions
-from ..training import Batch, FirstLook, Folds, Seen, Split, Training, Validation, checked_states
+from ..training import Batch, FirstLook, Folds, Seen, Split, Training, Validation
 
 _FITTED = ("training_", "solution_", "n_features_in_", "feature_names_in_", "n_outputs_", "_flat", "_waiting")
 
@@ -78,10 +72,10 @@ class Policy(Deployable, RegressorMixin, BaseEstimator, ABC):
         InvalidDataError
             If the arrays are ragged, empty, of different lengths or not finite.
         """
-        return self._fit(X, y, sample_weight, groups)
+        return self._fit(named(self.learner), X, y, sample_weight, groups)
 
-    def _fit(self, *batch: Any) -> Self:
-        learner, draft = named(self.learner), self._draft(*_FITTED)
+    def _fit(self, learner: Learner, *batch: Any) -> Self:
+        draft = self._draft(*_FITTED)
         checked = draft._checked(*batch, reset=True)
         return self._become(draft._began(FirstLook.at(checked), learner, more=False)._learnt([checked], learner))
 
@@ -175,12 +169,12 @@ class Policy(Deployable, RegressorMixin, BaseEstimator, ABC):
             helps on noisy recordings, since the direction of a slow movement
             is mostly noise.
         """
-        self._check_speed_power(speed_power)
         demos = [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
         states, actions, groups = stack(demos)
+        times, learner = times_of(demos), self._check_speed_power(speed_power)
         speed = np.linalg.norm(actions, axis=1)
         weights = (speed / speed.max()) ** speed_power if speed_power and speed.any() else None
-        return self._fit(states, actions, weights, groups, times_of(demos))
+        return self._fit(learner, states, actions, weights, groups, times)
 
     def with_learner(self, learner: Learner | str) -> Self:
         """Return the same policy with another learner, from the same moments: no second pass over the data.

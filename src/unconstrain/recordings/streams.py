@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import BLOCK_ROWS, Array, check_at_least
-from .demonstration import Demonstration, Recording
+from .demonstration import Demonstration, Recording, times_of
 from .preparation import Recipe, complete_recipe, prepare
 from .readers import expand, read_blocks
 
@@ -22,12 +21,16 @@ HELD_BYTES = 2**25
 
 
 class Block(NamedTuple):
-    """Samples to learn from: ``states`` (N, n), ``actions`` (N, d), ``weights`` (N,) if not ones, ``groups`` (N,)."""
+    """Samples to learn from: ``states`` (N, n), ``actions`` (N, d), ``weights`` (N,) if not ones, ``groups`` (N,).
+
+    ``times`` (N,), seconds, where all demonstrations have them.
+    """
 
     states: Array
     actions: Array
     weights: Array | None
     groups: NDArray[Any]
+    times: Array | None = None
 
 
 class Stream:
@@ -148,7 +151,7 @@ class Stream:
                     if self._walked:  # it was said on the first walk
                         warnings.simplefilter("ignore", UserWarning)
                     [demonstration] = prepare(recording, self.recipe)
-                yield f"{number}/{recording.name}", replace(demonstration, times=None)
+                yield f"{number}/{recording.name}", demonstration
 
     def _batch(self, named: list[tuple[str, Demonstration]]) -> Block:
         actions = np.concatenate([demo.actions for _, demo in named])
@@ -157,6 +160,7 @@ class Stream:
             actions,
             self._counts(actions),
             np.repeat([name for name, _ in named], [len(demo) for _, demo in named]),
+            times_of([demo for _, demo in named]),
         )
 
     def _counts(self, actions: Array) -> Array | None:

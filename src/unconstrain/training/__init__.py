@@ -1,7 +1,7 @@
 """What a learner may look at: moments fold by fold, and samples where they are kept."""
 
 from . import cluster
-from .batches import Batch, checked_states
+from .batches import Batch
 from .first_look import PLACING_SAMPLES, FirstLook, Seen
 from .folds import Folds, HeldOut, Split, Validation
 from .samples import Samples
@@ -18,6 +18,5 @@ __all__ = [
     "Split",
     "Training",
     "Validation",
-    "checked_states",
     "cluster",
 ]

@@ -7,14 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.utils.validation import validate_data
 
 from ..base.arrays import (
     BLOCK_ROWS,
     Array,
     Groups,
     as_groups,
-    as_matrix,
     as_table,
     as_vector,
     as_weights,
@@ -94,26 +92,3 @@ class Batch(NamedTuple):
             None if part is None else namespace(part).take(part, beside(rows, part), axis=0) for part in self
         ]
         return Batch(*parts)
-
-
-def checked_states(estimator: Any, X: ArrayLike, *, reset: bool = False, convert: bool = True) -> Array:
-    """States (N, n), finite, with the names and the number of columns that the estimator was fitted to.
-
-    Raises
-    ------
-    InvalidDataError
-        If they are anything else.
-    """
-    if isinstance(X, list | tuple):
-        X = as_matrix(X, "states")  # our words for ragged rows
-    try:
-        # scikit-learn checks names, sparse input and the number of columns; the numbers are ours to check.
-        kind = np.float64 if convert else "numeric"
-        if is_foreign(X):
-            table = as_matrix(X, "states", convert=convert)
-            validate_data(estimator, table, reset=reset, skip_check_array=True)
-            return table
-        table = validate_data(estimator, X, reset=reset, dtype=kind, ensure_all_finite=False)
-    except ValueError as error:
-        raise InvalidDataError(str(error)) from error
-    return as_matrix(table, "states", convert=convert)

@@ -1,0 +1,35 @@
+"""What scikit-learn checks of states, in our words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from sklearn.utils.validation import validate_data
+
+from .arrays import Array, as_matrix, is_foreign
+from .errors import InvalidDataError
+
+
+def checked_states(estimator: Any, X: ArrayLike, *, reset: bool = False, convert: bool = True) -> Array:
+    """States (N, n), finite, with the names and the number of columns that the estimator was fitted to.
+
+    Raises
+    ------
+    InvalidDataError
+        If they are anything else.
+    """
+    if isinstance(X, list | tuple):
+        X = as_matrix(X, "states")  # our words for ragged rows
+    try:
+        # scikit-learn checks names, sparse input and the number of columns; the numbers are ours to check.
+        kind = np.float64 if convert else "numeric"
+        if is_foreign(X):
+            table = as_matrix(X, "states", convert=convert)
+            validate_data(estimator, table, reset=reset, skip_check_array=True)
+            return table
+        table = validate_data(estimator, X, reset=reset, dtype=kind, ensure_all_finite=False)
+    except ValueError as error:
+        raise InvalidDataError(str(error)) from error
+    return as_matrix(table, "states", convert=convert)
