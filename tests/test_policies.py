@@ -179,7 +179,7 @@ def test_support_tells_how_far_from_the_data_a_state_is(data):
 
 def test_features_without_a_place_have_no_support(data):
     policy = uc.ParametricPolicy(uc.Affine()).fit(data.states, data.actions)
-    with pytest.raises(SettingError, match="support: Affine does not say where its data was"):
+    with pytest.raises(SettingError, match=r"support: Affine has no support\(states\)"):
         policy.support(data.states)
 
 

@@ -278,7 +278,7 @@ def export(policy: str, output: str, name: str | None) -> None:
     help="Folder for NAME.json and NAME.html.",
 )
 def reproduce(experiment: str, trials: int | None, seed: int, only: tuple[str, ...], workers: int, out: str) -> None:
-    """Reproduce one of the paper's experiments, beside its printed values.
+    """Run one of the paper's experiments, beside its printed values.
 
     An interrupted run continues where it stopped.
     """

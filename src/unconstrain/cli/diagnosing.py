@@ -37,9 +37,9 @@ def diagnose(
     as_json: bool,
     **reading: Any,
 ) -> None:
-    """Tell what each FILE leaves undetermined, and what to record next.
+    """Report noise, undetermined states, and what to record next.
 
-    Reports the noise, where constraints vary too little, and which demonstrations look free.
+    Learns from each FILE, and also reports where constraints vary too little and which demonstrations look free.
     """
     from .. import evaluation
     from ..learners import Robust

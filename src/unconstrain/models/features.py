@@ -188,7 +188,7 @@ class NormalisedRBF:
         width : float
             The kernels' σ as a multiple of the (mean) grid spacing.
         dimensions : int
-            Number of axes, where neither ``low`` nor ``high`` tells.
+            Number of axes, where all of the above are numbers.
 
         Raises
         ------

@@ -13,7 +13,7 @@ from .formula import ClosedForm
 from .receptive_fields import Everywhere, ReceptiveFields
 
 _ROWS = 4096
-"""Rows that are predicted together, so that what is made of them stays in cache."""
+"""Rows that are predicted together, so that temporaries stay in cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class Model:
         """
         measure = getattr(self.fields, "support", None) or getattr(self.features, "support", None)
         if measure is None:
-            raise SettingError(f"support: {type(self.features).__name__} does not say where its data was.")
+            raise SettingError(f"support: {type(self.features).__name__} has no support(states).")
         return np.asarray(measure(states))
 
     def roughness(self, models: int, size: int) -> Array:

@@ -59,7 +59,7 @@ def policy_page(policy: Policy, demonstrations: Sequence[Demonstration], title: 
         html.section("What the data determined", _determined(policy)),
     ]
     if policy.solution_.belief is not None:
-        parts.append(html.section("What is not known", *unknown(policy, demos)))
+        parts.append(html.section("Where the policy is not determined", *unknown(policy, demos)))
     if is_dataclass(learner):
         parts.append(html.settings_table(learner))
     return html.document(title, _lead(policy, demos, type(learner).__name__), *parts)

@@ -57,10 +57,8 @@ def noise_corrected(samples: Samples, noise: float | None = None) -> Candidate:
     smooth, proposed = smoothness.prior(unit), float(np.median(softness))
     softnesses = (proposed, *SOFTNESSES)
     held_out, loss = parts.held_out(softnesses, smooth, used)
-    chosen, best = (
-        _nearest(loss, np.log(np.array(softnesses) / proposed)),
-        int(loss.mean(axis=0).argmin()),
-    )
+    chosen = _nearest(loss, np.log(np.array(softnesses) / proposed))
+    best = int(loss.mean(axis=0).argmin())
     posterior = Posterior(whole.consistent, softnesses[chosen] * whole.risk + smooth)
     weights = posterior.weights(d)
     of_noise, residual = whole.noise(weights), whole.residual(weights)

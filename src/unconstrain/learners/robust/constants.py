@@ -80,10 +80,9 @@ LEAST_INFORMATIVE = 0.1
 INCONSISTENCY_RATIO = 1.9
 """Cut-off of the ratio of held-out inconsistencies above which the likelihood's policy is refuted.
 
-For Gaussian residuals of unknown variance the logarithm of that ratio, times n/2, is the log-likelihood ratio. It holds
-for half of the samples in other than the uniform component: with a share q the cut-off is ``1.9^min(1, 2q)``, since
-the likelihood also fits the position along the sphere, and so has to be less consistent. Changes of the learners moved
-it from 1.35 over 2.1 to 1.9.
+For Gaussian residuals of unknown variance the logarithm of that ratio, times n/2, is the log-likelihood ratio. With a
+share q of the samples in other than the uniform component the cut-off is ``1.9^min(1, 2q)``: the likelihood also fits
+their positions along the sphere, at the expense of consistency. It was 1.35, then 2.1, as the learners changed.
 """
 
 NEGLIGIBLE_RESIDUAL = 0.05

@@ -75,8 +75,8 @@ def mixture_of(samples: Samples, policy: Array, steps: int = 20) -> tuple[float,
 def free_probability(samples: Samples, policy: Array, variance: float, mixture: Array) -> Array:
     """Posterior probability that each sample was free, with a mixture for each demonstration, shape (N,).
 
-    A demonstration's mixing proportions have a Dirichlet prior around the pooled ones. Spreads below the noise cannot
-    be told from free and count as free.
+    A demonstration's mixing proportions have a Dirichlet prior around the pooled ones. Spreads below the noise are
+    indistinguishable from free, and count as free.
     """
     place = distances(samples.actions, policy)
     count = int(samples.groups.max()) + 1
@@ -176,7 +176,7 @@ class _GaussNewton:
         at_end, turned = free / (noise * along), tangential / across
         points = turned[:, None] * (self.policy + place.turn) + at_end[:, None] * samples.actions
         points /= np.maximum(turned + at_end, 1e-300)[:, None]
-        spread, worth = self._prior()
+        spread, factor = self._prior()
         part = slice(None) if rows is None else rows
         some = samples if rows is None else samples[rows]
         evidence = inconsistency(some.moments(target[part, None] * normal[part], radial[part]))
@@ -184,7 +184,7 @@ class _GaussNewton:
         risk = some.risk(samples.actions[part], np.full(len(some), 1.0 / (spread * along)))
         counted = float(some.counts.sum() / samples.counts.sum())
         smooth = self.smoothness.prior(counted)
-        return Posterior(evidence, worth * risk + smooth)
+        return Posterior(evidence, factor * risk + smooth)
 
     def _prior(self) -> tuple[float, Array]:
         """Variance per coordinate of the constrained actions about the policy, and unit-information factors (M,)."""
