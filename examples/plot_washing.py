@@ -12,7 +12,7 @@ millimetres of noise on the tracked sponge; ``unconstrain demo`` does the same w
 # Demonstrate
 # -----------
 #
-# One wish moves the sponge on all plates: circle, come back to a height, press down. Each plate takes away what
+# One policy moves the sponge on all plates: circle, come back to a height, press down. Each plate takes away what
 # points into it. The two plates in pink are kept for the test.
 
 import matplotlib.pyplot as plt
@@ -59,8 +59,9 @@ policies = {
 # Test on the plates that nobody learnt from
 # ------------------------------------------
 #
-# nCPE is the error along the plate, nUPE the error of the wish itself. Direct regression averages the plates into the
-# skill: it learns that the sponge likes to stay where the plates were. The other two learn what all plates share.
+# nCPE is the error along the plate, nUPE the error of the unconstrained policy. Direct regression averages the plates
+# into the skill: it learns that the sponge likes to stay where the plates were. The other two learn what all plates
+# share.
 
 print(f"{'method':15}{'plate':>16}{'nCPE':>9}{'nUPE':>9}")
 for method, policy in policies.items():

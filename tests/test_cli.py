@@ -210,7 +210,7 @@ def test_inspect_shows_a_line_for_each_demonstration(files):
     assert lines[1].split() == ["swing_0", "40", "1.95", "s", "20.0", "Hz", "0.0%", "none", "none", "0"]
     assert [line.split()[0] for line in lines[1:9]] == [f"swing_{number}" for number in range(8)]
     assert lines[9] == "columns: x, y, vx, vy"
-    assert lines[10] == "fit takes x, y as states and vx, vy as actions."
+    assert lines[10] == "fit uses x, y as states and vx, vy as actions."
     assert max(map(len, lines)) <= 80
 
 
@@ -327,7 +327,7 @@ def test_what_is_missed_where_held_out_is_said_in_a_note(tmp_path):
     given = ["fit", str(tmp_path / "*.csv"), "-o", str(tmp_path / "p.npz"), "--model", "rbf"]
     result = CliRunner().invoke(cli.main, [*given, "--learner", "inconsistency"])
     assert result.exit_code == 0
-    assert "Note: much is missed where held out." in result.stderr, result.output
+    assert "Note: much of the held-out motion is unexplained." in result.stderr, result.output
 
 
 def test_a_policy_is_no_recording(policy, tmp_path):
@@ -425,7 +425,7 @@ def test_archives_are_read(tmp_path):
     assert_learnt_the_policy(tmp_path / "p.npz")
 
 
-def test_what_was_mended_is_said_in_a_note(tmp_path):
+def test_what_was_repaired_is_said_in_a_note(tmp_path):
     pattern = circle(tmp_path)
     track = np.loadtxt(tmp_path / "circle_0.csv", delimiter=",", skiprows=1)
     track[600:, 0] += 3.0
@@ -721,7 +721,7 @@ def test_an_unknown_group_or_time_is_answered_with_the_columns_there_are(files, 
         ),
         (
             ("--alpha", "0.1", "--softness", "0.1"),
-            "--alpha: chooses a threshold, and --softness does without one; give one of the two.",
+            "--alpha: got --softness too, expected one of them; a softened split has no threshold to choose.",
         ),
         (("--centres", "9"), "--centres: belongs to --model rbf, got --model local."),
         (("--model", "rbf", "--variance", "1"), "--variance: belongs to --model local, got --model rbf."),
@@ -769,7 +769,7 @@ def test_a_policy_file_that_is_not_ours_is_refused(files, tmp_path, command):
         ("", "a folder, expected a policy file."),
         ("pickle.npz", "is no policy file, or a damaged one. Expected a file that save() wrote."),
         ("plain.npz", "was not written by unconstrain. Expected a file that save() wrote."),
-        ("new.npz", "holds a policy that has learnt nothing yet. Fit it before saving."),
+        ("new.npz", "holds a policy that is not fitted. Fit it before saving."),
     ):
         path = tmp_path / name
         said = refused(*(word.format(policy=path, file=files[0]) for word in command))
@@ -1082,16 +1082,16 @@ def test_doctor_finds_everything_that_the_tests_need():
     assert run("doctor").rstrip().endswith("Everything is there.")
 
 
-def test_doctor_tells_how_to_mend_what_is_missing(monkeypatch):
+def test_doctor_tells_how_to_fix_what_is_missing(monkeypatch):
     from unconstrain.cli import doctor
     from unconstrain.paper import simulation
 
     versions = {"plotly": None}
     monkeypatch.setattr(doctor, "_version", lambda package: versions.get(package, "1.0"))
     monkeypatch.setattr(simulation, "backend", lambda: None)
-    mends = {one.what: one.mend for one in doctor.examine()}
-    assert mends["viz"] == "pip install 'unconstrain[viz]'"
-    assert mends["graphics"] == "apt-get install libegl1 libegl-mesa0"
+    fixes = {one.what: one.fix for one in doctor.examine()}
+    assert fixes["viz"] == "pip install 'unconstrain[viz]'"
+    assert fixes["graphics"] == "apt-get install libegl1 libegl-mesa0"
     assert run("doctor").rstrip().endswith("2 of 9 are missing something.")
     versions["mujoco"] = None
     assert {one.what: one.found for one in doctor.examine()}["graphics"] == "needs sim"

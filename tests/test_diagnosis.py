@@ -128,9 +128,9 @@ class TestWhatIsFound:
     @pytest.mark.parametrize(
         ("change", "said"),
         [
-            ({"method": "likelihood"}, "does not speak against it"),
+            ({"method": "likelihood"}, "does not refute it"),
             ({"method": "hybrid", "compared": {"likelihood": 3.0, "hybrid": 1.0}}, "3.00 times"),
-            ({"method": "noise-corrected", "noise_share": 0.5}, "cannot be told under so much noise"),
+            ({"method": "noise-corrected", "noise_share": 0.5}, "unknown under so much noise"),
             ({"noise_share": 0.2, "noise": 1.0, "jitter": 0.1}, "Only 0.1 of it changes from sample to sample"),
             ({"states_determined": 0.3}, "not rich enough"),
             ({"states_determined": 0.8}, "rich enough in most places"),
@@ -236,7 +236,7 @@ class TestPage:
 
     def test_the_page_of_a_robust_fit_says_what_is_not_known(self, fitted, browser, tmp_path):
         page = fit.policy_page(*fitted, "A policy")
-        assert "What is not known" in page
+        assert "Where the policy is not determined" in page
         assert [one["id"] for one in opened(browser, page, tmp_path)][-1] == "known-1"
 
     def test_a_fit_of_which_nothing_can_be_said_says_so(self):

@@ -22,8 +22,6 @@ MARKS = re.compile(
 
 LEFT_OUT = {
     # What a block says: why it is not run.
-    "class FixedSplit": "rewritten with the learners",
-    "class Trimmed": "rewritten with the learners",
     "states.cuda()": "needs a GPU",
     "load_rim_wiping(download=True": "needs the network",
     'Client("tcp://': "needs a cluster",

@@ -179,7 +179,7 @@ def test_support_tells_how_far_from_the_data_a_state_is(data):
 
 def test_features_without_a_place_have_no_support(data):
     policy = uc.ParametricPolicy(uc.Affine()).fit(data.states, data.actions)
-    with pytest.raises(SettingError, match="support: Affine does not say where its data was"):
+    with pytest.raises(SettingError, match=r"support: Affine has no support\(states\)"):
         policy.support(data.states)
 
 
@@ -258,7 +258,11 @@ class NoFeatures:
         (uc.LocallyLinearPolicy(centres=[[0, 0, 0]]), InvalidDataError, "states: got 2 columns, expected 3 as"),
         (uc.LocallyLinearPolicy(centres=[[0, 0], [1]]), InvalidDataError, "centres: the rows have different lengths"),
         (uc.LocallyLinearPolicy(variance=-1.0), SettingError, "variance: got -1.0, expected a number above 1e-100"),
-        (uc.LocallyLinearPolicy(at_least=1.5), SettingError, "at_least: got 1.5, expected a weight between 0 and 1"),
+        (
+            uc.LocallyLinearPolicy(at_least=1.5),
+            SettingError,
+            "at_least: got 1.5, expected a membership between 0 and 1",
+        ),
         (
             uc.ParametricPolicy(validation=uc.Folds(by="demonstration")),
             SettingError,

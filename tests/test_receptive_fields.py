@@ -93,8 +93,8 @@ def test_states_that_do_not_vary_have_variance_one(value):
     ("arguments", "error", "sentence"),
     [
         ((np.ones((2, 1)), 0.0), SettingError, "variance: got 0.0, expected a number above 1e-100"),
-        ((np.ones((2, 1)), 1.0, 1.0), SettingError, "at_least: got 1.0, expected a weight between 0 and 1"),
-        ((np.ones((2, 1)), 1.0, 0.0), SettingError, "at_least: got 0.0, expected a weight between 0 and 1"),
+        ((np.ones((2, 1)), 1.0, 1.0), SettingError, "at_least: got 1.0, expected a membership between 0 and 1"),
+        ((np.ones((2, 1)), 1.0, 0.0), SettingError, "at_least: got 0.0, expected a membership between 0 and 1"),
         (([[1.0], [np.nan]], 1.0), InvalidDataError, "states: found nan at row 1, column 0"),
     ],
 )

@@ -12,13 +12,14 @@ import naive
 import unconstrain as uc
 from samples import draw, samples_of
 from unconstrain.learners.hybrid import SOFTNESSES, chosen_softness
-from unconstrain.learners.robust.consistent import _not_refuted
-from unconstrain.learners.robust.likelihood import clearly_more
+from unconstrain.learners.robust.consistent import _nearest
+from unconstrain.learners.robust.constants import ANGULAR_SPREADS
+from unconstrain.learners.robust.likelihood import exceeds_error
 from unconstrain.learners.robust.noise import corrected, correlation_time, noise_by_differences
 from unconstrain.learners.robust.posterior import Posterior
 from unconstrain.learners.robust.segments import change_points, constrained_error, found_segments, projection_of
 from unconstrain.learners.robust.smoothness import Smoothness
-from unconstrain.learners.robust.sphere import SPREADS, beliefs, distances
+from unconstrain.learners.robust.sphere import distances, e_step
 from unconstrain.learners.thresholds import within_errors
 from unconstrain.risks.moments import gather
 from unconstrain.risks.objectives import vec
@@ -55,25 +56,25 @@ def test_on_the_sphere_the_normal_is_the_action_over_the_policys_length():
     assert_allclose(place.normal, data.actions / np.linalg.norm(data.policy, axis=1)[:, None], atol=1e-9)
 
 
-@pytest.mark.parametrize("only", [0, 3, len(SPREADS)])
+@pytest.mark.parametrize("only", [0, 3, len(ANGULAR_SPREADS)])
 def test_each_density_has_a_mass_of_one(only):
     axis = np.linspace(-2.5, 3.5, 601)  # two points for each standard deviation
     points = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
     policy = np.tile([1.0, 0.0], (len(points), 1))
-    mixture = np.eye(len(SPREADS) + 1)[only]
-    found = beliefs(points, policy, distances(points, policy), 0.02**2, mixture)
-    mass = np.exp(found.likelihood).sum() * (axis[1] - axis[0]) ** 2
+    mixture = np.eye(len(ANGULAR_SPREADS) + 1)[only]
+    found = e_step(points, policy, distances(points, policy), 0.02**2, mixture)
+    mass = np.exp(found.log_likelihood).sum() * (axis[1] - axis[0]) ** 2
     assert_allclose(mass, 1.0, atol=0.03)
-    near = found.likelihood > -100.0
+    near = found.log_likelihood > -100.0
     assert near.any()
-    assert_allclose(found.shares[near, only], 1.0)
+    assert_allclose(found.components[near, only], 1.0)
 
 
 def test_free_samples_and_constrained_ones_are_told_apart():
     policy = np.array([[1.0, 0.0], [1.0, 0.0]])
     actions = np.array([[1.01, 0.01], [0.5, 0.5]])
-    mixture = np.full(len(SPREADS) + 1, 1 / (len(SPREADS) + 1))
-    free = beliefs(actions, policy, distances(actions, policy), 0.02**2, mixture).free
+    mixture = np.full(len(ANGULAR_SPREADS) + 1, 1 / (len(ANGULAR_SPREADS) + 1))
+    free = e_step(actions, policy, distances(actions, policy), 0.02**2, mixture).free
     assert free[0] > 0.3
     assert free[1] < 1e-6
 
@@ -146,7 +147,7 @@ def test_the_two_covariances_add_up_to_the_inverse(seed, rank):
     rng = np.random.default_rng(seed)
     evidence, prior = random_quadratic(rng, 6, rank=rank), random_quadratic(rng, 6)
     prior = Quadratic(prior.hessian + np.eye(6), prior.linear, prior.constant)
-    from_noise, undetermined = Posterior(evidence, prior).spreads()
+    from_noise, undetermined = Posterior(evidence, prior).covariances()
     inverse = np.linalg.inv(evidence.hessian + prior.hessian)
     assert_allclose(from_noise + undetermined, inverse, atol=1e-7 * np.abs(inverse).max())
     assert_allclose(from_noise, inverse @ evidence.hessian @ inverse, atol=1e-7 * np.abs(inverse).max())
@@ -179,7 +180,7 @@ def test_the_proposed_softness_is_taken_unless_held_out_data_clearly_objects(err
     gap = np.array([-1.0, 1.0, -1.0, 1.0])
     worse = best + gap + errors * gap.std(ddof=1) / 2.0
     missed = np.column_stack([worse, best, best + 0.5 * gap + 0.01])
-    assert _not_refuted(missed, np.array([0.0, -7.0, 2.0])) == chosen
+    assert _nearest(missed, np.array([0.0, -7.0, 2.0])) == chosen
 
 
 def test_alpha_auto_is_a_softness():
@@ -255,9 +256,9 @@ def test_what_is_no_noise_is_not_smoothed():
 
 def test_one_fold_alone_does_not_make_an_end_more_probable():
     samples = samples_of(draw(samples=200), groups=np.arange(200) % 10)
-    assert clearly_more(samples, np.full(200, 0.1))
-    assert not clearly_more(samples, np.full(200, -0.1))
-    assert not clearly_more(samples, np.where(samples.folds == 3, 5.0, -0.1))
+    assert exceeds_error(samples, np.full(200, 0.1))
+    assert not exceeds_error(samples, np.full(200, -0.1))
+    assert not exceeds_error(samples, np.where(samples.folds == 3, 5.0, -0.1))
 
 
 # Segments

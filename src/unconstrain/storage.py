@@ -105,7 +105,7 @@ def load(path: str | os.PathLike[str]) -> Policy:
         policy = _unpack(_from_version_1(content) if header["version"] == 1 else content, arrays)
     except ModelFileError as error:
         raise ModelFileError(f"{path}: {error}") from error
-    # Whoever tampers with a file and mends its digest can make any constructor fail, in any way.
+    # A file that was tampered with, digest included, can make any constructor fail, in any way.
     except Exception as error:
         raise ModelFileError(f"{path}: the policy in it is not complete ({_said(error)}).") from error
     if not isinstance(policy, Policy):

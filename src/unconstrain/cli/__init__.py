@@ -56,7 +56,7 @@ def main() -> None:
 @options_for_reading
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
-    """Say what is in FILEs, such as rates, gaps and zero actions."""
+    """Describe each FILE: columns, rate, gaps, zero actions."""
     from ..recordings import survey, unique_names
 
     recipe = recipe_of(**reading)
@@ -94,7 +94,7 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     if first is None:
         raise ReadError(f"{', '.join(files)}: holds no recording.")
     try:
-        click.echo(f"fit takes {said_recipe(complete(recipe, first))}.")
+        click.echo(f"fit uses {said_recipe(complete(recipe, first))}.")
     except UnconstrainError as error:
         click.echo(f"fit needs to know more: {error}")
 
@@ -102,8 +102,8 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
 @main.command(epilog="\b\nExample:\n  unconstrain fit wipe_*.csv --state x,y,z --differentiate -o wipe.npz")
 @options_for_reading
 @click.option("-o", "--output", required=True, type=click.Path(dir_okay=False), help="File for the policy (.npz).")
-@click.option("--model", type=click.Choice(MODELS), default="local", show_default=True, help="What the policy is.")
-@click.option("--learner", type=click.Choice(LEARNERS), help="How it learns: robust, or hybrid on much data.")
+@click.option("--model", type=click.Choice(MODELS), default="local", show_default=True, help="Model of the policy.")
+@click.option("--learner", type=click.Choice(LEARNERS), help="Learner; by default robust, or hybrid on much data.")
 @click.option("--variance", type=float, help="Local: σ² of the receptive fields. By default from the data.")
 @click.option("--centres", type=click.IntRange(1), help="RBF: number of kernels, 25 by default.")
 @click.option("--alpha", type=Alpha(), help="Hybrid: weight of the standard risk in choosing the threshold, or auto.")
@@ -113,13 +113,13 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     type=float,
     default=0.0,
     show_default=True,
-    help="Let samples count by this power of their speed; 2 for noisy recordings.",
+    help="Weight samples by this power of their speed; 2 for noisy recordings.",
 )
 @click.option(
     "--folds", type=click.IntRange(2), default=10, show_default=True, help="Folds to choose the threshold on."
 )
 @click.option(
-    "--hold-out", type=click.Choice(["auto", "demonstration", "sample"]), default="auto", help="What a fold holds."
+    "--hold-out", type=click.Choice(["auto", "demonstration", "sample"]), default="auto", help="Unit of a fold."
 )
 @click.option("--report", type=click.Path(dir_okay=False), help="Also write an HTML report there.")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on the dask cluster of this scheduler.")
@@ -139,9 +139,9 @@ def fit(
     scheduler: str | None,
     **reading: Any,
 ) -> None:
-    """Learn a policy from the demonstrations in FILEs.
+    """Learn a policy from the demonstrations in each FILE.
 
-    What does not fit into memory is read twice, one file or block at a time.
+    Data larger than memory is read twice, one file or block at a time.
     """
     from .. import storage
     from ..recordings import expand
@@ -173,9 +173,9 @@ def fit(
 @click.option("--plane", type=Numbers(), help="Normal of the plane that was held, for the constrained error.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def score(policy: str, files: Sequence[str], plane: tuple[float, ...] | None, as_json: bool) -> None:
-    """Say how well POLICY explains the demonstrations in FILEs.
+    """Score how well POLICY explains the demonstrations in each FILE.
 
-    They are prepared as those were that it learnt from.
+    They are prepared as the training data of the policy was.
     """
     from .. import storage
     from ..evaluation import metrics
@@ -203,7 +203,7 @@ def score(policy: str, files: Sequence[str], plane: tuple[float, ...] | None, as
 
 @main.command(epilog="\b\nExample:\n  unconstrain rollout wipe.npz --start 0.1,0,0 --plane 0,0.3,1 -o path.csv")
 @click.argument("policy", type=click.Path())
-@click.option("--start", type=Numbers(), required=True, help="Where to start, one number for each state.")
+@click.option("--start", type=Numbers(), required=True, help="Initial state, one number for each state column.")
 @click.option("--steps", type=click.IntRange(1), default=200, show_default=True, help="Number of samples.")
 @click.option("--dt", type=float, default=0.02, show_default=True, help="Seconds between samples.")
 @click.option("--plane", type=Numbers(), help="Normal of a plane to stay on.")
@@ -218,7 +218,7 @@ def score(policy: str, files: Sequence[str], plane: tuple[float, ...] | None, as
 def rollout(
     policy: str, start: tuple[float, ...], steps: int, dt: float, plane: tuple[float, ...] | None, output: str
 ) -> None:
-    """Follow POLICY, freely or on a plane, and write it as CSV."""
+    """Roll POLICY out, freely or on a plane, and write it as CSV."""
     from .. import motion, storage
 
     learnt, recipe = _fitted(policy), storage.load_notes(policy).get("recipe", {})
@@ -229,7 +229,7 @@ def rollout(
     states = recipe.get("states") or [f"x{i + 1}" for i in range(len(start))]
     try:
         support = learnt.support(path.states)
-    except SettingError:  # an affine policy, say, is at home everywhere
+    except SettingError:  # an affine policy has no support
         support = None
     table = _csv(["t", *states, *(f"v{name}" for name in states)], path)
     if output == "-":
@@ -246,7 +246,7 @@ def rollout(
 @main.command(epilog="\b\nExample:\n  unconstrain export wipe.npz -o wipe.c --name wipe")
 @click.argument("policy", type=click.Path())
 @click.option("-o", "--output", required=True, type=click.Path(dir_okay=False), help="File that ends in .c or .onnx.")
-@click.option("--name", help="C: what its function and macro begin with, policy by default.")
+@click.option("--name", help="C: prefix of functions and macros, policy by default.")
 def export(policy: str, output: str, name: str | None) -> None:
     """Write POLICY as C99 source or as an ONNX graph."""
     kind = Path(output).suffix.lower()
@@ -265,7 +265,7 @@ def export(policy: str, output: str, name: str | None) -> None:
 @main.command(epilog="\b\nExample:\n  unconstrain reproduce table1 --trials 100 --out results")
 @click.argument("experiment", type=click.Choice(experiments.NAMES))
 @click.option("--trials", type=click.IntRange(1), help="Data sets; the paper's number by default.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of everything random.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of all random numbers.")
 @click.option("--only", multiple=True, help="Of regimes: a system, a constraint, or both, such as 'limit cycle, half'.")
 @click.option(
     "--workers", type=int, default=-1, help="Processes; one for each core by default. The numbers do not depend on it."
@@ -280,7 +280,7 @@ def export(policy: str, output: str, name: str | None) -> None:
 def reproduce(experiment: str, trials: int | None, seed: int, only: tuple[str, ...], workers: int, out: str) -> None:
     """Run one of the paper's experiments, beside its printed values.
 
-    An interrupted run goes on where it stopped.
+    An interrupted run continues where it stopped.
     """
     from ..paper.experiments.journal import Journal
 
@@ -312,14 +312,14 @@ def reproduce(experiment: str, trials: int | None, seed: int, only: tuple[str, .
 @click.option("--real", is_flag=True, help="Learn from recorded wiping of a car rim, leaving one tilt out at a time.")
 @click.option("--download", is_flag=True, help="Fetch those recordings (3 MB) if they are not there.")
 @click.option("--plate", type=Numbers(), help="TILT_X,TILT_Y of a further plate to wipe, degrees.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the simulated demonstrator.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the simulation.")
 @click.option(
     "--out", type=click.Path(file_okay=False), default="demo", show_default=True, help="Folder for the report."
 )
 def demo(real: bool, download: bool, plate: tuple[float, ...] | None, seed: int, out: str) -> None:
-    """Wash a car: learn on some surfaces, be tested on others.
+    """Wash a car: learn on some surfaces, test on others.
 
-    Writes a report to look at.
+    Writes a report (HTML).
     """
     from ..paper.experiments import washing
 
@@ -341,15 +341,15 @@ def demo(real: bool, download: bool, plate: tuple[float, ...] | None, seed: int,
 @main.command(epilog="\b\nExample:\n  unconstrain doctor")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def doctor(as_json: bool) -> None:
-    """Say what is installed, what is missing, and the command that mends it."""
+    """List what is installed, what is missing, and how to install it."""
     from .doctor import examine
 
     found = examine()
     if as_json:
-        click.echo(json.dumps([one._asdict() for one in found], indent=2))
+        click.echo(json.dumps([one.to_json() for one in found], indent=2))
         return
-    print_table(["what", "for", "found", "to mend it"], [list(one) for one in found])
-    missing = sum(bool(one.mend) for one in found)
+    print_table(["what", "for", "found", "fix"], [list(one) for one in found])
+    missing = sum(bool(one.fix) for one in found)
     click.echo("Everything is there." if not missing else f"{missing} of {len(found)} are missing something.")
 
 
@@ -361,7 +361,7 @@ def _fitted(path: str) -> Policy:
 
     policy = storage.load(path)
     if not hasattr(policy, "solution_"):
-        raise ModelFileError(f"{path}: holds a policy that has learnt nothing yet. Fit it before saving.")
+        raise ModelFileError(f"{path}: holds a policy that is not fitted. Fit it before saving.")
     return policy
 
 

@@ -1,4 +1,4 @@
-"""``unconstrain diagnose``: what the recordings tell, what they do not, and what to record next."""
+"""``unconstrain diagnose``: what recordings determine, and what to record next."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST_ROWS = 8
 
 @click.command(epilog="\b\nExample:\n  unconstrain diagnose wipe_*.csv --state x,y,z --by savgol -o a.html")
 @options_for_reading
-@click.option("--model", type=click.Choice(MODELS), default="local", show_default=True, help="What the policy is.")
+@click.option("--model", type=click.Choice(MODELS), default="local", show_default=True, help="Model of the policy.")
 @click.option("--variance", type=float, help="Local: σ² of the receptive fields. By default from the data.")
 @click.option("--centres", type=click.IntRange(1), help="RBF: number of kernels, 25 by default.")
 @click.option("-o", "--report", type=click.Path(dir_okay=False), help="Also write an HTML page there.")
@@ -37,9 +37,9 @@ def diagnose(
     as_json: bool,
     **reading: Any,
 ) -> None:
-    """Say what FILEs do not tell, and what to record next.
+    """Report noise, undetermined states, and what to record next.
 
-    How much noise there is, where the constraints varied too little, and which demonstrations look free.
+    Learns from each FILE, and also reports where constraints vary too little and which demonstrations look free.
     """
     from .. import evaluation
     from ..learners import Robust
@@ -73,7 +73,7 @@ def _say(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> Non
     for line in sentences(found, states, actions):
         click.echo(line)
     shown = found.regions[:MOST_ROWS]
-    click.echo(f"\nThe {len(shown)} least known of {len(found.regions)} regions, least known first:")
+    click.echo(f"\nThe {len(shown)} regions of largest undetermined spread, of {len(found.regions)}, largest first:")
     head = ["demonstrate around", "in", "samples", "determined", "spread", "leave free"]
     rows = [
         [named(one.state, states), one.demonstration, str(one.samples), f"{one.determined:.0%}", f"{one.along:.1%}",
@@ -82,7 +82,7 @@ def _say(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> Non
     ]  # fmt: skip
     print_table(head, rows)
     free = sorted(found.movements, key=lambda one: -(one.free or 0.0))
-    click.echo("\nProbability that a sample was free, mean by demonstration, freest and most constrained:")
+    click.echo("\nMean probability that a sample was free, of the freest and the most constrained demonstrations:")
     ends = free if len(free) <= MOST_ROWS else [*free[: MOST_ROWS // 2], *free[-MOST_ROWS // 2 :]]
     print_table(
         ["demonstration", "samples", "free", "determined"],

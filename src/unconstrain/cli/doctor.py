@@ -1,4 +1,4 @@
-"""What is installed, what is missing, and the command that mends it."""
+"""What is installed, what is missing, and the command that installs it."""
 
 from __future__ import annotations
 
@@ -34,18 +34,22 @@ class Finding(NamedTuple):
     what: str
     serves: str
     found: str
-    mend: str
+    fix: str
+
+    def to_json(self) -> dict[str, str]:
+        """With the keys of ``doctor --json``, which programs may rely on."""
+        return {"what": self.what, "serves": self.serves, "found": self.found, "mend": self.fix}
 
 
 def examine() -> list[Finding]:
-    """Look at Python, the extras, and what the scene can be rendered with."""
+    """Find the versions of Python and the extras, and the back-end that renders the scene."""
     found = [Finding("Python", "everything", platform.python_version(), "")]
     for extra, packages in EXTRAS.items():
         versions = {package: _version(package) for package in packages}
         missing = [package for package, number in versions.items() if number is None]
         said = ", ".join(f"{package} {number or 'missing'}" for package, number in versions.items())
-        mend = f"pip install 'unconstrain[{extra}]'" if missing else ""
-        found.append(Finding(extra, SERVES[extra], said, mend))
+        fix = f"pip install 'unconstrain[{extra}]'" if missing else ""
+        found.append(Finding(extra, SERVES[extra], said, fix))
     return [*found, _graphics()]
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
 MODELS = ("local", "rbf", "linear")
 
 MUCH = 200_000_000
-"""Bytes of data beyond which the samples are not kept in memory, and so not looked at by the default learner."""
+"""Bytes of data above which samples are not kept in memory, and the default learner is the hybrid."""
 
 
 class Alpha(click.ParamType):  # type: ignore[type-arg]
@@ -41,22 +41,22 @@ def default_learner(
     softness: float | None,
     speed_power: float,
 ) -> str:
-    """Which learner is meant where none is named."""
+    """The learner where none is named."""
     if scheduler is not None or alpha is not None or softness is not None or speed_power:
         return "hybrid"
     size = sum(Path(path).stat().st_size for path in paths if Path(path).is_file())
     if size <= MUCH:
         return "robust"
     click.echo(
-        f"Note: {size / 1e6:.0f} MB of data are not kept in memory, so this is --learner hybrid; on a part of them "
-        "--learner robust may do better.",
+        f"Note: {size / 1e6:.0f} MB of data are not kept in memory, so this uses --learner hybrid; --learner robust "
+        "on a part of the data may be better.",
         err=True,
     )
     return "hybrid"
 
 
 def learner_of(name: str, alpha: float | Literal["auto"] | None, softness: float | None) -> Any:
-    """Make the learner that the options say."""
+    """Make the learner of the options."""
     from ..learners import Direct, Hybrid, Inconsistency, Robust
 
     given = {key: value for key, value in (("alpha", alpha), ("softness", softness)) if value is not None}
@@ -65,7 +65,9 @@ def learner_of(name: str, alpha: float | Literal["auto"] | None, softness: float
             raise SettingError(f"--{next(iter(given))}: belongs to the hybrid learner, got --learner {name}.")
         return {"direct": Direct, "inconsistency": Inconsistency, "robust": Robust}[name]()
     if alpha is not None and softness:
-        raise SettingError("--alpha: chooses a threshold, and --softness does without one; give one of the two.")
+        raise SettingError(
+            "--alpha: got --softness too, expected one of them; a softened split has no threshold to choose."
+        )
     # A softened split needs no threshold on top.
     return Hybrid(**given, threshold=0.0 if softness else None)  # type: ignore[arg-type]
 
@@ -80,7 +82,7 @@ def check_writable(outputs: Sequence[str | None], paths: Sequence[str | Path]) -
 
 
 def policy_of(model: str, variance: float | None, centres: int | None, **chosen: Any) -> Policy:
-    """Make the policy that the options say."""
+    """Make the policy of the options."""
     from .. import policies
     from ..models import Affine, KMeansRBF
 
@@ -94,9 +96,9 @@ def policy_of(model: str, variance: float | None, centres: int | None, **chosen:
 
 
 def check_speed_power(learner: str, speed_power: float) -> None:
-    """Refuse to weigh samples by their speed twice."""
+    """Refuse to weight samples by their speed twice."""
     if learner == "robust" and speed_power:
-        raise SettingError("--speed-power: the robust learner weighs speed itself; give another --learner with it.")
+        raise SettingError("--speed-power: the robust learner weights by speed itself; give another --learner with it.")
 
 
 def learn(policy: Policy, stream: Stream, scheduler: str | None) -> None:

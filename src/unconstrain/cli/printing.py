@@ -1,4 +1,4 @@
-"""What goes to the terminal: tables, progress, notes, errors in one sentence."""
+"""Output on the terminal: tables, progress bars, notes, and errors in one sentence."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
 
 
 class Group(click.Group):
-    """Turns our errors, and those of the file system, into one sentence and exit code 2."""
+    """Reports our errors, and those of the file system, in one sentence, with exit code 2."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command."""
@@ -38,7 +38,7 @@ class Group(click.Group):
         except UnconstrainError as error:
             said = str(error)
         except OSError as error:
-            if error.errno == errno.EPIPE:  # whoever read our output has seen enough; click leaves quietly
+            if error.errno == errno.EPIPE:  # the reader of our output has closed it; click exits quietly
                 raise
             said = f"{error.filename}: {error.strerror}." if error.filename and error.strerror else str(error)
         if said:
@@ -90,9 +90,9 @@ def _cell(value: Any) -> str:
 
 
 def say_fit(policy: Policy, stream: Stream | None, learner: str) -> None:
-    """Say what was learnt, how much the data determined, and how well it holds where held out.
+    """Print the solution, the share that the data determined, and the held-out inconsistency.
 
-    Without a stream nothing is said that would need to look at the samples again.
+    Without a stream, whatever needs a further pass over the samples is left out.
     """
     solution = policy.solution_
     models = f", {len(solution.weights)} local models" if len(solution.weights) > 1 else ""
@@ -115,25 +115,25 @@ def say_fit(policy: Policy, stream: Stream | None, learner: str) -> None:
             click.echo("Note: nothing was determined, so this is the same as --learner direct.", err=True)
     held_out = 1.0 - policy.held_out_score()
     click.echo(
-        "share of the observed motion that it misses (inconsistency): "
+        "share of the observed motion left unexplained (inconsistency): "
         + ("" if stream is None else f"{training:.4g} on the training data, ")
         + (f"{held_out:.4g} where held out." if isfinite(held_out) else "nothing could be held out.")
     )
     if stream is not None and held_out > 0.05 + 2.0 * training:
         faster = "" if learner == "robust" else "--speed-power 2 or "
         click.echo(
-            f"Note: much is missed where held out. Against noise at low speed a wider --window, {faster}"
-            "--still help; otherwise the demonstrations may have too little in common.",
+            "Note: much of the held-out motion is unexplained. If the noise at low speed is large, try a wider "
+            f"--window, {faster}--still; otherwise the demonstrations may have too little in common.",
             err=True,
         )
 
 
 def _said_of_samples(solution: Solution) -> str:
-    """Which way a robust learner went, and what it thinks of the samples."""
+    """The candidate that a robust learner took, and its estimates of noise and free samples."""
     ways = {
-        "likelihood": "by likelihood: samples look free, or constrained at random",
-        "noise-corrected": "by consistency, with the noise taken out: constraints go with the state",
-        "hybrid": "by consistency, softened: there is little noise to take out",
+        "likelihood": "by maximum likelihood: samples look free, or constrained at random",
+        "noise-corrected": "by noise-corrected consistency: constraints look like a function of the state",
+        "hybrid": "by softened consistency: the residuals are not noise",
     }
     return (
         f"Learnt {ways.get(solution.method, solution.method)}. Noise and misfit are about {solution.noise:.3g} on "
@@ -143,15 +143,15 @@ def _said_of_samples(solution: Solution) -> str:
 
 
 def _walked(policy: Policy, stream: Stream) -> tuple[int, int, float]:
-    """Numbers of demonstrations and samples, and the share of their motion that is missed, without weights."""
-    names, samples, missed, moved = set(), 0, 0.0, 0.0
+    """Numbers of demonstrations and samples, and the unexplained share of their motion, without sample weights."""
+    names, samples, unexplained, energy = set(), 0, 0.0, 0.0
     for name, demonstration in stream.named_demonstrations():
         names.add(name)
         samples += len(demonstration)
         motion = float((demonstration.actions**2).sum())
-        moved += motion
-        missed += motion * (1.0 - policy.score(demonstration.states, demonstration.actions))
-    return len(names), samples, missed / moved if moved > 0 else 1.0
+        energy += motion
+        unexplained += motion * (1.0 - policy.score(demonstration.states, demonstration.actions))
+    return len(names), samples, unexplained / energy if energy > 0 else 1.0
 
 
 def number(value: Any, form: str) -> str:

@@ -1,4 +1,4 @@
-"""What the options say about files: patterns, columns, how to prepare them."""
+"""Options for reading files: columns and preparation."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]
 
 
 def options_for_reading(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options that say how files are to be understood."""
+    """Add the options for reading and preparing files."""
     for option in reversed(
         [
             click.argument("files", nargs=-1, required=True, metavar="FILE..."),
@@ -56,7 +56,7 @@ def options_for_reading(command: Callable[..., Any]) -> Callable[..., Any]:
                 help="How to differentiate, savgol by default; implies --differentiate.",
             ),
             click.option("--window", type=float, help="Smoothing window of savgol, seconds."),
-            click.option("--still", type=float, help="Leave out what is slower than this at start and end."),
+            click.option("--still", type=float, help="Trim what is slower than this at start and end."),
             click.option("--rate", type=float, help="Resample to this many samples a second."),
             click.option("--centre", is_flag=True, help="States relative to the mean of each demonstration."),
             click.option("--group", help="Column that names the demonstration."),
@@ -78,7 +78,7 @@ def recipe_of(
     still: float | None = None,
     **_: Any,
 ) -> Recipe:
-    """How the options say that recordings are to be prepared."""
+    """The recipe of the options."""
     from ..recordings import Recipe
 
     if differentiate or by:

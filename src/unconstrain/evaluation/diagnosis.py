@@ -1,4 +1,4 @@
-"""What a robust fit knows of its demonstrations, what it does not, and what to record next."""
+"""Diagnosis of a robust fit: noise, undetermined states, free demonstrations, and what to record next."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InvalidDataError
-from ..learners import HIDDEN, Solution, noise_by_differences
+from ..learners import SPHERE_HIDDEN_BY_NOISE, Solution, noise_by_differences
 from ..models import choose_variance, cover
 from ..recordings import Demonstration, stack, unique_names
 
@@ -19,37 +19,37 @@ if TYPE_CHECKING:
     from ..policies import Policy
 
 SMALL = 0.1
-"""An undetermined spread below this share of the typical action does not count."""
+"""An undetermined spread below this share of the typical action is negligible."""
 
 MISFIT = 1.5
-"""Noise of this many times the jitter is a misfit of the model, for the most part."""
+"""Residuals above this many times the noise by differences in time are mostly misfit of the model."""
 
 FREE, CONSTRAINED = 0.5, 0.1
-"""Above and below these mean probabilities of a free sample, a demonstration looks free and constrained."""
+"""A demonstration looks free above the first, and constrained below the second mean probability of free samples."""
 
 
 @dataclass(frozen=True)
 class Region:
-    """A part of state space, and the recorded state in it at which least is known of the policy.
+    """A region of state space, and the recorded state in it of largest undetermined spread.
 
     Parameters
     ----------
     centre : tuple of float
         Of the receptive field, in units of the state.
     samples : int
-        Of which this field is the nearest.
+        Number of samples whose nearest field this is.
     determined : float
-        Share of them at which the policy is determined.
+        Share of these samples at which the policy is determined.
     spread : float
-        Root-mean-square undetermined spread over them, as a share of the typical action.
+        Root-mean-square undetermined standard deviation over them, as a share of the typical action.
     state : tuple of float
-        Where it is largest.
+        Recorded state at which it is largest.
     demonstration : str
-        In which that was recorded.
+        Demonstration of that state.
     direction : tuple of float
-        Unit vector of the actions of which least is known there.
+        Unit vector of actions along which it is largest there.
     along : float
-        Standard deviation of the policy along it there, undetermined part, as a share of the typical action.
+        Undetermined standard deviation along it, as a share of the typical action.
     """
 
     centre: tuple[float, ...]
@@ -75,36 +75,36 @@ class Movement:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What is known of the policy, and what is not.
+    """Where the policy is determined by the data, and where it is not.
 
     Parameters
     ----------
     method : str
         Which candidate :class:`~unconstrain.Robust` took.
     compared : dict
-        Each candidate's held-out inconsistency over that on noise-corrected moments.
+        Ratio of each candidate's held-out inconsistency to that of noise-corrected moments.
     refuted : bool
-        Whether that of the most probable policy was too far above.
+        Whether that ratio is above the cut-off for the most probable policy.
     noise : float
         Standard deviation of the noise on each action coordinate, misfit of the model included; units of the action.
     noise_share : float
-        Of all coordinates together, over the typical action.
+        Noise of all coordinates together, as a share of the typical action.
     jitter : float
-        The noise by differences in time, which know no model; infinite where demonstrations are too short. Too large
-        where constraints change at every sample.
+        Noise by differences in time, independent of the model; infinite where demonstrations are too short, and biased
+        upwards where constraints change at every sample.
     typical : float
         Root mean square length of the recorded actions.
     directions : int
         Weight directions, of all models together.
     directions_determined : float
-        Share of them in which the data says more than the prior.
+        Share of them in which the data has more than half of the posterior precision.
     states_determined : float
         Share of the recorded states at which the undetermined spread is below that from noise, or below a tenth of
         the typical action.
     free_share : float
         Estimated share of samples that nothing constrained.
     regions : tuple of Region
-        All, the least known first.
+        All, by decreasing undetermined spread.
     movements : tuple of Movement
         Each demonstration.
     undetermined, from_noise : ndarray, shape (N,)
@@ -131,7 +131,7 @@ class Diagnosis:
     free: Array | None
 
     def to_json(self) -> dict[str, Any]:
-        """All but what there is for each sample; None for what is not finite."""
+        """All fields but those with one value a sample; None for what is not finite."""
         plain = {one.name: getattr(self, one.name) for one in fields(self)}
         kept = {name: value for name, value in plain.items() if name not in ("undetermined", "from_noise", "free")}
         kept["jitter"] = self.jitter if np.isfinite(self.jitter) else None
@@ -139,24 +139,24 @@ class Diagnosis:
 
 
 def diagnose(policy: Policy, demonstrations: Sequence[Demonstration]) -> Diagnosis:
-    """Say what a policy fitted with :class:`~unconstrain.Robust` knows at the states of some demonstrations.
+    """Diagnose a policy fitted with :class:`~unconstrain.Robust` at the states of some demonstrations.
 
     Parameters
     ----------
     policy : Policy
     demonstrations : sequence of Demonstration
-        What it was fitted to, in the same order, or others.
+        Those it was fitted to, in the same order, or others.
 
     Raises
     ------
     SettingError
-        If the learner does not look at samples.
+        If the learner does not use the samples.
     InvalidDataError
         If there is one action column only, no motion, or too little data to hold anything out.
     """
     solution, demos = policy.solution_, list(demonstrations)
     states, actions, groups = stack(demos)
-    spread, belief = policy.uncertainty(states), solution.believed  # says what to do where the learner cannot tell
+    spread, belief = policy.uncertainty(states), solution.believed  # raises where the learner has none
     typical = _typical(actions, solution)
     undetermined, from_noise = (
         np.linalg.norm(one, axis=1) / typical for one in (spread.undetermined, spread.from_noise)
@@ -185,15 +185,15 @@ def diagnose(policy: Policy, demonstrations: Sequence[Demonstration]) -> Diagnos
 
 
 def _typical(actions: Array, solution: Solution) -> float:
-    """Root mean square length of the actions; refuses what has nothing to diagnose."""
+    """Root-mean-square length of the actions; raises where nothing can be diagnosed."""
     typical = float(np.sqrt((actions**2).sum(axis=1).mean()))
     if actions.shape[1] == 1:
         raise InvalidDataError(
-            "got one action column, expected at least two: in one dimension a constraint takes all or nothing, "
-            "and there is nothing to tell apart."
+            "got one action column, expected at least two: in one dimension a constraint removes all of the action "
+            "or nothing."
         )
     if typical == 0.0:
-        raise InvalidDataError("all actions are zero, expected some motion: nothing can be said about a policy.")
+        raise InvalidDataError("all actions are zero, expected some motion.")
     if np.isnan(solution.believed.held_out_score):
         raise InvalidDataError(
             "too little could be held out, expected at least two different samples or demonstrations in motion."
@@ -212,7 +212,7 @@ def _regions(
     ]
     found.sort(key=lambda one: -undetermined[one[1]].max())
     worst = [int(rows[undetermined[rows].argmax()]) for _, rows in found]
-    directions, along = _least_known(policy, states[worst])
+    directions, along = _least_determined(policy, states[worst])
     names = _names(demos)
     return tuple(
         Region(
@@ -229,8 +229,8 @@ def _regions(
     )
 
 
-def _least_known(policy: Policy, states: Array) -> tuple[Array, Array]:
-    """Direction of the actions (K, d) of which least is known, towards the prediction, and the spread along it (K,)."""
+def _least_determined(policy: Policy, states: Array) -> tuple[Array, Array]:
+    """Principal axes (K, d) of the undetermined covariance, towards the prediction, and the spreads along them (K,)."""
     values, vectors = np.linalg.eigh(policy.covariances(states))
     directions = vectors[:, :, -1]
     ahead = (directions * policy(states)).sum(axis=1) >= 0
@@ -263,7 +263,7 @@ def _numbers(values: Array) -> tuple[float, ...]:
 
 
 def sentences(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> list[str]:
-    """The diagnosis in plain words.
+    """The diagnosis in sentences.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ def sentences(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -
 
 def _about_noise(found: Diagnosis) -> str:
     verdict = "little" if found.noise_share < SMALL else "some" if found.noise_share < 3 * SMALL else "much"
-    hidden = " That hides most of what follows." if found.noise_share > HIDDEN else ""
+    hidden = " So much noise makes the following unreliable." if found.noise_share > SPHERE_HIDDEN_BY_NOISE else ""
     said = (
         f"Noise: {verdict}, {found.noise:.3g} on each action coordinate, {found.noise_share:.1%} of a typical action "
         f"({found.typical:.3g}) in all.{hidden}"
@@ -290,24 +290,24 @@ def _about_noise(found: Diagnosis) -> str:
     if found.noise_share < 0.5 * SMALL or found.noise < MISFIT * found.jitter:
         return said
     return said + (
-        f" Only {found.jitter:.3g} of it changes from sample to sample; the rest is what the model cannot follow; "
-        "a smaller --variance or --model rbf may."
+        f" Only {found.jitter:.3g} of it changes from sample to sample; the rest is misfit of the model, which a "
+        "smaller --variance or --model rbf may reduce."
     )
 
 
 def _about_method(found: Diagnosis) -> str:
-    """Which candidate was taken, and what speaks for it; see :class:`~unconstrain.Robust`."""
+    """The candidate that was taken, and the reason; see :class:`~unconstrain.Robust`."""
     if "likelihood" not in found.compared or len(found.compared) < 2:
         return f"Policy: learnt as {found.method}; nothing was compared with it."
     other = found.compared["likelihood"]
-    times = f"its inconsistency where held out is {other:.2f} times that on noise-corrected moments"
+    times = f"its held-out inconsistency is {other:.2f} times that of noise-corrected moments"
     if found.method == "likelihood":
-        return f"Policy: the most probable one if constraints vary at random: {times}, which does not speak against it."
+        return f"Policy: the most probable one if constraints vary at random: {times}, which does not refute it."
     corrected = found.method == "noise-corrected"
-    kind = "on moments without the noise" if corrected else "as what it misses goes on in time and is no noise"
-    why = "or it tells no more than consistency does"
-    if found.noise_share > HIDDEN:
-        why = "and so much noise hides how samples lie about their spheres"
+    kind = "from noise-corrected moments" if corrected else "softened, since its residuals are not noise"
+    why = "or nearly all samples are in its uniform component"
+    if found.noise_share > SPHERE_HIDDEN_BY_NOISE:
+        why = "and so much noise hides which samples are free"
     elif found.refuted:
         why = "so constraints do not seem to vary at random"
     return f"Policy: the consistent one, {kind}. The most probable one was not taken: {times}, {why}."
@@ -316,8 +316,8 @@ def _about_method(found: Diagnosis) -> str:
 def _about_variability(found: Diagnosis) -> str:
     share = found.states_determined
     verdict = "rich enough" if share > 0.95 else "rich enough in most places" if share > 0.7 else "not rich enough"
-    if found.noise_share > HIDDEN:
-        verdict = "cannot be told under so much noise"
+    if found.noise_share > SPHERE_HIDDEN_BY_NOISE:
+        verdict = "unknown under so much noise"
     return (
         f"Variability of the constraints: {verdict}. The data determines {found.directions_determined:.0%} of "
         f"{found.directions} weight directions, and the policy at {share:.0%} of the recorded states."
@@ -329,11 +329,11 @@ def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[st
     worst = found.regions[0]
     advice = (
         f"demonstrate around {named(worst.state, states)} with motion along {named(worst.direction, actions)} left "
-        f"free (policy known there to {worst.along:.0%} of a typical action, as in '{worst.demonstration}')."
+        f"free (standard deviation there: {worst.along:.0%} of a typical action; see '{worst.demonstration}')."
     )
     if not open_:
         return [f"Every recorded state is determined. If you record more: {advice}"]
-    where = f"{len(open_)} of {len(found.regions)} regions hold states at which the policy is not determined."
+    where = f"{len(open_)} of {len(found.regions)} regions have states at which the policy is not determined."
     return [where, f"What would help most: {advice}"]
 
 
@@ -345,7 +345,7 @@ def _about_freedom(found: Diagnosis) -> str:
     free, held = int((means > FREE).sum()), int((means < CONSTRAINED).sum())
     between = len(means) - free - held
     return f"Free: {share}. Of {len(means)} demonstrations, {free} look free and {held} constrained" + (
-        f"; {between} cannot be told." if between else "."
+        f"; {between} are uncertain." if between else "."
     )
 
 

@@ -1,4 +1,4 @@
-"""From what was observed to a solution: the paper's learners, and the robust ones."""
+"""Learners, from training data to a solution: those of the paper, and the robust ones."""
 
 from . import robust
 from .direct import Direct
@@ -6,11 +6,19 @@ from .hybrid import Hybrid
 from .inconsistency import Inconsistency
 from .learner import Learner
 from .named import named
-from .robust import HIDDEN, Likelihood, NoiseCorrected, Robust, Segments, Uncertainty, noise_by_differences
+from .robust import (
+    SPHERE_HIDDEN_BY_NOISE,
+    Likelihood,
+    NoiseCorrected,
+    Robust,
+    Segments,
+    Uncertainty,
+    noise_by_differences,
+)
 from .solution import Belief, Solution
 
 __all__ = [
-    "HIDDEN",
+    "SPHERE_HIDDEN_BY_NOISE",
     "Belief",
     "Direct",
     "Hybrid",

@@ -1,4 +1,4 @@
-"""Ordinary regression on what was observed."""
+"""Least-squares regression on the observed actions."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from .solution import Solution
 
 @dataclass(frozen=True)
 class Direct(Learner):
-    """Minimise the standard risk alone: ordinary regression on what was observed (eq. 5)."""
+    """Minimise the standard risk alone: least-squares regression on the observed actions (eq. 5)."""
 
     def learn(self, training: Training) -> Solution:
-        """Learn from the whole; nothing is left to choose."""
+        """Learn from all folds; there is no setting to choose."""
         whole = training.folds.whole
         models, d, p = whole.cross.shape
         spectrum, _ = eigensystem(whole.gram)

@@ -1,4 +1,4 @@
-"""Consistency first; then, in the directions that leaves undetermined, the standard risk."""
+"""The inconsistency first, then the standard risk in the directions that it leaves undetermined."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from .solution import Solution
 from .thresholds import Averaging, check_settings, judged, solve_at_threshold, within_errors
 
 AT_REST = 1e-3
-"""A demonstration whose mean square action is below this share of the largest has nothing to say of softness."""
+"""Demonstrations with a mean square action below this share of the largest are left out in choosing the softness."""
 
 SOFTNESSES = (1e-11, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.2, 0.3, 0.5, 1.0, 3.0)
-"""What ``Hybrid(alpha="auto")`` tries."""
+"""Softnesses among which ``Hybrid(alpha="auto")`` chooses."""
 
 
 @dataclass(frozen=True)
 class Hybrid(Learner):
-    """Minimise the inconsistency, then the standard risk where that leaves room (eqs 6 to 17).
+    """Minimise the inconsistency, then the standard risk in the directions left undetermined (eqs 6 to 17).
 
     Parameters
     ----------
@@ -46,12 +46,12 @@ class Hybrid(Learner):
         held-out data is within one standard error of the best.
     threshold : float, optional
         Use this λ_t, as a share of the largest eigenvalue, instead of
-        choosing. 0 leaves out rounding noise only.
+        choosing. 0 leaves out rounding errors only.
     softness : float
-        Soften "subject to being consistent" (eq. 6): the first objective is
-        ``E_i + softness E_2``. The paper splits hard, at 0. On noisy
-        recordings a tenth and ``threshold=0`` do better: every direction then
-        goes over from one objective to the other by degrees.
+        Replace the first objective of eq. 6 by ``E_i + softness E_2``. The
+        paper has 0, a hard split of the directions. On noisy recordings 0.1
+        with ``threshold=0`` is better: each direction is then a weighted
+        compromise of both objectives.
     """
 
     alpha: float | Literal["auto"] = 0.1
@@ -68,7 +68,7 @@ class Hybrid(Learner):
         check_settings(self.threshold, self.averaging)
 
     def learn(self, training: Training) -> Solution:
-        """Learn from the whole, at a threshold or with a softness chosen on the folds."""
+        """Learn from all folds, with a threshold or softness chosen by cross-validation."""
         folds = training.folds
         if self.alpha == "auto":
             return replace(self, alpha=0.0, threshold=0.0, softness=chosen_softness(folds)).learn(training)
@@ -86,16 +86,19 @@ def _score(alpha: float, moments: Moments) -> Quadratic:
 
 
 def chosen_softness(folds: FoldedMoments) -> float:
-    """The softness that ``alpha="auto"`` chooses, the same for all models."""
+    """The softness of ``alpha="auto"``, for all models: the largest by the one-standard-error rule.
+
+    The loss is the held-out inconsistency; see :func:`~.thresholds.within_errors`.
+    """
     rounds = folds.rounds()
     if not rounds:
         return SOFTNESSES[0]
     speeds = [held_out.energy.sum() / max(held_out.weight.sum(), 1e-300) for _, held_out in rounds]
-    missed = []
+    losses = []
     for (training, held_out), speed in zip(rounds, speeds, strict=True):
         if speed < AT_REST * max(speeds):
-            continue  # all noise: as a share of its motion it would outvote the others
+            continue  # all noise: relative to its motion its loss would outweigh the others'
         candidates = softened_minima(inconsistency(training), standard_risk(training), SOFTNESSES)
-        # Each round as a share of its own motion: a fast demonstration says no more than a slow one.
-        missed.append(judged(inconsistency(held_out), candidates).sum(axis=0) / max(held_out.energy.sum(), 1e-300))
-    return SOFTNESSES[within_errors(np.stack(missed)).max()]
+        # Each round relative to its own motion, so that fast demonstrations do not outweigh slow ones.
+        losses.append(judged(inconsistency(held_out), candidates).sum(axis=0) / max(held_out.energy.sum(), 1e-300))
+    return SOFTNESSES[within_errors(np.stack(losses)).max()]

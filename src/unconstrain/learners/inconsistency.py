@@ -1,4 +1,4 @@
-"""The distance after projection onto each recorded action."""
+"""Least squares after projection onto each recorded action."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class Inconsistency(Learner):
     Parameters
     ----------
     threshold : float, optional
-        Eigenvalues up to this share of the largest are left out and their
-        directions stay zero. 0 leaves out rounding noise only. None chooses
-        by the inconsistency on held-out data.
+        Truncate eigenvalues up to this share of the largest; weights along
+        their eigenvectors are zero. 0 leaves out rounding errors only. None
+        chooses by the inconsistency on held-out data.
     averaging
         See :class:`Hybrid`.
     """
@@ -32,7 +32,7 @@ class Inconsistency(Learner):
         check_settings(self.threshold, self.averaging)
 
     def learn(self, training: Training) -> Solution:
-        """Learn from the whole, at a threshold chosen on the folds."""
+        """Learn from all folds, at a threshold that is given or chosen by cross-validation."""
         return solve_at_threshold(
             training.folds, _path, inconsistency, self.threshold, self.averaging, method="inconsistency"
         )

@@ -1,4 +1,4 @@
-"""What every learner is."""
+"""Base class of the learners."""
 
 from __future__ import annotations
 
@@ -14,45 +14,45 @@ from .solution import Solution
 
 
 class Learner(Parameters, ABC):
-    """Turns what was observed into a solution. A learner of your own is one method.
+    """Computes a solution from training data. A subclass implements ``learn``.
 
     Learners are dataclasses; their fields are their settings.
     """
 
     needs_samples: ClassVar[bool] = False
-    """Whether it looks at ``training.samples``, which are then kept, or at the sums in ``training.folds`` alone."""
+    """Whether ``learn`` uses ``training.samples``, which are then kept, or the moments in ``training.folds`` only."""
 
     @abstractmethod
     def learn(self, training: Training) -> Solution:
-        """Learn from everything, choosing settings on the folds.
+        """Learn from all folds; choose settings, if any, by cross-validation over them.
 
         Parameters
         ----------
         training : Training
-            ``training.folds`` are the moments of each fold, over the features ``T_m φ``.
+            ``training.folds`` are the moments of each fold in the features ``T_m φ``.
 
         Returns
         -------
         Solution
-            With weights (M, d, p) over these features.
+            Weights (M, d, p) over these features.
         """
 
     def solve(self, training: Training) -> Solution:
-        """What was learnt, with weights over the features φ(x)."""
+        """The solution with weights over the features φ(x)."""
         return self.learn(training).over(training.model)
 
     def held_out_score(self, training: Training) -> float:
-        """Share of the motion in each fold that is explained by what is learnt from the others.
+        """Cross-validated share of the squared motion explained: one minus the inconsistency over the energy.
 
-        From the moments alone, each model by itself in its own field; NaN where there is nothing to hold out, or where
-        the learner needs the samples.
+        From the moments alone, each model evaluated in its own receptive field. NaN where nothing can be held out, or
+        where the learner needs the samples.
         """
         filled = training.folds.filled
         if self.needs_samples or len(filled) < 2:
             return float("nan")
-        missed = moved = 0.0
+        loss = energy = 0.0
         for i in filled:
             part, rest = training.folds.parts[i], training.of_folds([j for j in filled if j != i])
-            missed += float(np.clip(inconsistency(part)(vec(self.learn(rest).weights)), 0.0, None).sum())
-            moved += float(part.energy.sum())
-        return 1.0 - missed / moved if moved > 0 else float("nan")
+            loss += float(np.clip(inconsistency(part)(vec(self.learn(rest).weights)), 0.0, None).sum())
+            energy += float(part.energy.sum())
+        return 1.0 - loss / energy if energy > 0 else float("nan")

@@ -18,7 +18,7 @@ BY_NAME: dict[str, type[Learner]] = {
 
 
 def named(learner: Learner | str | None) -> Learner:
-    """The learner itself, or one with its default settings by name; :class:`~unconstrain.Hybrid` for None.
+    """The learner itself, or by name with its default settings; :class:`~unconstrain.Hybrid` for None.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a learner found, and what it believes of it."""
+"""Result of a learner: the weights, and a belief about noise, free samples and uncertainty."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ if TYPE_CHECKING:
 class Uncertainty(NamedTuple):
     """Standard deviations of the predicted policy, each of shape (N, d).
 
-    ``from_noise`` is what noise and misfit leave open, ``undetermined`` what
-    the data does not say, and ``total`` both: 95 % of the time the policy
-    should be within 1.96 of it, where ``undetermined`` is not most of it.
+    ``from_noise`` is due to noise and misfit, ``undetermined`` to directions
+    that the data does not determine, and ``total`` to both. The policy should
+    be within 1.96 of ``total`` 95 % of the time, except where ``undetermined``
+    is most of it.
     """
 
     from_noise: Array
@@ -31,29 +32,30 @@ class Uncertainty(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Belief(Shown):
-    """What a learner that looks at samples believes beside the weights.
+    """Estimates beside the weights, of a learner that uses the samples.
 
     Parameters
     ----------
     noise : float
         Standard deviation of the noise on each action coordinate, misfit of the model included.
     misfit : float
-        Standard deviation, per action coordinate, of what the model of the policy misses: the part of the residuals
-        that goes on smoothly in time, and 1.5 % of the actions' size, which no model is trusted to be below.
+        Standard deviation of the model's misfit per action coordinate: the part of the residuals that is smooth in
+        time, and 1.5 % of the actions' root-mean-square length as a floor.
     free_share : float
         Estimated share of samples that nothing constrained.
     free : ndarray, shape (N,)
         Probability that each sample was free, in the order in which they were given.
     from_noise, undetermined : ndarray, shape (M, d p, d p)
-        Covariance of the weights over ``T_m φ``, due to noise in the data and due to what the data does not say.
+        Posterior covariance of the weights over ``T_m φ``, due to noise and to directions that the data does not
+        determine.
     held_out_score : float
-        Share of the observed motion that is explained where it is held out, as by ``Policy.score``.
+        Share of the squared motion that is explained where held out, as by ``Policy.score``.
     compared : dict
-        Logarithm of each candidate's held-out inconsistency over that on noise-corrected moments.
+        Logarithm of each candidate's held-out inconsistency over that of noise-corrected moments.
     refuted : bool
-        Whether that of the most probable policy was too far above.
+        Whether that ratio is above the cut-off for the most probable policy.
     candidates : dict
-        Weights (M, d, p) of everything that was learnt to choose from, by name.
+        Weights (M, d, p) of each candidate, by name.
     """
 
     noise: float
@@ -68,10 +70,10 @@ class Belief(Shown):
     candidates: dict[str, Array] = field(default_factory=dict)
 
     def uncertainty(self, model: Model, states: Array) -> Uncertainty:
-        """Posterior spread of the prediction at N states.
+        """Posterior standard deviations of the prediction at N states.
 
         Neighbouring models learn from the same samples, so their errors are
-        taken to go together: standard deviations are averaged, not variances.
+        taken as fully correlated: standard deviations are averaged, not variances.
         """
         spread = _Spread(model, states)
         from_noise = np.hypot(spread.of(self.from_noise), self.misfit)
@@ -79,10 +81,10 @@ class Belief(Shown):
         return Uncertainty(from_noise, undetermined, np.hypot(from_noise, undetermined))
 
     def covariances(self, model: Model, states: Array) -> Array:
-        """Covariance of the prediction at N states due to what the data does not say, shape (N, d, d).
+        """Covariance of the prediction at N states in what the data does not determine, shape (N, d, d).
 
-        On the diagonal are the squares of ``uncertainty(...).undetermined``. Beside it, models are mixed by their
-        correlations, so that the result is positive.
+        Variances are the squares of ``uncertainty(...).undetermined``. Correlations are those of the models, averaged
+        by their shares, so that the result is positive semidefinite.
         """
         return _Spread(model, states).covariances(self.undetermined)
 
@@ -94,29 +96,29 @@ class Belief(Shown):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(Shown):
-    """What a learner found, for each of M models.
+    """Result of a learner, for each of M models.
 
     Parameters
     ----------
     weights : ndarray, shape (M, d, p)
-        The policy's weights W. A learner gives them over the features ``T_m φ`` whose moments it is shown; those of a
-        fitted policy are over φ.
+        The policy's weights W. Those that ``learn`` returns are over the features ``T_m φ`` of ``training.folds``,
+        those of a fitted policy over φ.
     determined : ndarray of int, shape (M,)
-        How many of the ``directions`` the first objective determined.
+        Number of the ``directions`` that the first objective determines.
     directions : int
         Dimension of the weight space, ``P = d p``.
     threshold : ndarray, shape (M,)
         The λ_t used, as a share of the largest eigenvalue.
     eigenvalues : ndarray, shape (M, P), optional
-        Of the inconsistency's Hessian, ascending, where it was factored.
+        Of the inconsistency's Hessian, ascending, where they were computed.
     scores : ndarray, shape (M, P + 1), optional
         Held-out ``E_i + α E_2`` per unit of weight, averaged over the folds,
         for every number of undetermined directions, where the threshold was
         chosen by it.
     method : str
-        How it was learnt; of several candidates, which was chosen.
+        Name of the learner, or of the candidate that was taken.
     belief : Belief, optional
-        From learners that look at the samples.
+        Of learners that use the samples.
     """
 
     weights: Array
@@ -140,11 +142,11 @@ class Solution(Shown):
         Raises
         ------
         MissingBeliefError
-            If the learner has none, since it does not look at the samples.
+            If the learner has none, since it does not use the samples.
         """
         if self.belief is None:
             raise MissingBeliefError(
-                f"learner: {self.method or 'this one'} works on sums alone and does not tell it. "
+                f"belief: got a solution of {self.method or 'a learner'} from moments alone, which estimates none. "
                 "Fit with learner=Robust()."
             )
         return self.belief
@@ -166,7 +168,7 @@ class Solution(Shown):
 
     @property
     def candidates(self) -> dict[str, Array]:
-        """Weights (M, d, p) of everything that was learnt to choose from, by name."""
+        """Weights (M, d, p) of each candidate, by name."""
         return self.believed.candidates
 
     def over(self, model: Model) -> Solution:
@@ -187,7 +189,7 @@ class Solution(Shown):
 
 
 class _Spread:
-    """Each model's features and share at some states, by which a covariance of weights becomes one of actions."""
+    """Propagates covariances of the weights to the predictions at some states."""
 
     def __init__(self, model: Model, states: Array) -> None:
         self._features, shares = model.design(states), model.fields.shares(states)
@@ -195,7 +197,7 @@ class _Spread:
         self._models = list(zip(shares.T, np.eye(p)[None] if centring is None else centring, strict=True))
 
     def of(self, covariance: Array) -> Array:
-        """Standard deviation of each action coordinate, averaged over the models, shape (N, d)."""
+        """Standard deviation of each action coordinate, averaged over the models by their shares, shape (N, d)."""
         p = self._features.shape[1]
         d = covariance.shape[1] // p
         spread = np.zeros((len(self._features), d))

@@ -1,4 +1,4 @@
-"""How much counts as undetermined: a split of the eigenvectors, chosen on held-out data (section III-C)."""
+"""Split of the eigenvectors into determined and undetermined ones, by cross-validation (section III-C)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Averaging = Literal["geometric", "arithmetic"]
 
 
 def check_settings(threshold: float | None, averaging: str) -> None:
-    """Refuse a negative threshold and an average that does not exist.
+    """Check the settings that the learners of the paper share.
 
     Raises
     ------
@@ -39,15 +39,15 @@ def solve_at_threshold(
     averaging: Averaging,
     method: str,
 ) -> Solution:
-    """Solve on the whole, at a threshold that is given or else chosen on the folds.
+    """Solve on all folds, at a threshold that is given or else chosen by cross-validation.
 
     Parameters
     ----------
     folds : FoldedMoments
     path_of : callable
-        Moments to the solutions at every split.
+        From moments to the solutions at every split.
     score_of : callable
-        Held-out moments to what a solution is judged by, the lower the better.
+        From held-out moments to the loss.
     threshold : float, optional
         λ_t as a share of the largest eigenvalue.
     averaging : {"geometric", "arithmetic"}
@@ -60,7 +60,7 @@ def solve_at_threshold(
         return judged(score_of(held_out), path_of(training).weights)
 
     whole = folds.whole
-    # With nothing to hold out, the data has to judge itself.
+    # With nothing to hold out, the loss on the training data has to do.
     rounds = folds.rounds() or [(whole, whole)] if threshold is None else []
     calls: list[Callable[[], Any]] = [partial(path_of, whole), *(partial(judge, *pair) for pair in rounds)]
     models, size = vec(whole.cross).shape
@@ -78,36 +78,38 @@ def solve_at_threshold(
 
 
 def judged(objective: Quadratic, weights: Array) -> Array:
-    """Values to compare candidates by, as :class:`~unconstrain.Quadratic` gives them.
-
-    A sum of squares is not below zero; what rounding leaves there is cut off. Whatever is not finite is worse than all.
-    """
+    """Loss of each candidate: the objective's values, at least zero, infinite where they are not finite."""
     values = objective(weights)
     return np.where(np.isfinite(values), np.clip(values, 0.0, None), np.inf)
 
 
-def within_errors(missed: Array, times: float = 1.0) -> NDArray[np.intp]:
-    """Candidates whose loss is within a standard error, or so many times one, of the best.
+def within_errors(losses: Array, times: float = 1.0) -> NDArray[np.intp]:
+    """Candidates whose loss is within some standard errors of the least.
+
+    The one-standard-error rule (Breiman, Friedman, Olshen and Stone, *Classification and Regression Trees*, 1984), with
+    the standard error of the paired difference to the best candidate.
 
     Parameters
     ----------
-    missed : ndarray, shape (R, K)
-        Held-out loss of each candidate in each round. Errors are of the difference to the best, round by round.
+    losses : ndarray, shape (R, K)
+        Held-out loss of each candidate in each round.
+    times : float
+        Number of standard errors.
     """
-    best = int(missed.mean(axis=0).argmin())
-    if len(missed) < 2:  # and so no standard error
+    best = int(losses.mean(axis=0).argmin())
+    if len(losses) < 2:  # and so no standard error
         return np.array([best], dtype=np.intp)
-    gap = missed - missed[:, [best]]
-    return np.flatnonzero(gap.mean(axis=0) <= times * gap.std(axis=0, ddof=1) / np.sqrt(len(missed)))
+    gap = losses - losses[:, [best]]
+    return np.flatnonzero(gap.mean(axis=0) <= times * gap.std(axis=0, ddof=1) / np.sqrt(len(losses)))
 
 
 def _average(judged: Array, parts: Sequence[Moments], averaging: Averaging) -> Array:
-    """Average scores (folds, M, P + 1) over the folds, each per unit of its weight and counted by it."""
+    """Average scores (folds, M, P + 1) per unit of weight over the folds, weighted by the folds' weights."""
     weight = np.stack([part.weight for part in parts])[..., None]
     counts = np.where(weight > 0, weight, 1.0)  # a fold that a field does not see scores 0 with weight 0
     scores = judged / counts
     if averaging == "geometric":
-        # Of a perfect fit, or of a demonstration at rest, rounding is left, and its logarithm must not decide.
+        # The score of a perfect fit, or of a demonstration at rest, is rounding: its logarithm must not decide.
         energy = np.stack([part.energy for part in parts])[..., None].sum(axis=0)
         floor = 1e-9 * energy / np.maximum(weight.sum(axis=0), np.finfo(float).tiny)
         scores = np.log(np.maximum(scores + floor, np.finfo(float).tiny))
@@ -117,6 +119,6 @@ def _average(judged: Array, parts: Sequence[Moments], averaging: Averaging) -> A
 
 
 def _last_best(scores: Array) -> NDArray[np.intp]:
-    """The largest split with the lowest score: what does not matter is left to the standard risk."""
+    """The largest split of the lowest score: ties are left to the standard risk."""
     good = scores == scores.min(axis=1, keepdims=True)
     return scores.shape[1] - 1 - good[:, ::-1].argmax(axis=1)

@@ -1,4 +1,4 @@
-"""What a policy is made of: features, receptive fields, and the policy as one formula."""
+"""Models of a policy: features, receptive fields, and their closed form."""
 
 from .features import Affine, FeatureMap, KMeansRBF, NormalisedRBF, Placeable
 from .formula import ClosedForm

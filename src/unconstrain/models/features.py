@@ -1,8 +1,8 @@
 """Feature maps: states (N, n) to features (N, p).
 
-A feature map is any callable on a table of states. One that has to look at
-the data before it is fixed also has ``place(states)``, which returns the map
-to use; a policy calls it once, on the first batch it sees.
+A feature map is any callable on a table of states. One whose parameters depend
+on the data also has ``place(states)``, which returns the map to use; a policy
+calls it once, on the first batch.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from ..base.parameters import Parameters
 from .formula import ClosedForm, exponents
 
 _LEAST_SPREAD = 1e10 * np.sqrt(SMALLEST_VARIANCE)
-"""States that spread less count as one; centres laid among them may be nearer to one another, by a millionth."""
+"""States that spread less count as one: centres placed among them may be a millionth of this apart."""
 
 
 class FeatureMap(Protocol):
-    """What a policy needs of its features: to be called, by several threads at once where there are many."""
+    """A callable from states to features, possibly called by several threads at once."""
 
     def __call__(self, states: Array, /) -> Array:
         """Compute features (N, p) of states (N, n)."""
@@ -35,7 +35,7 @@ class FeatureMap(Protocol):
 
 @runtime_checkable
 class Placeable(Protocol):
-    """Features that are fixed only once the data has been seen."""
+    """Features whose parameters depend on the data."""
 
     def place(self, states: Array, /) -> FeatureMap:
         """Return the feature map to use from now on."""
@@ -49,8 +49,8 @@ class Affine(Shown):
     Parameters
     ----------
     centre, scale : float or array_like, shape (n,)
-        The features are ``((x − centre) / scale, 1)``. Which functions they
-        span does not depend on either; rounding does.
+        The features are ``((x − centre) / scale, 1)``. The functions they span
+        do not depend on either; the condition of the solution does.
     """
 
     centre: Array | float = 0.0
@@ -64,19 +64,19 @@ class Affine(Shown):
         return xp.concat([scaled, xp.ones_like(scaled[:, :1])], axis=1)
 
     def closed_form(self, weights: Array) -> ClosedForm:
-        """Write a policy ``W φ(x)`` with weights (d, n + 1) as one formula."""
+        """Closed form of the policy ``W φ(x)`` with weights (d, n + 1)."""
         n = weights.shape[1] - 1
         scale = np.broadcast_to(np.asarray(self.scale, np.float64), n)
         maps = np.column_stack([weights[:, :n] / scale, weights[:, n]])
         return ClosedForm(np.broadcast_to(np.asarray(self.centre, np.float64), n), maps[None], None, np.abs(scale))
 
     def place(self, states: Array) -> Affine:
-        """Centre and scale on the data, unless told where already."""
+        """Centre and scale on the data, unless centre or scale were given."""
         if np.any(self.centre != 0.0) or np.any(self.scale != 1.0):
             return self
         centre = states.mean(axis=0)
         spread = np.sqrt(((states - centre) ** 2).mean(axis=0))
-        # A coordinate that does not move carries rounding only; dividing by that would amplify it.
+        # The spread of a constant coordinate is rounding only; dividing by it would amplify that.
         still = spread <= np.maximum(1e-12 * np.abs(states).max(axis=0, initial=0.0), _LEAST_SPREAD)
         return replace(self, centre=centre, scale=np.where(still, 1.0, spread))
 
@@ -87,11 +87,11 @@ class Affine(Shown):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class NormalisedRBF(Shown):
-    """Gaussian kernels that share out one at each state (section III-C).
+    """Gaussian kernels normalised to sum to one at each state (section III-C).
 
     ``b_i(x) = K(x − c_i) / Σ_j K(x − c_j)`` with
     ``K(δ) = exp(−‖δ‖² / 2σ²)``. Computed by log-sum-exp: far from all
-    centres the nearest one takes everything, and nothing overflows.
+    centres the nearest kernel has a share of one, and nothing overflows.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ class NormalisedRBF(Shown):
         """Compute features (N, p) of states (N, n); each row sums to one."""
         if len(self._ticks) < 2:
             return shares(states, self.centres, self.variance)
-        # On a grid both kernels and what they sum to are products over the axes: few exponentials instead of many.
+        # On a grid kernels and their sums factorise over the axes, which takes fewer exponentials.
         _check_columns(states, self.centres)
         xp = namespace(states)
         product, *others = (
@@ -129,29 +129,29 @@ class NormalisedRBF(Shown):
 
     @cached_property
     def _ticks(self) -> list[Array]:
-        """Where the centres are along each axis, if they are all points of a grid; else nothing."""
+        """Coordinates of the centres along each axis, if they are all points of a grid; else empty."""
         ticks = [np.unique(column) for column in self.centres.T]
         if np.prod([len(each) for each in ticks], dtype=float) != len(self.centres):
             return []
         return ticks if np.array_equal(_grid(ticks), self.centres) else []
 
     def support(self, states: Array) -> Array:
-        """Weight of the nearest kernel, from 1 at its centre to 0 far from all, shape (N,)."""
+        """Kernel of the nearest centre, from 1 at it to 0 far from all, shape (N,)."""
         distances = squared_distances(states, self.centres)
         return gaussian(namespace(distances).min(distances, axis=1), self.variance)
 
     def closed_form(self, weights: Array) -> ClosedForm:
-        """Write a policy ``W φ(x)`` with weights (d, p) as one formula."""
+        """Closed form of the policy ``W φ(x)`` with weights (d, p)."""
         origin = self.centres.mean(axis=0)
         reach = np.abs(self.centres - origin).max(axis=0) + np.sqrt(self.variance)
         return ClosedForm(origin, weights.T[:, :, None], exponents(self.centres, self.variance, origin), reach)
 
     def roughness(self) -> Array:
-        """Measure how rough a policy of some weights is, shape (p, p).
+        """Roughness matrix R of the kernels' weights, shape (p, p).
 
-        ``wᵀ R w`` is the mean square, over the kernels, of what a weight differs from what its neighbours' weights,
-        continued linearly, would make it. Of a function that is affine in the state it is zero. Penalised splines do
-        so with second differences [1]_.
+        ``wᵀ R w`` is the mean square, over the kernels, of the residual of each weight from a local affine fit to its
+        neighbours' weights. It is zero for weights that are affine in the centres. This is the analogue, for kernels
+        at any place, of the second-difference penalty of P-splines [1]_.
 
         References
         ----------
@@ -164,7 +164,7 @@ class NormalisedRBF(Shown):
         near = np.sort(squared, axis=1)[:, : min(2 * n, count - 1)].mean() if count > n + 1 else 0.0
         if not near > 0.0:
             return np.zeros((count, count))
-        weights = np.exp(-0.5 * squared / near)  # of kernel j in what is said of kernel i, none of itself
+        weights = np.exp(-0.5 * squared / near)  # of kernel j in the local fit at kernel i, zero for i itself
         apart = (self.centres - self.centres[:, None]) / np.sqrt(near)
         affine = np.concatenate([np.ones((count, count, 1)), apart], axis=2)
         weighted = weights[:, None, :] * affine.mT
@@ -183,7 +183,7 @@ class NormalisedRBF(Shown):
         width: float = 1.0,
         dimensions: int = 2,
     ) -> NormalisedRBF:
-        """Lay the centres on a regular grid.
+        """Place the centres on a regular grid.
 
         Parameters
         ----------
@@ -194,7 +194,7 @@ class NormalisedRBF(Shown):
         width : float
             The kernels' σ as a multiple of the (mean) grid spacing.
         dimensions : int
-            Number of axes, where neither ``low`` nor ``high`` tells.
+            Number of axes, where all of the above are numbers.
 
         Raises
         ------
@@ -222,7 +222,7 @@ class NormalisedRBF(Shown):
 
     @classmethod
     def kmeans(cls, states: Array, count: int = 25, *, width: float = 1.0, seed: int = 0) -> NormalisedRBF:
-        """Lay the centres where the states are, by k-means.
+        """Place the centres by k-means on the states.
 
         Parameters
         ----------
@@ -232,7 +232,7 @@ class NormalisedRBF(Shown):
         width : float
             The kernels' σ as a multiple of the mean distance from a centre to its nearest neighbour.
         seed : int
-            Of k-means' starts.
+            Seed of k-means.
         """
         from sklearn.cluster import KMeans
 
@@ -250,7 +250,7 @@ class NormalisedRBF(Shown):
         distances = squared_distances(found, found)
         np.fill_diagonal(distances, np.inf)
         spacing = np.mean(np.sqrt(distances.min(axis=1))) if count > 1 else 1.0
-        centres = np.clip(middle + unit * found, table.min(axis=0), table.max(axis=0))  # but for rounding they are
+        centres = np.clip(middle + unit * found, table.min(axis=0), table.max(axis=0))  # rounding may put them outside
         return cls(centres, float((width * spacing * unit) ** 2))
 
     def _summary(self) -> tuple[str, ...]:
@@ -260,7 +260,7 @@ class NormalisedRBF(Shown):
 
 @dataclass(frozen=True)
 class KMeansRBF(Parameters):
-    """Normalised RBFs whose centres k-means lays on the first data it is shown.
+    """Normalised RBFs with centres by k-means on the first batch.
 
     Parameters
     ----------
@@ -269,7 +269,7 @@ class KMeansRBF(Parameters):
     width : float
         See :meth:`NormalisedRBF.kmeans`.
     seed : int
-        Of k-means' starts.
+        Seed of k-means.
     """
 
     count: int = 25
@@ -277,14 +277,14 @@ class KMeansRBF(Parameters):
     seed: int = field(default=0)
 
     def place(self, states: Array) -> NormalisedRBF:
-        """Lay the centres on these states (N, n)."""
+        """Place the centres on states (N, n)."""
         count = max(1, min(self.count, len(states) // 4))
         return NormalisedRBF.kmeans(states, count, width=self.width, seed=self.seed)
 
 
 def gaussian(squared: Array, variance: float) -> Array:
-    """Weights ``exp(−δ² / 2σ²)`` at squared distances."""
-    with np.errstate(over="ignore"):  # to −inf: no weight at all
+    """Gaussian kernel ``exp(−δ² / 2σ²)`` of squared distances."""
+    with np.errstate(over="ignore"):  # to −inf: a kernel of zero
         exponents = squared * (-0.5 / variance)
     weights: Array = namespace(exponents).exp(exponents)
     return weights
@@ -306,14 +306,14 @@ def squared_distances(states: Array, centres: Array) -> Array:
 
 
 def shares(states: Array, centres: Array, variance: float) -> Array:
-    """Gaussian weights that sum to one at each state, by log-sum-exp, shape (N, M)."""
+    """Gaussian kernels normalised to sum to one at each state, by log-sum-exp, shape (N, M)."""
     # ‖x‖² is common to all centres and cancels; leaving it out keeps far states exact.
     near, far = _apart(states, centres)
     xp = namespace(near)
     exponents = far @ near.T  # (M, N): sums over centres then run along rows
     exponents -= 0.5 * xp.sum(far * far, axis=1)[:, None]
     exponents -= xp.max(exponents, axis=0)
-    with np.errstate(over="ignore"):  # to −inf: no share at all
+    with np.errstate(over="ignore"):  # to −inf: a share of zero
         exponents *= 1.0 / variance
     weights: Array = xp.exp(exponents)
     weights *= 1.0 / xp.sum(weights, axis=0)
@@ -321,12 +321,12 @@ def shares(states: Array, centres: Array, variance: float) -> Array:
 
 
 def _grid(ticks: Sequence[Array]) -> Array:
-    """All points of a grid, the last axis first to move."""
+    """All points of a grid, the last axis varying fastest."""
     return np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, len(ticks))
 
 
 def _apart(states: Array, centres: Array) -> tuple[Array, Array]:
-    """States and centres from the centres' mean."""
+    """States and centres relative to the centres' mean."""
     _check_columns(states, centres)
     origin = centres.mean(axis=0)
     return states - beside(origin, states), beside(centres - origin, states)

@@ -1,4 +1,4 @@
-"""A fitted policy as one formula, without estimator, moments or feature map."""
+"""Closed form of a fitted policy, without estimator, moments or feature map."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..base.display import Shown, counted
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ClosedForm(Shown):
-    """Affine maps, blended by normalised Gaussian kernels.
+    """Affine maps blended by normalised Gaussian kernels.
 
     With ``z = x − origin``,
 
@@ -20,9 +20,8 @@ class ClosedForm(Shown):
 
     where ``e_m = slope_mᵀ z + offset_m`` is the logarithm of a Gaussian
     kernel without ``−‖z‖² / 2σ²``, which is common to all and cancels.
-    An affine policy has M = 1, a parametric policy on normalised RBFs has no
-    A, a locally linear one has everything. Every target of
-    :mod:`~unconstrain.deployment` is made from this.
+    An affine policy has M = 1, a parametric policy on normalised RBFs A = 0.
+    All of :mod:`~unconstrain.deployment` is generated from it.
 
     Parameters
     ----------
@@ -32,7 +31,7 @@ class ClosedForm(Shown):
     exponents : ndarray, shape (M, n + 1), optional
         ``(slope_m, offset_m)``; see :func:`exponents`. Without it M is 1.
     reach : ndarray, shape (n,)
-        How far from the origin the policy is at home, along each axis; where self-tests look.
+        Extent of the data from the origin along each axis; the range of self-tests.
     """
 
     origin: Array

@@ -1,4 +1,4 @@
-"""What a policy is made of, without what was learnt."""
+"""Model of a policy: features and receptive fields, without weights."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from .formula import ClosedForm
 from .receptive_fields import Everywhere, ReceptiveFields
 
 _ROWS = 4096
-"""Rows that are predicted together, so that what is made of them stays in cache."""
+"""Rows that are predicted together, so that temporaries stay in cache."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Model(Shown):
-    """M models on common features, averaged by their fields: ``π̃(x) = Σ_m s_m(x) W_m φ(x)``.
+    """M linear models on common features, blended by their fields: ``π̃(x) = Σ_m s_m(x) W_m φ(x)``.
 
     A parametric policy (section III-C) has M = 1 and a field that is 1
     everywhere; a locally linear one (section III-D) has affine features.
@@ -29,12 +29,12 @@ class Model(Shown):
     features : FeatureMap
         φ, states (N, n) to features (N, p).
     fields : ReceptiveFields or Everywhere
-        Where each of the M models counts.
+        Membership of states in the M models.
 
     Attributes
     ----------
     centring : ndarray, shape (M, p, p), or None
-        ``T_m``: model m is solved on the features ``T_m φ``, for the sake of rounding; None for φ itself.
+        ``T_m``: model m is solved in the features ``T_m φ``, for numerical accuracy; None for φ itself.
     """
 
     features: FeatureMap
@@ -66,30 +66,30 @@ class Model(Shown):
         return namespace(states).concat([self.fields.blend(self.design(block), weights, block) for block in blocks])
 
     def support(self, states: Array) -> Array:
-        """How near to the data each state is, from 1 to 0, shape (N,).
+        """Support of each state by the data, from 1 to 0 far away, shape (N,).
 
         Raises
         ------
         SettingError
-            If neither fields nor features have a place in state space.
+            If neither fields nor features offer it.
         """
         measure = getattr(self.fields, "support", None) or getattr(self.features, "support", None)
         if measure is None:
-            raise SettingError(f"support: {type(self.features).__name__} does not say where its data was.")
+            raise SettingError(f"support: {type(self.features).__name__} has no support(states).")
         return np.asarray(measure(states))
 
     def roughness(self, models: int, size: int) -> Array:
-        """``R_m`` (M, p, p): ``wᵀ R_m w`` tells how rough a policy of weights w is; zero where it is not known."""
+        """``R_m`` (M, p, p): ``wᵀ R_m w`` is the roughness of a policy of weights w; zero where features offer none."""
         measure = getattr(self.features, "roughness", None)
         return np.zeros((models, size, size)) if measure is None else measure()[None]
 
     def formula(self, weights: Array) -> ClosedForm:
-        """The policy of weights (M, d, p) as one formula: what is exported, and what other targets are made from.
+        """Closed form of the policy of weights (M, d, p), for export.
 
         Raises
         ------
         SettingError
-            If the features are a callable that does not say its formula.
+            If the features are a callable without ``closed_form``.
         """
         form = self.fields.formula(self.features, weights)
         if form is None:

@@ -1,4 +1,4 @@
-"""Where each model of a policy counts: Gaussian receptive fields (section III-D), or everywhere."""
+"""Receptive fields: membership of states in local models (section III-D), or in a single one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .features import Affine, FeatureMap, gaussian, shares, squared_distances
 from .formula import ClosedForm, exponents
 
 MOST_FIELDS = 100
-"""How many fields :func:`choose_variance` puts up with before it widens them."""
+"""Most fields that :func:`choose_variance` accepts before it widens them."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,20 +35,20 @@ class ReceptiveFields(Shown):
         check_at_least("variance", self.variance, SMALLEST_VARIANCE, strict=True)
 
     def weights(self, states: Array) -> Array:
-        """How much each sample counts in each field, shape (N, M) (eq. 14)."""
+        """Membership of each state in each field, the w of eq. 14, shape (N, M)."""
         return gaussian(squared_distances(states, self.centres), self.variance)
 
     def shares(self, states: Array) -> Array:
-        """The same weights, normalised over the fields, shape (N, M)."""
+        """Memberships normalised over the fields, shape (N, M)."""
         return shares(states, self.centres, self.variance)
 
     def support(self, states: Array) -> Array:
-        """Weight in the nearest field, from 1 at a centre to 0 far from all, shape (N,)."""
+        """Membership in the nearest field, from 1 at a centre to 0 far from all, shape (N,)."""
         distances = squared_distances(states, self.centres)
         return gaussian(namespace(distances).min(distances, axis=1), self.variance)
 
     def blend(self, features: Array, weights: Array, states: Array) -> Array:
-        """Predictions of models with these weights (M, d, p), averaged by their shares, shape (N, d)."""
+        """Predictions of models with weights (M, d, p), averaged by their shares, shape (N, d)."""
         each = namespace(states).tensordot(features, beside(weights, states), axes=((1,), (2,)))  # (N, M, d)
         if is_foreign(each):
             return (self.shares(states)[:, None, :] @ each)[:, 0, :]
@@ -66,7 +66,7 @@ class ReceptiveFields(Shown):
         return centring
 
     def formula(self, features: FeatureMap, weights: Array) -> ClosedForm | None:
-        """Affine models with these weights (M, d, n + 1), blended, as one formula."""
+        """Closed form of affine models with weights (M, d, n + 1)."""
         if not isinstance(features, Affine):
             return None
         origin, scale = np.asarray(features.centre), features.scale
@@ -84,7 +84,7 @@ class Everywhere:
     """One field that is 1 at every state: the policy is a single model."""
 
     def weights(self, states: Array) -> Array:
-        """How much each sample counts, ones of shape (N, 1)."""
+        """Membership of each state, ones of shape (N, 1)."""
         return namespace(states).ones_like(states[:, :1])
 
     shares = weights
@@ -97,16 +97,16 @@ class Everywhere:
         """Features of a single model stay as they are."""
 
     def formula(self, features: FeatureMap, weights: Array) -> ClosedForm | None:
-        """The formula of the features with weights (1, d, p), where they offer one."""
+        """Closed form of the features with weights (1, d, p), where they offer one."""
         closed = getattr(features, "closed_form", None)
         return None if closed is None else closed(weights[0])
 
 
 def cover(states: Array, variance: float, at_least: float = 0.7) -> ReceptiveFields:
-    """Place fields on the samples so that each sample counts enough in one of them.
+    """Place fields on the samples so that each sample has a least membership in one of them.
 
-    Farthest-first: the sample nearest to the mean becomes the first centre;
-    from then on always the sample that is least well covered, until every
+    Farthest-first traversal: the first centre is the sample nearest to the
+    mean, each further one the sample farthest from all centres, until every
     sample has ``w_m(x) ≥ at_least`` for some m (section IV-B).
 
     Parameters
@@ -115,7 +115,7 @@ def cover(states: Array, variance: float, at_least: float = 0.7) -> ReceptiveFie
     variance : float
         The fields' σ².
     at_least : float
-        The weight to reach, between 0 and 1.
+        The membership to reach, between 0 and 1.
 
     Returns
     -------
@@ -124,7 +124,7 @@ def cover(states: Array, variance: float, at_least: float = 0.7) -> ReceptiveFie
     Raises
     ------
     SettingError
-        If the weight is not between 0 and 1 or the variance is not positive.
+        If the membership is not between 0 and 1 or the variance is not positive.
     """
     return _cover(as_matrix(states, "states"), variance, at_least, most=None)
 
@@ -136,7 +136,7 @@ def choose_variance(states: Array, at_least: float = 0.7, most: int = MOST_FIELD
     Returns 1 where the states do not vary.
     """
     total = float(states.var(axis=0).sum())
-    # What rounding of the mean leaves is no variance.
+    # A variance below that of rounding the mean counts as none.
     least = max((1e-12 * np.abs(states).max()) ** 2, 8 * SMALLEST_VARIANCE)
     variance = total / 4 if total > least else 1.0
     while len(_cover(states, variance, at_least, most).centres) > most:
@@ -146,7 +146,7 @@ def choose_variance(states: Array, at_least: float = 0.7, most: int = MOST_FIELD
 
 def _cover(states: Array, variance: float, at_least: float, most: int | None) -> ReceptiveFields:
     if not 0.0 < at_least < 1.0:
-        raise SettingError(f"at_least: got {at_least!r}, expected a weight between 0 and 1.")
+        raise SettingError(f"at_least: got {at_least!r}, expected a membership between 0 and 1.")
     check_at_least("variance", variance, SMALLEST_VARIANCE, strict=True)
     reach = -2.0 * variance * np.log(at_least)
     chosen = [int(((states - states.mean(axis=0)) ** 2).sum(axis=1).argmin())]

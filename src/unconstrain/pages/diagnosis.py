@@ -1,4 +1,4 @@
-"""The page of what a robust fit knows of its demonstrations, what it does not, and what to record next."""
+"""The page of a diagnosis: noise, undetermined states, free demonstrations, and what to record next."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ def diagnosis_page(
     demos = list(demonstrations)
     return html.document(
         title,
-        "What was recorded is the wish of the demonstrator with whatever the surroundings took away. This page says "
-        "how well the wish can be told from these recordings: how much noise is in the way, where the constraints "
-        "varied too little, and which further demonstration would help most.",
+        "The recordings are the demonstrator's policy, projected by unknown constraints. This page reports how well "
+        "they determine the unconstrained policy: the noise, where constraints vary too little, and which further "
+        "demonstration would help most.",
         _tiles(found, demos),
         html.bullets(sentences(found, states, actions)),
-        html.section("Where the policy is not known", _map(found, demos, states, actions)),
+        html.section("Where the policy is not determined", _map(found, demos, states, actions)),
         html.section("What to record next", _next(found, states, actions)),
         html.section("Free or constrained", _freedom(found)),
         html.section("How the policy was chosen", _chosen(found)),
@@ -86,7 +86,7 @@ def _tiles(found: Diagnosis, demos: list[Demonstration]) -> html.Markup:
 
 
 def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], actions: Sequence[str]) -> html.Markup:
-    """Two state columns, coloured by how little is known."""
+    """Two state columns, coloured by the undetermined spread."""
     recorded = stack(demos).states
     regions = found.regions[:MOST_REGIONS]
     worst = np.array([region.state for region in regions])
@@ -111,11 +111,11 @@ def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], ac
         top=SMALL,
     )
     caption = (
-        "Each dot is a recorded state. Its colour is the standard deviation that the data leaves open, noise apart, as "
-        f"a share of the typical action, {html.number(found.typical)} in units of the actions: dark is known. The "
+        "Each dot is a recorded state. Its colour is the undetermined standard deviation, without that from noise, as "
+        f"a share of the typical action, {html.number(found.typical)} in units of the actions: dark is determined. The "
         "numbers are those of the table below"
     )
-    caption += ", the lines through them the motion of which least is known there." if same else "."
+    caption += ", the lines through them the direction of motion that is determined least." if same else "."
     if len(states) > 2:
         caption += " Of all state columns, the two that vary most are drawn."
     return html.picture("known", [picture], caption)
@@ -138,11 +138,10 @@ def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> ht
     ]
     around, along = (", ".join(names) for names in (states, actions))
     header = ["", f"demonstrate around\n({around})", f"with motion left free along\n({along})", "recorded in"]
-    header += ["unknown\nalong it", "unknown in\nthe region", "states\ndetermined", "samples"]
+    header += ["spread\nalong it", "spread in\nthe region", "states\ndetermined", "samples"]
     note = (
-        f"The {len(shown)} of {len(found.regions)} regions with the least known state. What is unknown is a standard "
-        "deviation as a share of the typical action; a state is determined where less than a tenth, or less than noise "
-        "leaves open, is unknown."
+        f"The {len(shown)} of {len(found.regions)} regions with the largest undetermined spread: a standard deviation "
+        "as a share of the typical action. A state is determined where it is below a tenth, or below that from noise."
     )
     return html.table(header, rows, left=4, note=note)
 
@@ -165,8 +164,8 @@ def _freedom(found: Diagnosis) -> html.Markup:
     more = f" The first {len(shown)} of {len(found.movements)} are drawn." if len(found.movements) > len(shown) else ""
     caption = (
         "One bar for each demonstration, the mean over its samples: above "
-        f"{FREE:g} it looks free, below {CONSTRAINED:g} constrained. A constraint that takes little looks free where "
-        f"there is noise.{more}"
+        f"{FREE:g} it looks free, below {CONSTRAINED:g} constrained. A constraint that changes an action by less "
+        f"than the noise looks free.{more}"
     )
     return html.picture("free", [picture], caption)
 
@@ -177,6 +176,8 @@ def _chosen(found: Diagnosis) -> html.Markup:
     rows = [
         [name, html.number(times), "yes" if name == found.method else "no"] for name, times in found.compared.items()
     ]
-    note = "Inconsistency on held-out demonstrations over that on noise-corrected moments; the most probable policy is "
-    note += "refuted where it is too far above 1; the less it knows of its samples, the sooner."
+    note = (
+        "Ratio of the held-out inconsistency to that of noise-corrected moments. The most probable policy is refuted "
+    )
+    note += "above a cut-off, which is 1 if all samples are in its uniform component and larger if fewer are."
     return html.table(["candidate", "held-out inconsistency, ratio", "taken"], rows, note=note)

@@ -59,7 +59,7 @@ def policy_page(policy: Policy, demonstrations: Sequence[Demonstration], title: 
         html.section("What the data determined", _determined(policy)),
     ]
     if policy.solution_.belief is not None:
-        parts.append(html.section("What is not known", *unknown(policy, demos)))
+        parts.append(html.section("Where the policy is not determined", *unknown(policy, demos)))
     if is_dataclass(learner):
         parts.append(html.settings_table(learner))
     return html.document(title, _lead(policy, demos, type(learner).__name__), *parts)
@@ -70,8 +70,8 @@ def _lead(policy: Policy, demos: list[Demonstration], learner: str) -> html.Mark
     kind = "Locally linear" if hasattr(policy, "fields_") else "Parametric"
     return html.markup(
         "{} policy with the {} learner, for {} state and {} action "
-        "columns. What was recorded is the wish of the demonstrator with whatever the surroundings took away; what was "
-        "learnt is meant to be the wish alone. So it should agree with the recordings <i>along the observed motion</i> "
+        "columns. The recordings are the demonstrator's policy, projected by unknown constraints; what was learnt is "
+        "an estimate of the unconstrained policy. It should agree with the recordings <i>along the observed motion</i> "
         "and may differ from them across it."
     ).format(kind, learner, states.shape[1], actions.shape[1])
 
@@ -105,7 +105,7 @@ def _movements(policy: Policy, demos: list[Demonstration]) -> html.Markup:
         return html.picture(
             "movements",
             [_field(policy, tracks)],
-            "Grey lines are the demonstrations, green arrows the learnt policy where nothing is in its way. Arrows are "
+            "Grey lines are the demonstrations, green arrows the learnt policy, unconstrained. Arrows are "
             "not to the scale of the axes; those longer than the longest observed action are cut to it.",
             keys=("hybrid", "training"),
             labels={"hybrid": "learnt policy", "training": "demonstrations"},
@@ -155,9 +155,9 @@ def _actions(policy: Policy, demos: list[Demonstration]) -> html.Markup:
     return html.picture(
         "actions",
         panels,
-        "Black is what was observed. Green is what the policy would do if nothing were in its way; where it differs "
-        "from black, it says that the surroundings took something away. Dashed blue is green projected onto the "
-        f"observed motion, which should lie on black.{more}",
+        "Black is what was observed. Green is the learnt, unconstrained policy; where it differs from black, a "
+        "constraint was active according to it. Dashed blue is green projected onto the observed motion, which should "
+        f"agree with black.{more}",
         keys=("observed", "hybrid", "direct"),
         labels={"observed": "observed", "hybrid": "learnt policy", "direct": "along the observed motion"},
     )
@@ -183,11 +183,11 @@ def _errors(policy: Policy, demos: list[Demonstration]) -> html.Markup:
     rows.append(cells("all", demos, None if support is None else np.concatenate(support)))
     note = "Errors are squared, as a share of the motion’s variance: 0 is perfect, 1 no better than a constant. "
     note += (
-        "Support is 1 at the middle of what was recorded and 0 far away from it, where predictions are guesses. "
+        "Support is 1 at the centres of the data and 0 far from it, where the policy extrapolates. "
         if support is not None
-        else "These features do not tell how near a state is to the data. "
+        else "These features offer no support of states by the data. "
     )
-    note += "" if known else "Without the truth, errors across the observed motion cannot be told. "
+    note += "" if known else "Without the true policy, errors across the observed motion cannot be computed. "
     note += f"The first {len(shown)} demonstrations are listed." if len(demos) > len(shown) else ""
     return html.table(header, rows, note=note, rules=(len(shown),))
 
@@ -196,25 +196,23 @@ def _determined(policy: Policy) -> html.Markup:
     solution = policy.solution_
     panels = []
     if solution.eigenvalues is not None:
-        title = "how strongly it is pinned down"
+        title = "eigenvalue, share of the largest"
         panels.append(figures.spectra(solution.eigenvalues, title=title))
     if solution.scores is not None:
         chosen = solution.directions - solution.determined
         panels.append(figures.step_scores(solution.scores, chosen, title="held-out score along the threshold"))
     share = f"The data determined {solution.determined_share:.1%} of all weight directions."
     if not panels:
-        return html.paragraph(f"{share} This learner has nothing to choose.")
+        return html.paragraph(f"{share} This learner has no threshold to choose.")
     words = f"{share} "
     if solution.eigenvalues is not None:
-        words += (
-            "Directions of the weights, sorted by how strongly the first objective pins them down; the black line is "
-        )
+        words += "Eigenvalues of the first objective, one for each direction of the weights, sorted; the black line is "
         words += "the median over the models. "
     if solution.scores is not None:
         words += (
             "Every number of undetermined directions was tried on held-out demonstrations, for each model; green dots "
         )
-        words += "are what was chosen, and 1 is the best. What is undetermined follows the standard risk."
+        words += "are the chosen ones, and 1 is the best. Undetermined directions minimise the standard risk."
     return html.picture("determined", panels, words)
 
 
@@ -234,7 +232,7 @@ def _or_nan(metric: object, policy: Policy, demos: list[Demonstration]) -> float
 
 
 def _thin(demo: Demonstration) -> Demonstration:
-    """At most so many samples as a picture can show."""
+    """Thinned to as many samples as a picture can show."""
     return demo[:: -(-len(demo) // MOST_POINTS)]
 
 

@@ -1,4 +1,4 @@
-"""The mathematics: projections, moments, quadratics and their minima."""
+"""The mathematics: projections, moments (sufficient statistics), quadratics and their minima."""
 
 from .folded_moments import FoldedMoments
 from .moments import Moments, Sums, gather, total

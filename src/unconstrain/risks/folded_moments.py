@@ -1,4 +1,4 @@
-"""Moments of each fold, and which of them are held out in turn."""
+"""Moments of each fold, for cross-validation."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class FoldedMoments(Shown):
     Parameters
     ----------
     parts : tuple of Moments
-        One for each fold, all of the same shape; none before the first sample.
+        One for each fold, all of the same shape; empty before the first sample.
     held_out : range
-        Which of them are held out, one after the other.
+        Indices of the folds that are held out, one after the other.
     """
 
     parts: tuple[Moments, ...]
@@ -28,20 +28,20 @@ class FoldedMoments(Shown):
 
     @property
     def whole(self) -> Moments:
-        """Moments of everything."""
+        """Moments of all folds."""
         return total(self.parts)
 
     @property
     def filled(self) -> list[int]:
-        """Indices of the parts that hold anything."""
+        """Indices of the folds that are not empty."""
         return [i for i, part in enumerate(self.parts) if part.weight.any()]
 
     def rounds(self) -> list[tuple[Moments, Moments]]:
-        """Pairs of training and held-out moments; empty if nothing can be held out."""
+        """Training and held-out moments of each round of cross-validation; empty with less than two folds."""
         filled = self.filled
         if len(filled) < 2:
             return []
-        # Everything but one from the sums before and after it: subtracting would leave rounding behind.
+        # All folds but one are the sum of those before and after it: subtracting it would leave rounding errors.
         before = list(accumulate(self.parts[i] for i in filled[:-1]))
         after = list(accumulate(self.parts[i] for i in reversed(filled[1:])))[::-1]
         others = [after[0], *map(add, before[:-1], after[1:]), before[-1]]

@@ -1,4 +1,4 @@
-"""The sums that every learner needs, and the only code that sees N samples.
+"""Moments: the sufficient statistics of all objectives. No other code of the learners from moments sees N samples.
 
 All risks of the method are one quadratic with three metrics. For any
 orthogonal projection P with ``P u = u``,
@@ -7,12 +7,12 @@ orthogonal projection P with ``P u = u``,
 
 so the standard risk (P = I, eq. 5) and the inconsistency (P = ûûᵀ, eq. 4)
 share the constant and the linear term, and with ``π̃(x) = W φ(x)`` five sums
-say everything about a data set.
+are sufficient statistics.
 
-A zero action has no direction: it counts in weight, gram (and, adding
-nothing, in energy and cross), but not in ``consistent``. This is the one place
-where that is decided. What is zero is for the caller to say (``at_rest``):
-the direction of rounding would claim that the policy is zero along it.
+A zero action has no direction: it counts in ``weight`` and ``gram`` (and, as
+zero, in ``energy`` and ``cross``), but not in ``consistent``. The caller sets
+the length up to which actions are zero (``at_rest``): the direction of a
+rounding error would state that the policy is zero along it.
 """
 
 from __future__ import annotations
@@ -37,8 +37,9 @@ from .projection import unit_actions
 class Moments(Shown):
     """Weighted sums over samples, for M models at once.
 
-    They add (batches, machines), subtract (leave a fold out) and scale
-    (forgetting).
+    They add (batches, machines), subtract (leaving a fold out) and scale
+    (forgetting). The weight w of a sample in a model is its sample weight times
+    its membership in that model.
 
     Parameters
     ----------
@@ -77,11 +78,11 @@ class Moments(Shown):
         return Moments(*(mine + theirs for mine, theirs in zip(self.sums, other.sums, strict=True)))
 
     def __sub__(self, other: Moments) -> Moments:
-        """Moments without a part that is in them."""
+        """Moments of the rest of the data set, without a part of it."""
         return Moments(*(mine - theirs for mine, theirs in zip(self.sums, other.sums, strict=True)))
 
     def __mul__(self, factor: float) -> Moments:
-        """Moments with every sample's weight multiplied."""
+        """Moments with each sample's weight multiplied by a factor."""
         return Moments(*(factor * mine for mine in self.sums))
 
     __rmul__ = __mul__
@@ -117,7 +118,7 @@ class Moments(Shown):
         )
 
     def on_host(self) -> Moments:
-        """The same as NumPy arrays."""
+        """Moments as NumPy arrays."""
         return Moments(*map(on_host, self.sums))
 
     def _summary(self) -> tuple[str, ...]:
@@ -138,11 +139,11 @@ def gather(features: Array, actions: Array, weights: Array | None = None, at_res
     ----------
     features : ndarray, shape (N, p)
         These and the following may be arrays of any library that follows the
-        array API standard; so are the sums then. Summed in float64.
+        array API standard; the moments then are too. Summed in float64.
     actions : ndarray, shape (N, d)
     weights : ndarray, shape (N, M), optional
-        How much each sample counts in each model, not negative; ones for a
-        single model if None.
+        Sample weight times membership in each model, not negative; ones for
+        a single model if None.
     at_rest : float
         Actions of at most this length have no direction.
 
@@ -167,7 +168,7 @@ def gather_blocks(
 
 
 class Sums:
-    """Moments in the making: samples are added block by block, and Hessians are put together at the end.
+    """Accumulator of moments: samples are added block by block, and Hessians are assembled at the end.
 
     ``û_k û_m`` and 1 are called metrics here: a Hessian consists of one
     product ``Σ w û_k û_m φφᵀ`` for each k ≤ m, and the Gram matrix is that of 1.
@@ -185,7 +186,7 @@ class Sums:
         self._sums: list[Array] = []
 
     def pieces(self, table: Array, start: int = 0, stop: int | None = None) -> Iterator[slice]:
-        """Rows of a table, or of some of it, to add at a time, so that what is made of them stays in cache."""
+        """Slices of a table, or of part of it, to add one at a time, short enough for temporaries to stay in cache."""
         models, d, p = self.shape
         columns = p if models == 1 else max(1, d * d * p * p // 4)
         numbers, most = (_FOREIGN_BLOCK, 2**20) if is_foreign(table) else (_BLOCK, 8192)
@@ -217,12 +218,12 @@ class Sums:
 
     @property
     def moments(self) -> Moments:
-        """What was added, summed."""
+        """Moments of all samples added so far."""
         models, d, p = self.shape
         if not self._sums:
             return Moments.zero(models, d, p)
         xp = namespace(self._sums[0])
-        # The first three as copies: what is added later must not change them.
+        # The first three as copies: samples added later must not change them.
         weight, energy, cross = (xp.asarray(each, copy=True) for each in self._sums[:3])
         products = self._sums[3:]
         if models == 1:
@@ -243,10 +244,10 @@ class Sums:
 
 
 _BLOCK = 2**20
-"""Numbers in the largest temporary: more do not stay in cache, fewer give BLAS too little to do at once."""
+"""Numbers in the largest temporary: more do not stay in cache, fewer make products too small for BLAS."""
 
 _FOREIGN_BLOCK = 2**25
-"""The same where arrays are of another library, and may be on a device that wants much to do at once."""
+"""The same for arrays of another library, which may be on a device that needs larger products."""
 
 
 class _Workspace:

@@ -1,7 +1,4 @@
-"""What a policy should minimise: functions from moments to quadratics.
-
-A new objective is one function like these.
-"""
+"""Objectives: functions from moments to quadratics. A new objective is one such function."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ from .quadratic import Quadratic
 
 
 def inconsistency(moments: Moments) -> Quadratic:
-    """How far the policy, projected onto each action, misses it (eqs 4 and 14).
+    """Squared distance of each action from the policy projected onto it (eqs 4 and 14).
 
     ``E_i = Σ w (r − ûᵀ π̃(x))²``
     """
@@ -21,7 +18,7 @@ def inconsistency(moments: Moments) -> Quadratic:
 
 
 def standard_risk(moments: Moments) -> Quadratic:
-    """How far the policy misses each action (eqs 5 and 11).
+    """Squared distance of each action from the policy (eqs 5 and 11).
 
     ``E_2 = Σ w ‖u − π̃(x)‖²``
     """
@@ -32,7 +29,7 @@ def standard_risk(moments: Moments) -> Quadratic:
 
 
 def vec(weights: Array) -> Array:
-    """Matrices (..., d, p) laid out by columns, shape (..., d p)."""
+    """Matrices (..., d, p) stacked by columns, shape (..., d p)."""
     d, p = weights.shape[-2:]
     laid: Array = namespace(weights).reshape(weights.mT, (*weights.shape[:-2], d * p))
     return laid

@@ -1,4 +1,4 @@
-"""Orthogonal projections: what a constraint leaves, and what an action shows.
+"""Orthogonal projections: onto the null space of constraints, and onto actions.
 
 Every projection here is symmetric and idempotent, ``P = Pᵀ = P²``.
 """
@@ -17,7 +17,7 @@ RANK_TOLERANCE = 1e-9
 """Singular values below this share of the largest count as zero."""
 
 ROW_TOLERANCE = 1e-12
-"""Rows shorter than this share of the longest are rounding, as in a Jacobian at a singular posture."""
+"""Rows shorter than this share of the longest are rounding errors, as in a Jacobian at a singular posture."""
 
 
 def null_space_projection(constraint_matrix: Array, tolerance: float = RANK_TOLERANCE) -> Array:
@@ -26,11 +26,10 @@ def null_space_projection(constraint_matrix: Array, tolerance: float = RANK_TOLE
     Parameters
     ----------
     constraint_matrix : ndarray, shape (..., k, d)
-        One constraint in each row; rows may be zero or dependent.
+        One constraint in each row; rows may be zero or linearly dependent.
     tolerance : float
-        Of the rows scaled to unit length, singular values below ``tolerance``
-        times the largest count as zero, so that a nearly dependent row
-        constrains nothing new.
+        Singular values of the rows, scaled to unit length, count as zero below
+        ``tolerance`` times the largest.
 
     Returns
     -------
@@ -51,7 +50,7 @@ def null_space_projection(constraint_matrix: Array, tolerance: float = RANK_TOLE
     if not np.isfinite(constraint_matrix).all():
         raise InvalidDataError("constraint matrix: found NaN or infinity, expected finite numbers.")
     d = constraint_matrix.shape[-1]
-    # A u = 0 says the same whatever the length of a row, so none counts less than another unless it is rounding.
+    # A u = 0 does not depend on the lengths of the rows, so all are scaled to one, except those that are rounding.
     directions, lengths = unit_actions(constraint_matrix)
     directions[lengths <= ROW_TOLERANCE * lengths.max(axis=-1, initial=0.0, keepdims=True)] = 0.0
     # By rows of Vᵀ rather than by A⁺: the rank decision is explicit and N is symmetric by construction.
@@ -59,7 +58,7 @@ def null_space_projection(constraint_matrix: Array, tolerance: float = RANK_TOLE
     active = singular > tolerance * singular.max(axis=-1, initial=0.0, keepdims=True)
     rows = rows * active[..., None]
     free = np.eye(d) - np.swapaxes(rows, -1, -2) @ rows
-    # Where nothing is left free, rounding must not look like a direction.
+    # At full rank N is exactly zero: rounding errors must not become a direction.
     return np.where((active.sum(axis=-1) == d)[..., None, None], 0.0, free)
 
 

@@ -60,7 +60,7 @@ class Quadratic(Shown):
     linear : ndarray, shape (M, P)
     constant : ndarray, shape (M,)
     gram : ndarray, shape (M, p, p), optional
-        Where the Hessian is ``gram ⊗ I``, and products with it need not multiply its zeros.
+        Where the Hessian is ``gram ⊗ I``; makes products with it cheaper.
     """
 
     hessian: Array
@@ -74,19 +74,19 @@ class Quadratic(Shown):
         Returns
         -------
         ndarray, shape (M,) or (M, K)
-            Below zero where the objective is, as those of noise-corrected moments may be, or by rounding; NaN and
-            infinity where numbers overflow.
+            Negative by rounding, or where the objective is, as with noise-corrected moments; NaN or infinite on
+            overflow.
         """
         xp = namespace(weights)
         many = weights if weights.ndim == 3 else weights[..., None]
-        with np.errstate(over="ignore", invalid="ignore"):  # overflow is for the caller to see
+        with np.errstate(over="ignore", invalid="ignore"):  # the caller sees overflow in the values
             bent = self.hessian @ many
             bent -= 2.0 * self.linear[..., None]
             bent *= many
             values = self.constant[:, None] + xp.sum(bent, axis=1)
         return values if weights.ndim == 3 else values[:, 0]
 
-    __array_ufunc__ = None  # an array times a quadratic is ours to compute
+    __array_ufunc__ = None  # so that array * quadratic calls __rmul__
 
     def __add__(self, other: Quadratic) -> Quadratic:
         """Add, problem by problem."""
@@ -125,7 +125,7 @@ class Path:
     eigenvalues : ndarray, shape (M, P)
         Of the first objective's Hessian, ascending.
     lowest : ndarray of int, shape (M,)
-        Splits below this one would divide by rounding noise; there the path
+        Splits below this one would divide by rounding errors; there the path
         repeats the solution at this one.
     basis : ndarray, shape (M, P, P)
         The A of the derivation above.
@@ -214,7 +214,7 @@ def lexicographic_path(first: Quadratic, second: Quadratic | None = None) -> Pat
 
 
 def minimum(objective: Quadratic) -> Array:
-    """Minimise one objective alone, shape (M, P); of least norm where it is not unique."""
+    """Minimiser of one objective, shape (M, P); that of least norm where it is not unique."""
     xp = namespace(objective.linear)
     axes = xp.eye(objective.linear.shape[1], dtype=xp.float64, device=objective.linear.device)
     axes = xp.broadcast_to(axes, objective.hessian.shape)
@@ -241,8 +241,8 @@ def softened_minima(first: Quadratic, second: Quadratic, softnesses: Sequence[fl
 def eigensystem(hessian: Array) -> tuple[Array, Array]:
     """Eigenvalues (M, P), ascending, and eigenvectors (M, P, P) of symmetric matrices.
 
-    Scaled to one, and without what is too small to matter: LAPACK gives up
-    on some matrices whose entries span hundreds of orders of magnitude.
+    Computed on the matrix scaled to one, with entries below 1e-60 set to zero:
+    LAPACK fails on some matrices whose entries span hundreds of orders of magnitude.
     """
     xp = namespace(hessian)
     size = xp.max(xp.abs(hessian), axis=(-2, -1), keepdims=True)
@@ -255,10 +255,10 @@ def eigensystem(hessian: Array) -> tuple[Array, Array]:
 def _factor(objective: Quadratic, vectors: Array) -> Array:
     """Cholesky factor of ``Vᵀ M V`` with M the Hessian, shape (M, P, P).
 
-    Where M is singular, its null directions are given the weight of its
-    largest eigenvalue first. The linear term has no part in them, so they
-    stay zero, which is the solution of least norm. An M that is nothing but
-    underflow, as of a field that no sample is near, counts as zero.
+    Where M is singular, its zero eigenvalues are replaced by the largest one.
+    The linear term is orthogonal to their eigenvectors, so weights along them
+    stay zero: the solution of least norm. An M of underflow only, as of a
+    field far from all samples, counts as zero.
     """
     xp = namespace(objective.hessian)
     try:
@@ -291,10 +291,10 @@ def _running(columns: Array) -> Array:
 
 def _solve_lower(lower: Array, right: Array) -> Array:
     """Solve ``L y = r`` for each problem."""
-    if is_foreign(lower):  # the standard knows no triangular matrices
+    if is_foreign(lower):  # the array API standard has no triangular solve
         solved: Array = namespace(lower).linalg.solve(lower, right)
         return solved
     return np.stack(
-        # BLAS has columns first: Lᵀ and rᵀ as they lie, and r on the right.
+        # BLAS stores columns first: it sees Lᵀ and rᵀ in the same memory, so r is on the right.
         [dtrsm(1.0, factor.T, side.T, side=1, lower=0) for factor, side in zip(lower, right, strict=True)]
     ).mT

@@ -1,11 +1,12 @@
-"""Beyond the paper: learners that look at the samples, hold under noise, and say when they cannot know."""
+"""Learners beyond the paper: they use the samples, estimate noise and uncertainty, and need no α."""
 
 from ..solution import Uncertainty
-from .learner import HIDDEN, Likelihood, NoiseCorrected, Robust, SampleLearner, Segments
+from .constants import SPHERE_HIDDEN_BY_NOISE
+from .learner import Likelihood, NoiseCorrected, Robust, SampleLearner, Segments
 from .noise import noise_by_differences
 
 __all__ = [
-    "HIDDEN",
+    "SPHERE_HIDDEN_BY_NOISE",
     "Likelihood",
     "NoiseCorrected",
     "Robust",

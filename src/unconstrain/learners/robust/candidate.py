@@ -1,4 +1,4 @@
-"""A policy to choose from."""
+"""A candidate policy."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from .smoothness import Smoothness
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """What one way of learning found.
+    """A policy learnt in one way, of which :class:`~unconstrain.Robust` takes one.
 
     Parameters
     ----------
     name : str
-        How it was learnt.
+        Of the way of learning.
     weights : ndarray, shape (M, d, p)
     posterior : Posterior
     held_out : ndarray, shape (N, d)
-        Prediction of each sample by what is learnt from the other folds.
+        Cross-validated predictions: each sample's from the other folds.
     variance : float
-        Of the noise, per coordinate, misfit included.
+        Residual variance per coordinate, of noise and misfit.
     smoothness : Smoothness
-        Of the policy, as far as it is part of the prior.
+        Smoothness prior in ``posterior``.
     most_consistent : ndarray, shape (N, d)
-        As ``held_out``, but as held-out consistency alone would choose, and no prior.
+        As ``held_out``, with the softness of the least held-out inconsistency.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Learners that look at the samples: they need no α and hold under noise."""
+"""Learners that use the samples themselves: they estimate the noise and need no α."""
 
 from __future__ import annotations
 
@@ -19,40 +19,28 @@ from ..solution import Belief, Solution
 from ..thresholds import judged
 from .candidate import Candidate
 from .consistent import by_segments, noise_corrected, softened
-from .likelihood import MISFIT, free_probability, maximise, settle
+from .constants import (
+    INCONSISTENCY_RATIO,
+    LEAST_INFORMATIVE,
+    LEAST_MISFIT,
+    NEARLY_EXACT,
+    NEGLIGIBLE_RESIDUAL,
+    NOISE_TO_CORRECT,
+    SPHERE_HIDDEN_BY_NOISE,
+)
+from .likelihood import free_probability, maximise, mixture_of
 from .noise import noise_by_differences
 from .posterior import Posterior, unit_information
 from .segments import found_segments
 
-NOISY = 0.015
-"""Noise of more than this share of the actions' size is taken out of the sums."""
-
-CLEAR = 0.05
-"""Where less than this share of the motion is missed, held out and along the actions, a policy is next to exact."""
-
-INFORMED = 0.1
-"""Where of fewer samples than this share more is known than that they are on their spheres, nothing is added by it."""
-
-WORSE = 1.9
-"""By which factor the inconsistency of the likelihood has to be larger to refute it, if it knows half of the samples.
-
-It fits more than the inconsistency, and may be the worse in that for it; the less else it knows, the less.
-"""
-
-NEGLIGIBLE = 0.05
-"""Share of the actions' size that may be missed without counting, when policies are compared."""
-
-HIDDEN = 0.35
-"""Noise of more than this share hides the sphere: free and constrained samples look the same."""
-
 
 class SampleLearner(Learner):
-    """Looks at the samples, not only at their moments, and has a belief beside the weights."""
+    """Learns from the samples, not only from their moments; its solution has a ``belief``."""
 
     needs_samples: ClassVar[bool] = True
 
     def learn(self, training: Training) -> Solution:
-        """Learn from samples; where there is nothing to tell free from constrained, as the hybrid does."""
+        """Learn from the samples; as :class:`~unconstrain.Hybrid` with one action, no motion or a single fold."""
         everything = training.samples
         samples = everything.counted
         if _trivial(samples):
@@ -62,12 +50,12 @@ class SampleLearner(Learner):
 
     @abstractmethod
     def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
-        """Learn from samples of some weight; also what the belief is to say of the choice."""
+        """Learn from the samples of positive weight; returns a policy and further fields of the belief."""
 
 
 @dataclass(frozen=True)
-class _Climbing(SampleLearner):
-    """What learners have that climb to the most probable policy."""
+class _Maximising(SampleLearner):
+    """Settings of the learners that use expectation maximisation."""
 
     steps: int = 60
     most: int = 2000
@@ -76,43 +64,44 @@ class _Climbing(SampleLearner):
         check_at_least("steps", self.steps, 1, whole=True)
         check_at_least("most", self.most, 1, whole=True)
 
-    def _climbed(
+    def _maximised(
         self, samples: Samples, training: Training, corrected: Candidate, consistent: Candidate
     ) -> tuple[Candidate, Array]:
-        """The most probable policy, from the consistent one and from what was observed."""
+        """The most probable policy, from two starts: the consistent policy and direct regression."""
         starts = [consistent.weights, Direct().learn(training).weights]
         return maximise(samples, starts, corrected.smoothness, self.steps, self.most)
 
 
 @dataclass(frozen=True)
-class Likelihood(_Climbing):
-    """The most probable policy, where each sample was free, turned a little, or anywhere on its sphere.
+class Likelihood(_Maximising):
+    """Maximum a posteriori policy under a mixture of free, nearly free and uniformly constrained samples.
 
-    See :mod:`unconstrain.learners.robust.sphere`. It holds where constraints vary at
-    random; where they are a function of the state, what they took looks like
-    part of the policy. Needs the samples, not only their moments.
+    The model is that of :mod:`unconstrain.learners.robust.sphere`. It supposes
+    constraints that vary at random. Where they are a function of the state,
+    their effect is taken for part of the policy. Needs the samples, not only
+    their moments.
 
     Parameters
     ----------
     steps : int
-        Of expectation maximisation from each of two starts, at most.
+        Most steps of expectation maximisation from each of two starts.
     most : int
-        Steps but the last look at no more samples than these, evenly thinned in time.
+        All steps but the last use at most so many samples, evenly thinned in time.
     """
 
     def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
         """The most probable policy."""
         corrected, consistent = _consistent(samples, training)
-        return self._climbed(samples, training, corrected, consistent)[0], {}
+        return self._maximised(samples, training, corrected, consistent)[0], {}
 
 
 @dataclass(frozen=True)
 class NoiseCorrected(SampleLearner):
-    """Consistency first, on moments without the expected part of the noise; see :mod:`~.robust.noise`.
+    """Minimise the inconsistency on noise-corrected moments; see :mod:`unconstrain.learners.robust.noise`.
 
-    Samples count by ‖u‖², and the standard risk beside the inconsistency by
-    what a prior counts. Holds under noise, constraints of any kind, and
-    knows nothing of free samples. Needs the samples, not only their moments.
+    Samples are weighted by ‖u‖², and the standard risk is a unit-information
+    prior. Valid under noise and constraints of any kind; does not use that
+    samples were free. Needs the samples, not only their moments.
 
     Parameters
     ----------
@@ -133,15 +122,15 @@ class NoiseCorrected(SampleLearner):
 
 @dataclass(frozen=True)
 class Segments(SampleLearner):
-    """Learn where each constraint stays the same for a while; see :mod:`unconstrain.learners.robust.segments`.
+    """Learn from segments of constant constraint; see :mod:`unconstrain.learners.robust.segments`.
 
     Needs the samples, not only their moments.
 
     Parameters
     ----------
     labels : {"found", "groups"}
-        "groups": each demonstration has one constant constraint. "found": constraints change on the way, and where
-        they do is found from the actions, which must then be in the order of time.
+        "groups": each demonstration is one segment. "found": change points within demonstrations are found from the
+        actions, which must then be in the order of time.
     noise : float, optional
         Standard deviation of the noise on each action coordinate; by default from differences in time.
     """
@@ -156,7 +145,7 @@ class Segments(SampleLearner):
             check_at_least("noise", self.noise, 0.0)
 
     def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
-        """The policy that is consistent with the projection of each segment."""
+        """The policy of least constrained error."""
         most = noise_by_differences(samples.actions, samples.groups)
         noise = self.noise if self.noise is not None else float(np.sqrt(min(most, samples.energy)))
         by_group = self.labels == "groups"
@@ -167,18 +156,18 @@ class Segments(SampleLearner):
 
 
 @dataclass(frozen=True)
-class Robust(_Climbing):
-    """Learn under noise and in every constraint setting, with nothing to tune.
+class Robust(_Maximising):
+    """Learn under noise and any kind of constraints, without a setting to tune.
 
-    Learns a consistent policy, on noise-corrected moments where what is
-    missed is noise or next to nothing, and as :class:`~unconstrain.Hybrid`
-    with ``alpha="auto"`` otherwise, and the most probable one (:class:`Likelihood`). The likelihood's is
-    taken unless noise hides the sphere, or it knows no more of next to any
-    sample than that it is on its sphere, or its inconsistency on samples held
-    out is too far above that on noise-corrected moments: then constraints do
-    not vary as it supposes.
+    Learns two policies and takes one. The *consistent* policy is
+    :class:`NoiseCorrected` where the residuals are noise or small, and
+    :class:`~unconstrain.Hybrid` with ``alpha="auto"`` otherwise. The *most
+    probable* policy is that of :class:`Likelihood`. It is taken unless noise
+    hides the sphere, or nearly all samples are in the uniform component, or
+    its held-out inconsistency is too far above that of noise-corrected
+    moments: then the constraints do not vary at random, as it supposes.
 
-    Needs the samples, not only their moments, and keeps those it has seen.
+    Needs the samples, not only their moments, and keeps them.
 
     Parameters
     ----------
@@ -189,15 +178,16 @@ class Robust(_Climbing):
     def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
         """The likelihood's or the consistent policy."""
         corrected, consistent = _consistent(samples, training)
-        likely, mixture = self._climbed(samples, training, corrected, consistent)
+        likely, mixture = self._maximised(samples, training, corrected, consistent)
         learnt = {one.name: one for one in (corrected, consistent, likely)}
         gaps = {
             name: compared(samples, one.held_out, corrected.most_consistent, corrected.variance)
             for name, one in learnt.items()
         }
         informed = 1.0 - float(mixture[-1])
-        refuted = _refuted(*gaps[likely.name], WORSE ** min(1.0, 2.0 * informed))
-        usable = informed > INFORMED and not refuted and not _more_than(HIDDEN, likely.variance, samples)
+        refuted = _refuted(*gaps[likely.name], INCONSISTENCY_RATIO ** min(1.0, 2.0 * informed))
+        hidden = _more_than(SPHERE_HIDDEN_BY_NOISE, likely.variance, samples)
+        usable = informed > LEAST_INFORMATIVE and not refuted and not hidden
         return likely if usable else consistent, {
             "compared": {name: gap for name, (gap, _) in gaps.items()},
             "refuted": refuted,
@@ -206,48 +196,48 @@ class Robust(_Climbing):
 
 
 def _consistent(samples: Samples, training: Training) -> tuple[Candidate, Candidate]:
-    """On noise-corrected moments; and what is to be had of consistency alone: the same where noise is what is missed.
+    """The policy of noise-corrected moments, and the consistent policy: the same where residuals are noise or small.
 
-    Where it is not, as if people do not always do the same, consistency is given up as far as held-out data lets it.
+    Elsewhere, as where a demonstrator varies, it is a softened hybrid of the softness that held-out data allows.
     """
     corrected = noise_corrected(samples)
-    exact = 1.0 - _explained(samples, corrected.held_out) < CLEAR
-    noisy = _more_than(NOISY, corrected.variance, samples)
+    exact = 1.0 - _explained(samples, corrected.held_out) < NEARLY_EXACT
+    noisy = _more_than(NOISE_TO_CORRECT, corrected.variance, samples)
     return corrected, corrected if noisy or exact else softened(samples, training.filled)
 
 
 def _refuted(gap: float, error: float, factor: float) -> bool:
-    """Whether an inconsistency is larger by a factor, and by more than a standard error."""
+    """Whether a log-ratio of inconsistencies exceeds that of a cut-off and its own standard error."""
     return bool(gap > max(np.log(factor), error))
 
 
 def compared(samples: Samples, one: Array, other: Array, variance: float) -> tuple[float, float]:
-    """Logarithm of the inconsistency of ``one`` over ``other``'s, median over the folds and standard error.
+    """Logarithm of the inconsistency of ``one`` over that of ``other``: median over the folds, and standard error.
 
-    The inconsistency is that of :mod:`unconstrain.learners.robust.noise`, in which
-    every sample's residual has the same variance.
+    The inconsistency is the mean square of ρ (:mod:`unconstrain.learners.robust.noise`), whose variance does not
+    depend on the constraint.
     """
     actions, d = samples.actions, samples.actions.shape[1]
     counts = np.bincount(samples.folds, samples.counts)
 
-    def missed(policy: Array) -> Array:
+    def loss(policy: Array) -> Array:
         residual = (actions * (actions - policy)).sum(axis=1) - d * variance
         return np.asarray(np.bincount(samples.folds, samples.counts * residual**2) / counts)
 
-    floor = (NEGLIGIBLE * samples.energy) ** 2
-    gap = np.log(missed(one) + floor) - np.log(missed(other) + floor)
+    floor = (NEGLIGIBLE_RESIDUAL * samples.energy) ** 2
+    gap = np.log(loss(one) + floor) - np.log(loss(other) + floor)
     return float(np.median(gap)), float(gap.std(ddof=1) / np.sqrt(len(gap)))
 
 
 def _solution(chosen: Candidate, samples: Samples, everything: Samples, **more: Any) -> Solution:
-    variance, mixture = settle(samples, samples.predict(chosen.weights))
+    variance, mixture = mixture_of(samples, samples.predict(chosen.weights))
     free = free_probability(everything, everything.predict(chosen.weights), variance, mixture)
     models, d, p = chosen.weights.shape
-    belief = _belief(samples, chosen.posterior.evidence)
-    from_noise, undetermined = belief.spreads()
+    vague = _vague_posterior(samples, chosen.posterior.evidence)
+    from_noise, undetermined = vague.covariances()
     return Solution(
         chosen.weights,
-        belief.determined(),
+        vague.determined(),
         d * p,
         np.zeros(models),
         method=chosen.name,
@@ -257,57 +247,58 @@ def _solution(chosen: Candidate, samples: Samples, everything: Samples, **more: 
             free_share=float(everything.counts @ free / everything.counts.sum()),
             free=free[np.argsort(everything.places)],
             from_noise=from_noise,
-            undetermined=undetermined + _moved(chosen, belief),
+            undetermined=undetermined + _prior_sensitivity(chosen, vague),
             held_out_score=_explained(samples, chosen.held_out),
             **more,
         ),
     )
 
 
-def _belief(samples: Samples, evidence: Quadratic) -> Posterior:
-    """Evidence beside a prior that knows the policy's size, as if each model had seen one such sample a feature."""
+def _vague_posterior(samples: Samples, evidence: Quadratic) -> Posterior:
+    """Posterior with a weak prior: unit information of p samples, their residuals as large as the actions."""
     d, p = samples.actions.shape[1], samples.features.shape[1]
-    vague = samples.risk(samples.actions, np.full(len(samples), d / max(samples.energy, 1e-300)))
-    return Posterior(evidence, unit_information(p, samples.sizes) * vague)
+    risk = samples.risk(samples.actions, np.full(len(samples), d / max(samples.energy, 1e-300)))
+    return Posterior(evidence, unit_information(p, samples.sizes) * risk)
 
 
-def _moved(chosen: Candidate, belief: Posterior) -> Array:
-    """How far the weights would move under the weaker prior of the belief, as a covariance, shape (M, P, P)."""
-    prior = belief.prior + chosen.smoothness.prior()
-    apart = vec(chosen.weights) - vec(Posterior(belief.evidence, prior).weights(chosen.weights.shape[1]))
+def _prior_sensitivity(chosen: Candidate, vague: Posterior) -> Array:
+    """Outer product of the change in the weights under the weak prior, (M, P, P), to be added to a covariance."""
+    prior = vague.prior + chosen.smoothness.prior()
+    apart = vec(chosen.weights) - vec(Posterior(vague.evidence, prior).weights(chosen.weights.shape[1]))
     return np.asarray(apart[:, :, None] * apart[:, None, :])
 
 
 def _misfit(samples: Samples, variance: float) -> float:
-    """Variance, per coordinate, of what the model misses: what the residuals have and differences in time have not."""
-    least = MISFIT**2 * samples.energy
+    """Variance of the misfit per coordinate: residual variance less that of the noise by differences in time."""
+    least = LEAST_MISFIT**2 * samples.energy
     smooth = variance - max(noise_by_differences(samples.actions, samples.groups), least)
     return least / samples.actions.shape[1] + max(smooth, 0.0)
 
 
 def _explained(samples: Samples, policy: Array) -> float:
+    """Share of the squared motion explained: one minus the inconsistency of predictions (N, d) over the energy."""
     directions, lengths = unit_actions(samples.actions)
-    missed = samples.counts @ (lengths - (directions * policy).sum(axis=1)) ** 2
-    return float(1.0 - missed / (samples.counts @ lengths**2))
+    loss = samples.counts @ (lengths - (directions * policy).sum(axis=1)) ** 2
+    return float(1.0 - loss / (samples.counts @ lengths**2))
 
 
 def _trivial(samples: Samples) -> bool:
-    """Whether there is no sphere, or nothing on it."""
+    """Whether there is one action column only, no motion, or nothing to hold out."""
     return samples.actions.shape[1] == 1 or samples.energy == 0.0 or samples.folds.max() == 0
 
 
 def _plain(training: Training, samples: Samples, everything: Samples) -> Solution:
-    """What the hybrid makes of it."""
+    """The hybrid's solution, with a belief from its residuals."""
     found, whole = Hybrid().learn(training), training.filled.whole
     size, d = found.directions, samples.actions.shape[1]
-    missed = judged(inconsistency(whole), vec(found.weights)) / np.maximum(samples.sizes - size, 1.0)
-    evidence = (1.0 / np.maximum(missed, MISFIT**2 * samples.energy + 1e-300)) * inconsistency(whole)
-    from_noise, undetermined = _belief(samples, evidence).spreads()
+    residual = judged(inconsistency(whole), vec(found.weights)) / np.maximum(samples.sizes - size, 1.0)
+    evidence = (1.0 / np.maximum(residual, LEAST_MISFIT**2 * samples.energy + 1e-300)) * inconsistency(whole)
+    from_noise, undetermined = _vague_posterior(samples, evidence).covariances()
     return replace(
         found,
         belief=Belief(
-            noise=float(np.sqrt(missed.mean())),
-            misfit=MISFIT * float(np.sqrt(samples.energy / d)),
+            noise=float(np.sqrt(residual.mean())),
+            misfit=LEAST_MISFIT * float(np.sqrt(samples.energy / d)),
             free_share=1.0,
             free=np.ones(len(everything)),
             from_noise=from_noise,
@@ -317,4 +308,5 @@ def _plain(training: Training, samples: Samples, everything: Samples) -> Solutio
 
 
 def _more_than(share: float, variance: float, samples: Samples) -> bool:
+    """Whether noise of a variance per coordinate exceeds a share of the actions."""
     return samples.actions.shape[1] * variance > share**2 * samples.energy

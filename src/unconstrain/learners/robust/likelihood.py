@@ -1,4 +1,4 @@
-"""The most probable policy if each sample was free, turned a little, or anywhere on its sphere."""
+"""Maximum a posteriori policy under the mixture model of :mod:`.sphere`, by expectation maximisation."""
 
 from __future__ import annotations
 
@@ -12,52 +12,44 @@ from ...base.arrays import Array
 from ...risks import inconsistency
 from ...training import Samples
 from .candidate import Candidate
+from .constants import ANGULAR_SPREADS, EM_LEAST_STEPS, EM_TOLERANCE, LEAST_MISFIT, POOLED_PSEUDO_COUNT
 from .noise import correlation_time, noise_by_differences
 from .posterior import Posterior, unit_information
 from .smoothness import Smoothness
-from .sphere import SPREADS, Beliefs, Distances, beliefs, distances
-
-MISFIT = 0.015
-"""No model is right to better than this share of the actions' size."""
-
-_GAIN = 1e-4
-"""Less than this in a sample's log-likelihood, for each action coordinate, is the end of a climb."""
-
-_AT_LEAST = 6
-_POOLED = 10.0
-"""Samples that the data as a whole counts for, beside a demonstration's own, in how free it was."""
+from .sphere import Distances, Responsibilities, distances, e_step
 
 
 def maximise(
     samples: Samples, starts: Sequence[Array], smoothness: Smoothness, steps: int, most: int
 ) -> tuple[Candidate, Array]:
-    """Expectation maximisation from several starts; the most probable end is kept.
+    """Expectation maximisation from several starts.
 
     Parameters
     ----------
     samples : Samples
     starts : sequence of ndarray, shape (M, d, p)
-        Another end than the first one's is kept only if it is clearly more probable.
+        A later start's optimum replaces an earlier one's only if its log-likelihood is higher by more than one
+        standard error over the folds.
     smoothness : Smoothness
-        To begin with.
+        Initial smoothness prior.
     steps : int
-        At most so many from each.
+        Most steps from each start.
     most : int
-        Of more samples than these, every second, third, ... is climbed on; the last step is on all.
+        More samples than these are thinned to every second, third, ...; the last step uses all.
 
     Returns
     -------
     candidate : Candidate
     mixture : ndarray, shape (K + 1,)
-        Share of each spread on the sphere, and of the uniform density.
+        Mixing proportions: of each spread, and of the uniform component.
     """
     thinned, noise = samples[:: -(-len(samples) // most)], noise_by_differences(samples.actions, samples.groups)
-    ends = [_climb(thinned, start, smoothness, steps, noise) for start in starts]
-    best = ends[0]
-    for end in ends[1:]:
-        if clearly_more(thinned, end.likelihood - best.likelihood):
-            best = end
-    model = _Model(samples, samples.predict(best.weights), best.variance, best.mixture, best.smoothness)
+    optima = [_maximise_from(thinned, start, smoothness, steps, noise) for start in starts]
+    best = optima[0]
+    for optimum in optima[1:]:
+        if exceeds_error(thinned, optimum.log_likelihood - best.log_likelihood):
+            best = optimum
+    model = _GaussNewton(samples, samples.predict(best.weights), best.variance, best.mixture, best.smoothness)
     parts = [model.posterior(samples.folds == fold) for fold in range(int(samples.folds.max()) + 1)]
     d = samples.actions.shape[1]
     whole = _sum(parts)
@@ -69,91 +61,92 @@ def maximise(
     return found, best.mixture
 
 
-def settle(samples: Samples, policy: Array, steps: int = 20) -> tuple[float, Array]:
-    """Noise variance and mixture that go best with a policy's predictions (N, d)."""
-    variance, mixture = _begin(samples, policy)
+def mixture_of(samples: Samples, policy: Array, steps: int = 20) -> tuple[float, Array]:
+    """Noise variance and mixing proportions of maximum likelihood, at a policy's fixed predictions (N, d)."""
+    variance, mixture = _initial(samples, policy)
     place = distances(samples.actions, policy)
     for _ in range(steps):
-        found = beliefs(samples.actions, policy, place, variance, mixture)
-        missed, mixture = _updated(samples, policy, place, found)
-        variance = _trusted(samples, missed)
+        found = e_step(samples.actions, policy, place, variance, mixture)
+        residual, mixture = _m_step(samples, policy, place, found)
+        variance = _floored(samples, residual)
     return variance, mixture
 
 
 def free_probability(samples: Samples, policy: Array, variance: float, mixture: Array) -> Array:
-    """Probability that each sample was free, knowing that a demonstration's samples go together, shape (N,).
+    """Posterior probability that each sample was free, with a mixture for each demonstration, shape (N,).
 
-    Each demonstration has a share of free samples of its own, drawn towards that of all. What turned a sample by less
-    than the noise does is as good as nothing, and counts as free.
+    A demonstration's mixing proportions have a Dirichlet prior around the pooled ones. Spreads below the noise are
+    indistinguishable from free, and count as free.
     """
     place = distances(samples.actions, policy)
     count = int(samples.groups.max()) + 1
     own = np.tile(mixture, (count, 1))
     size = np.bincount(samples.groups, samples.counts, count)[:, None]
-    for _ in range(_AT_LEAST):
-        shares = beliefs(samples.actions, policy, place, variance, own[samples.groups]).shares
-        seen = np.stack([np.bincount(samples.groups, samples.counts * one, count) for one in shares.T], axis=1)
-        own = (seen + _POOLED * mixture) / (size + _POOLED)
-    hidden = np.array(SPREADS) * place.lengths[:, None] < np.sqrt(variance)
-    return np.asarray((shares[:, :-1] * hidden).sum(axis=1))
+    for _ in range(EM_LEAST_STEPS):
+        components = e_step(samples.actions, policy, place, variance, own[samples.groups]).components
+        seen = np.stack([np.bincount(samples.groups, samples.counts * one, count) for one in components.T], axis=1)
+        own = (seen + POOLED_PSEUDO_COUNT * mixture) / (size + POOLED_PSEUDO_COUNT)
+    hidden = np.array(ANGULAR_SPREADS) * place.lengths[:, None] < np.sqrt(variance)
+    return np.asarray((components[:, :-1] * hidden).sum(axis=1))
 
 
-def _begin(samples: Samples, policy: Array) -> tuple[float, Array]:
+def _initial(samples: Samples, policy: Array) -> tuple[float, Array]:
+    """Noise variance from the median of δ², which is 0.455 σ² (χ² of one degree of freedom), and an even mixture."""
     radial = distances(samples.actions, policy).radial
-    count = len(SPREADS) + 1
-    return _trusted(samples, float(np.median(radial**2)) / 0.455), np.full(count, 1.0 / count)
+    count = len(ANGULAR_SPREADS) + 1
+    return _floored(samples, float(np.median(radial**2)) / 0.455), np.full(count, 1.0 / count)
 
 
-def _trusted(samples: Samples, variance: float) -> float:
-    """Not below what no model is right to."""
-    return max(variance, MISFIT**2 * samples.energy)
+def _floored(samples: Samples, variance: float) -> float:
+    """Residual variance, at least that of the least misfit."""
+    return max(variance, LEAST_MISFIT**2 * samples.energy)
 
 
-def _updated(samples: Samples, policy: Array, place: Distances, found: Beliefs) -> tuple[float, Array]:
-    """Variance of what is missed, and mixture, given what is thought of each sample."""
+def _m_step(samples: Samples, policy: Array, place: Distances, found: Responsibilities) -> tuple[float, Array]:
+    """Residual variance and mixing proportions, given the responsibilities."""
     counts, free, d = samples.counts, found.free, samples.actions.shape[1]
-    missed = (1.0 - free) * place.radial**2 + free * ((samples.actions - policy) ** 2).sum(axis=1)
-    return float(counts @ missed / (counts @ (1.0 - free + d * free))), counts @ found.shares / counts.sum()
+    squares = (1.0 - free) * place.radial**2 + free * ((samples.actions - policy) ** 2).sum(axis=1)
+    return float(counts @ squares / (counts @ (1.0 - free + d * free))), counts @ found.components / counts.sum()
 
 
-class _End(NamedTuple):
-    """Where a climb ended: weights, σ² and mixture, how much smoothness counts, and each sample's log-likelihood."""
+class _Optimum(NamedTuple):
+    """Where expectation maximisation ended; ``log_likelihood`` (N,) is that of each sample."""
 
     weights: Array
     variance: float
     mixture: Array
     smoothness: Smoothness
-    likelihood: Array
+    log_likelihood: Array
 
 
-def _climb(samples: Samples, weights: Array, smoothness: Smoothness, steps: int, noise: float) -> _End:
-    """One run of expectation maximisation; ``noise`` is the variance of what does not go on from sample to sample."""
+def _maximise_from(samples: Samples, weights: Array, smoothness: Smoothness, steps: int, noise: float) -> _Optimum:
+    """Expectation maximisation from some weights; ``noise`` is the variance estimated by differences in time."""
     policy, last = samples.predict(weights), -np.inf
-    variance, mixture = _begin(samples, policy)
+    variance, mixture = _initial(samples, policy)
     for step in range(steps):
-        model = _Model(samples, policy, variance, mixture, smoothness)
-        missed, mixture = _updated(samples, policy, model.place, model.found)
-        variance = _trusted(samples, missed)
-        likelihood = float(samples.counts @ model.found.likelihood / samples.counts.sum())
+        model = _GaussNewton(samples, policy, variance, mixture, smoothness)
+        residual, mixture = _m_step(samples, policy, model.place, model.found)
+        variance = _floored(samples, residual)
+        mean = float(samples.counts @ model.found.log_likelihood / samples.counts.sum())
         posterior = model.posterior(variance=variance)
         weights = posterior.weights(samples.actions.shape[1])
-        smoothness = smoothness.updated(weights, posterior, min(1.0, noise / variance, missed / variance))
+        smoothness = smoothness.updated(weights, posterior, min(1.0, noise / variance, residual / variance))
         policy = samples.predict(weights)
-        if step >= _AT_LEAST and abs(likelihood - last) < _GAIN * samples.actions.shape[1]:
+        if step >= EM_LEAST_STEPS and abs(mean - last) < EM_TOLERANCE * samples.actions.shape[1]:
             break
-        last = likelihood
-    return _End(weights, variance, mixture, smoothness, model.found.likelihood)
+        last = mean
+    return _Optimum(weights, variance, mixture, smoothness, model.found.log_likelihood)
 
 
-def clearly_more(samples: Samples, gain: Array) -> bool:
-    """Whether the gain of each sample is above zero by a standard error: one demonstration must not decide."""
+def exceeds_error(samples: Samples, gain: Array) -> bool:
+    """Whether the mean gain over the folds exceeds its standard error, so that no single demonstration decides."""
     size = np.bincount(samples.folds, samples.counts)
     by_fold = np.bincount(samples.folds, samples.counts * gain)[size > 0] / size.mean()
     return len(by_fold) > 1 and bool(by_fold.mean() > by_fold.std(ddof=1) / np.sqrt(len(by_fold)))
 
 
-class _Model:
-    """The quadratic that stands for the likelihood near a policy (Gauss–Newton), as evidence and prior."""
+class _GaussNewton:
+    """Quadratic approximation of the expected log-posterior about a policy (Gauss–Newton), as evidence and prior."""
 
     def __init__(
         self,
@@ -166,39 +159,39 @@ class _Model:
         self.samples, self.policy, self.variance = samples, policy, variance
         self.smoothness = smoothness
         self.place = distances(samples.actions, policy)
-        self.found = beliefs(samples.actions, policy, self.place, variance, mixture)
+        self.found = e_step(samples.actions, policy, self.place, variance, mixture)
 
     def posterior(self, rows: NDArray[np.bool_] | None = None, variance: float | None = None) -> Posterior:
-        """Of all samples, or of some, which then count as their part of all."""
+        """Of all samples, or of some, with the prior scaled to their share of all."""
         samples, place, found = self.samples, self.place, self.found
         noise = self.variance if variance is None else variance
         free, tangential = found.free, found.tangential
-        # Neighbours in time say the same again: misfit and constraints go on from sample to sample.
+        # Residuals and constraints are autocorrelated in time, so n samples carry the information of fewer.
         along = correlation_time(place.radial[:, None], samples.groups)
         across = correlation_time(np.sqrt(tangential)[:, None] * place.turn, samples.groups)
         size = np.linalg.norm(place.normal, axis=1)
         normal = place.normal / np.maximum(size, 1e-300)[:, None]
         target = (place.radial + (place.normal * self.policy).sum(axis=1)) / np.maximum(size, 1e-300)
         radial = (1.0 - free) * size**2 / (noise * along)
-        held, turned = free / (noise * along), tangential / across
-        points = turned[:, None] * (self.policy + place.turn) + held[:, None] * samples.actions
-        points /= np.maximum(turned + held, 1e-300)[:, None]
-        spread, worth = self._prior()
+        at_end, turned = free / (noise * along), tangential / across
+        points = turned[:, None] * (self.policy + place.turn) + at_end[:, None] * samples.actions
+        points /= np.maximum(turned + at_end, 1e-300)[:, None]
+        spread, factor = self._prior()
         part = slice(None) if rows is None else rows
         some = samples if rows is None else samples[rows]
         evidence = inconsistency(some.moments(target[part, None] * normal[part], radial[part]))
-        evidence = evidence + some.risk(points[part], (turned + held)[part])
+        evidence = evidence + some.risk(points[part], (turned + at_end)[part])
         risk = some.risk(samples.actions[part], np.full(len(some), 1.0 / (spread * along)))
         counted = float(some.counts.sum() / samples.counts.sum())
         smooth = self.smoothness.prior(counted)
-        return Posterior(evidence, worth * risk + smooth)
+        return Posterior(evidence, factor * risk + smooth)
 
     def _prior(self) -> tuple[float, Array]:
-        """Mean square of what constraints took in each coordinate, and what the risk is worth beside it."""
-        samples, held = self.samples, self.samples.counts * (1.0 - self.found.free)
+        """Variance per coordinate of the constrained actions about the policy, and unit-information factors (M,)."""
+        samples, constrained = self.samples, self.samples.counts * (1.0 - self.found.free)
         d = samples.actions.shape[1]
         away = np.maximum(((samples.actions - self.policy) ** 2).sum(axis=1) - self.place.radial**2, 0.0)
-        spread = float(held @ away / ((held.sum() + 1e-9) * (d - 1))) + self.variance
+        spread = float(constrained @ away / ((constrained.sum() + 1e-9) * (d - 1))) + self.variance
         return spread, unit_information(d * samples.features.shape[1], samples.sizes)
 
 

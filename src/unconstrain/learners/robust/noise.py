@@ -1,4 +1,4 @@
-"""How much noise there is on the actions, how it hangs together in time, and sums without it.
+"""Noise on the actions: its variance, its autocorrelation, and moments corrected for it.
 
 Let ``u = N π + ε`` with ε of variance σ² in each of d coordinates. The
 direction of a slow action is mostly noise, and eq. 4 gives it full weight.
@@ -6,16 +6,17 @@ The residual
 
     ρ = ‖u‖² − uᵀπ − d σ² = ‖ε‖² − d σ² − εᵀ(I − 2N) π
 
-has mean zero, and, since I − 2N is a reflection, the variance
-``σ²‖π‖² + 2 d σ⁴`` whatever the constraint: it is the inconsistency with
-samples weighted by ‖u‖². Its quadratic is not yet right, as u is noisy in
-it twice; expectations give what has to be subtracted:
+has mean zero and, since I − 2N is a reflection, the variance
+``σ²‖π‖² + 2 d σ⁴`` under any constraint. It is the residual of the
+inconsistency with samples weighted by ‖u‖². The sum of its squares is biased
+as a quadratic in the weights, since u is a regressor with errors; the bias
+follows from the expectations
 
     E[u uᵀ]       = N π πᵀ N + σ² I
     E[‖u‖² u]     = (‖N π‖² + (d + 2) σ²) N π
     E[‖u‖⁴]       = ‖N π‖⁴ + 2 (d + 2) σ² ‖N π‖² + d (d + 2) σ⁴
 
-All of it is in the moments with weights ‖u‖² and with weights 1.
+and is a combination of the moments with sample weights ‖u‖² and 1.
 """
 
 from __future__ import annotations
@@ -28,18 +29,15 @@ from scipy.stats import chi2
 
 from ...base.arrays import Array
 from ...risks import Moments, standard_risk
-
-_ORDER = 4
-_LAGS = 20
-_QUIET = 0.05
+from .constants import DIFFERENCE_ORDER, LEAST_AUTOCORRELATION, MOST_LAGS
 
 
 def noise_by_differences(actions: Array, groups: NDArray[np.intp]) -> float:
-    """Variance of what does not go on smoothly from sample to sample, per coordinate.
+    """Variance of the white noise on each action coordinate, from differences in time.
 
-    From fourth differences within each demonstration: a movement has almost
-    none. Their median does not mind a constraint that switches now and then.
-    One that changes at every sample looks like noise; then this is too large.
+    The median of the squared fourth differences within demonstrations, which
+    is robust to constraints that switch now and then. Biased upwards where a
+    constraint changes at every sample: that looks like noise.
 
     Parameters
     ----------
@@ -51,11 +49,11 @@ def noise_by_differences(actions: Array, groups: NDArray[np.intp]) -> float:
     float
         Infinity where no demonstration is long enough.
     """
-    weights = np.array([(-1) ** i * comb(_ORDER, i) for i in range(_ORDER + 1)], dtype=np.float64)
-    count = len(actions) - _ORDER
+    weights = np.array([(-1) ** i * comb(DIFFERENCE_ORDER, i) for i in range(DIFFERENCE_ORDER + 1)], dtype=np.float64)
+    count = len(actions) - DIFFERENCE_ORDER
     if count < 1:
         return np.inf
-    same = groups[_ORDER:] == groups[:-_ORDER]
+    same = groups[DIFFERENCE_ORDER:] == groups[:-DIFFERENCE_ORDER]
     if not same.any():
         return np.inf
     differences = sum(weight * actions[i : i + count] for i, weight in enumerate(weights))
@@ -64,7 +62,10 @@ def noise_by_differences(actions: Array, groups: NDArray[np.intp]) -> float:
 
 
 def correlation_time(residuals: Array, groups: NDArray[np.intp]) -> float:
-    """Samples that say as much as one independent one, ``1 + 2 Σ_k r_k`` up to the first r_k near zero.
+    """Integrated autocorrelation time of residuals, ``1 + 2 Σ_k r_k``, in samples.
+
+    N samples carry the information of N over this number of independent ones.
+    The sum ends at the first autocorrelation r_k near zero.
 
     Parameters
     ----------
@@ -78,19 +79,19 @@ def correlation_time(residuals: Array, groups: NDArray[np.intp]) -> float:
     """
     energy = float((residuals**2).sum(axis=1).mean()) if len(residuals) else 0.0
     time = 1.0
-    for lag in range(1, min(_LAGS, len(residuals) - 1) + 1):
+    for lag in range(1, min(MOST_LAGS, len(residuals) - 1) + 1):
         same = groups[lag:] == groups[:-lag]
         if energy <= 0.0 or not same.any():
             break
         correlation = float((residuals[lag:] * residuals[:-lag]).sum(axis=1)[same].mean()) / energy
-        if correlation <= _QUIET:
+        if correlation <= LEAST_AUTOCORRELATION:
             break
         time += 2.0 * correlation
     return time
 
 
 def corrected(weighted: Moments, plain: Moments, variance: float) -> Moments:
-    """Moments of samples weighted by ‖u‖², without the expected part of the noise (see above).
+    """Moments of samples weighted by ‖u‖², without the noise's expected contribution (see above).
 
     Parameters
     ----------
@@ -102,7 +103,7 @@ def corrected(weighted: Moments, plain: Moments, variance: float) -> Moments:
     Returns
     -------
     Moments
-        The matrix ``consistent`` need not be positive: subtracting leaves what the noise was by chance.
+        The matrix ``consistent`` may be indefinite: the noise's contribution differs from its expectation.
     """
     d = plain.cross.shape[1]
     return Moments(

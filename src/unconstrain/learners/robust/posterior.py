@@ -1,4 +1,4 @@
-"""What is believed of the weights: evidence of the data, and a prior worth little."""
+"""Gaussian posterior of the weights: quadratic log-likelihood and a unit-information prior."""
 
 from __future__ import annotations
 
@@ -12,39 +12,40 @@ from ...risks import SECONDARY_NOISE, Quadratic, eigensystem, minimum, unvec
 
 
 def unit_information(weights: int, sizes: Array) -> Array:
-    """How much the standard risk counts beside the inconsistency, as priors go, shape (M,).
+    """Factor P / n of the standard risk in a unit-information prior, shape (M,).
 
-    All samples together say as much, in all P directions together, as one
-    sample for each: enough to hold what the data leaves undetermined, and
-    nothing where it speaks.
+    It scales the information of the n samples to that of one sample for each of
+    the P weights. For one sample altogether this is the prior of Kass and
+    Wasserman, *Journal of the American Statistical Association* 90(431), 1995.
     """
     return weights / np.maximum(sizes, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Twice the negative logarithm of a density over the weights of each model, in two parts.
+    """Posterior density of each model's weights: −2 times its logarithm is ``evidence + prior``, up to a constant.
 
     Parameters
     ----------
     evidence : Quadratic
-        From the data's consistency, per variance of its residuals.
+        −2 times the log-likelihood: consistency, divided by the residual variance.
     prior : Quadratic
-        The standard risk and smoothness, by as much as they count.
+        −2 times the logarithm of the prior density: standard risk and smoothness.
     """
 
     evidence: Quadratic
     prior: Quadratic
 
     def weights(self, actions: int) -> Array:
-        """The most probable weights, shape (M, d, p)."""
+        """The weights of maximum posterior density, shape (M, d, p)."""
         return unvec(minimum(self.evidence + self.prior), actions)
 
-    def spreads(self) -> tuple[Array, Array]:
-        """Covariance of the weights, due to the noise in the data and due to what it does not say, each (M, P, P).
+    def covariances(self) -> tuple[Array, Array]:
+        """Posterior covariance of the weights in two parts, from noise and undetermined by the data, each (M, P, P).
 
-        With ``C = (A + B)⁻¹`` for evidence A and prior B, they are C A C and C B C, and add up to C. In what no
-        sample has excited, B is at least a hundredth of its mean over all directions: it must not count as known.
+        For the Hessians A of the evidence and B of the prior, ``C = (A + B)⁻¹`` is the sum of C A C and C B C.
+        Eigenvalues of B are at least a hundredth of their mean: features that no sample excites have no prior
+        precision, and their weights must not count as known.
         """
         values, axes = eigensystem(self.prior.hessian)
         floored = np.maximum(values, 1e-2 * values.mean(axis=1, keepdims=True))
@@ -55,7 +56,7 @@ class Posterior:
         return both @ self.evidence.hessian @ both, both @ prior @ both
 
     def determined(self) -> NDArray[np.intp]:
-        """In how many directions the data says more than the prior, shape (M,)."""
+        """Number of directions in which the evidence has more than half of the posterior precision, shape (M,)."""
         eigenvalues, vectors = eigensystem(self.evidence.hessian + self.prior.hessian)
         kept = eigenvalues > SECONDARY_NOISE * eigenvalues[:, -1:]
         scale = np.where(kept, 1.0 / np.sqrt(np.where(kept, eigenvalues, 1.0)), 0.0)

@@ -1,11 +1,10 @@
-"""Constraints that stay the same for a while show themselves in what was done meanwhile.
+"""Segments of constant constraint: change-point detection and the constrained error.
 
-Within a segment under one constant constraint all actions lie in the range
-of one projection N. Its directions are the singular vectors of the
-segment's actions that are larger than their noise; with them the
-constrained error ``Σ w ‖u − N π̃‖²`` can be minimised, as if the constraint
-were known. It knows more than the inconsistency: that nothing but N u was
-possible, in all its directions at once and without each sample's noise.
+Under a constant constraint all actions lie in the range of one projection N,
+estimated by the singular vectors of the segment's actions whose singular
+values exceed the noise. With it the constrained error ``Σ w ‖u − N π̃‖²`` is
+minimised as if the constraint were known. It uses more than the
+inconsistency: all directions of the range, from all samples of the segment.
 """
 
 from __future__ import annotations
@@ -16,16 +15,11 @@ from numpy.typing import NDArray
 from ...base.arrays import Array
 from ...risks import Quadratic
 from ...training import Samples
-
-_CLEAR = 3.0
-"""A direction is real if the actions' rms along it is more than so many times the noise."""
-
-_FEWEST = 4
-"""Samples of a segment found automatically, at least."""
+from .constants import LEAST_SEGMENT, SEGMENT_SIGNAL_TO_NOISE
 
 
 def projection_of(actions: Array, noise: float) -> Array:
-    """The projection whose range the actions of one segment lie in.
+    """Projection onto the subspace spanned by the actions of one segment, by a singular value decomposition.
 
     Parameters
     ----------
@@ -36,23 +30,23 @@ def projection_of(actions: Array, noise: float) -> Array:
     Returns
     -------
     ndarray, shape (d, d)
-        Of rank 0 where there is nothing but noise.
+        Of rank 0 where all singular values are within the noise.
     """
     _, singular, rows = np.linalg.svd(actions, full_matrices=False)
     size = singular / np.sqrt(len(actions))
     largest = size[0] if len(size) else 0.0
-    kept = rows[size > max(_CLEAR * noise, 1e-9 * largest)] if largest > 0 else rows[:0]
+    kept = rows[size > max(SEGMENT_SIGNAL_TO_NOISE * noise, 1e-9 * largest)] if largest > 0 else rows[:0]
     return np.asarray(kept.T @ kept)
 
 
 def change_points(actions: Array, noise: float) -> NDArray[np.intp]:
-    """Where a constraint changes along one demonstration: segments that no smaller subspace than their own explains.
+    """Change points of the constraint along one demonstration, by the Bayesian information criterion.
 
-    Dynamic programming over all cuts. A segment of rank k costs twice its
-    negative log-likelihood, with normal actions as wide as the
-    demonstration's along its subspace and as the noise off it, and, as in
-    the Bayesian information criterion, each parameter of the subspace and
-    the cut the logarithm of the number of samples.
+    Dynamic programming over all segmentations. The cost of a segment of rank
+    k is −2 times its log-likelihood plus ``(k (d − k) + 1) log T``: k (d − k)
+    parameters of the subspace and one of the cut (BIC; Schwarz, *Annals of
+    Statistics* 6(2), 1978). Actions are normal, with the demonstration's
+    variance along the subspace and the noise's across it.
 
     Parameters
     ----------
@@ -63,7 +57,7 @@ def change_points(actions: Array, noise: float) -> NDArray[np.intp]:
     Returns
     -------
     ndarray of int
-        First samples of the segments but the first, ascending.
+        First sample of each segment but the first, ascending.
     """
     count, d = actions.shape
     sums = np.concatenate([np.zeros((1, d, d)), np.cumsum(actions[:, :, None] * actions[:, None, :], axis=0)])
@@ -74,8 +68,8 @@ def change_points(actions: Array, noise: float) -> NDArray[np.intp]:
     along = ranks * (1.0 + np.log(max(spread / variance, 1.0)))
     best, before = np.full(count + 1, np.inf), np.zeros(count + 1, dtype=np.intp)
     best[0] = 0.0
-    for stop in range(min(_FEWEST, count), count + 1):
-        starts = np.flatnonzero(np.isfinite(best[: max(stop - _FEWEST, 0) + 1]))
+    for stop in range(min(LEAST_SEGMENT, count), count + 1):
+        starts = np.flatnonzero(np.isfinite(best[: max(stop - LEAST_SEGMENT, 0) + 1]))
         off = np.cumsum(np.maximum(np.linalg.eigvalsh(sums[stop] - sums[starts]), 0.0), axis=1)
         missed = np.concatenate([off[:, ::-1], np.zeros((len(starts), 1))], axis=1)  # by rank: d - k smallest are off
         cost = best[starts] + (missed / variance + (stop - starts)[:, None] * along + penalty).min(axis=1)
@@ -90,7 +84,7 @@ def change_points(actions: Array, noise: float) -> NDArray[np.intp]:
 
 
 def found_segments(actions: Array, groups: NDArray[np.intp], noise: float) -> NDArray[np.intp]:
-    """Number of the segment each sample is in, (N,); segments never go from one demonstration to the next."""
+    """Index of each sample's segment, (N,), by change points within each demonstration."""
     starts = np.zeros(len(actions), dtype=bool)
     edges = np.flatnonzero(np.diff(groups, prepend=groups[0] - 1))
     for first, last in zip(edges, [*edges[1:], len(actions)], strict=True):
@@ -100,7 +94,7 @@ def found_segments(actions: Array, groups: NDArray[np.intp], noise: float) -> ND
 
 
 def constrained_error(samples: Samples, labels: NDArray[np.intp], noise: float) -> Quadratic:
-    """``Σ w ‖N̂ u − N̂ π̃‖²`` with the projection of each segment from its own actions."""
+    """``Σ w ‖N̂ u − N̂ π̃‖²`` with the projection N̂ estimated from each segment's actions."""
     d, p = samples.actions.shape[1], samples.features.shape[1]
     models = samples.memberships.shape[1]
     whole = Quadratic(np.zeros((models, p * d, p * d)), np.zeros((models, p * d)), np.zeros(models))

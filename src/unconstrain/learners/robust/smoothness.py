@@ -1,15 +1,14 @@
-"""A prior by which policies are smooth, and how much it counts, from the data.
+"""Smoothness prior of the weights, its precision by expectation maximisation.
 
-Noise leaves weights that only few samples speak of rough. Let ``wᵀ R w``
-measure the roughness of an action coordinate, as features tell it, and let
-weights have the prior density N(0, (λ R)⁻¹). Given a posterior with
-covariance C, expectation maximisation takes the λ that makes the expected
-roughness what it is:
+Let ``wᵀ R w`` be the roughness of an action coordinate with weights w (see
+:meth:`~unconstrain.NormalisedRBF.roughness`), and N(0, (λ R)⁻¹) their prior.
+Given posterior means w_k and covariance C, the M-step for the prior precision
+λ is
 
     λ = rank(R) d / (Σ_k w_kᵀ R w_k + tr C (R ⊗ I))
 
-What the model itself misses is no reason to smooth, so λ counts by the share
-of the residuals that is noise.
+Misfit of the model is no reason to smooth, so λ is multiplied by the share of
+noise in the residual variance.
 """
 
 from __future__ import annotations
@@ -23,26 +22,24 @@ from ...base.arrays import Array
 from ...risks import Quadratic, eigensystem, vec
 from ...training import Samples
 from ..thresholds import judged
+from .constants import ROUGHNESS_RANK_TOLERANCE
 from .posterior import Posterior
-
-_RANK = 1e-10
-"""Eigenvalues of R below this share of the largest are rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class Smoothness:
-    """How rough weights are, and how much that counts.
+    """Smoothness prior of each of M models.
 
     Parameters
     ----------
     penalty : Quadratic
-        ``Σ_k w_kᵀ R w_k`` of each of M models.
+        Roughness ``Σ_k w_kᵀ R w_k``.
     rank : ndarray, shape (M,)
         Of its Hessian.
     precision : ndarray, shape (M,)
-        The λ of each model, by as much as it counts; zero at first.
+        Prior precision λ times the share of noise; zero at first.
     least : float
-        Squared roughness that is rounding.
+        Roughness up to which it is rounding.
     """
 
     penalty: Quadratic
@@ -52,32 +49,32 @@ class Smoothness:
 
     @classmethod
     def of(cls, samples: Samples) -> Self:
-        """Before anything is known of the weights."""
+        """The prior of precision zero."""
         rough, d = samples.roughness, samples.actions.shape[1]
         models, p = rough.shape[:2]
         hessian = np.einsum("mij,kl->mikjl", rough, np.eye(d)).reshape(models, p * d, p * d)
         values, _ = eigensystem(rough)
-        rank = d * (values > np.maximum(_RANK * values[:, -1:], 1e-300)).sum(axis=1)
+        rank = d * (values > np.maximum(ROUGHNESS_RANK_TOLERANCE * values[:, -1:], 1e-300)).sum(axis=1)
         none = np.zeros(models)
         penalty = Quadratic(hessian, np.zeros((models, p * d)), none)
-        return cls(penalty, rank, none, max(_RANK**2 * samples.energy, 1e-290))
+        return cls(penalty, rank, none, max(ROUGHNESS_RANK_TOLERANCE**2 * samples.energy, 1e-290))
 
     def prior(self, factors: Array | float = 1.0) -> Quadratic:
-        """Twice the negative logarithm of the density, times a factor (M,)."""
+        """−2 times the logarithm of the prior density, times a factor (M,)."""
         return (self.precision * factors) * self.penalty
 
     def updated(self, weights: Array, posterior: Posterior, noise: Array | float, unit: Array | float = 1.0) -> Self:
-        """With the λ that goes best with weights.
+        """M-step: with the precision of maximum likelihood.
 
         Parameters
         ----------
         weights : ndarray, shape (M, d, p)
         posterior : Posterior
-            Of them.
+            Whose mean the weights are.
         noise : ndarray, shape (M,), or float
-            Share of the residuals that is noise.
+            Share of noise in the residual variance.
         unit : ndarray, shape (M,), or float
-            Variance of the posterior's residuals, in which it is not measured yet.
+            Residual variance by which ``posterior`` has yet to be divided.
         """
         if not self.rank.any():
             return self

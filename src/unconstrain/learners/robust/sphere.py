@@ -1,20 +1,18 @@
-"""The sphere on which every projection of the policy lies, and how samples lie on it.
+"""Mixture model of the actions on the sphere of all projections of the policy, and its E-step.
 
-By Thales' theorem a projection ``u = N π`` sees 0 and π at a right angle, so
-it lies on the sphere with diameter [0, π], whatever the constraint. What is
-observed is therefore at a distance of the sphere's surface that is noise
-alone; where on the surface it is, is the constraint's doing. A sample that
-was free is at the end of the diameter, π itself.
+By Thales' theorem every projection ``u = N π`` lies on the sphere with
+diameter [0, π], whatever the constraint: u and π − u are orthogonal. A free
+sample is π itself. Noise moves a sample off the surface, the constraint
+determines its position on the surface.
 
-Density of a sample, given π (d actions, noise of variance σ² in each):
+Density of a sample given π, with d actions and noise of variance σ² in each:
 
     p(u | π) = N(δ; 0, σ²) Σ_k m_k D_k(t)
 
-with δ the distance to the surface, and t = ‖u − π‖ along it. The D_k are
-normal densities in d − 1 dimensions of variance ``σ² + s_k² ‖π‖²``: for
-``s_0 = 0`` the sample was free, for larger ones the constraint turned it
-that far off. The last D is uniform on the sphere. The shares m_k, and so how
-near to the free end constraints leave the samples, come from the data.
+Here δ is the distance to the surface and t = ‖u − π‖ along it. The D_k are
+normal densities in d − 1 dimensions with variance ``σ² + s_k² ‖π‖²``; the
+component ``s_0 = 0`` is that of free samples. The last D is uniform on the
+sphere. Mixing proportions m_k are estimated by expectation maximisation.
 """
 
 from __future__ import annotations
@@ -25,18 +23,17 @@ import numpy as np
 from scipy.special import gammaln, logsumexp
 
 from ...base.arrays import Array
-
-SPREADS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.4)
-"""The s_k: typical angles between action and policy, in radians for the small ones."""
+from .constants import ANGULAR_SPREADS
 
 _TINY = 1e-300
 
 
 class Distances(NamedTuple):
-    """Where samples are about their spheres: ``radial`` (N,) is δ, ``normal`` (N, d) minus its derivative by π.
+    """Residuals of samples on their spheres.
 
-    On the sphere the normal is ``u / ‖π‖``: the inconsistency with samples weighted by ``‖u‖² / ‖π‖²``.
-    ``turn`` (N, d) takes π to its own length along u, at right angles to π; ``lengths`` (N,) are ‖π‖.
+    ``radial`` (N,) is δ, ``normal`` (N, d) minus its gradient in π. On the sphere the normal is ``u / ‖π‖``: that of
+    the inconsistency with samples weighted by ``‖u‖² / ‖π‖²``. ``turn`` (N, d) is the component orthogonal to π of
+    the vector of length ‖π‖ along u; ``lengths`` (N,) are ‖π‖.
     """
 
     radial: Array
@@ -45,25 +42,25 @@ class Distances(NamedTuple):
     lengths: Array
 
 
-class Beliefs(NamedTuple):
-    """What is thought of each sample: ``shares`` (N, K + 1) are the probabilities of each spread, free first.
+class Responsibilities(NamedTuple):
+    """Result of the E-step: ``components`` (N, K + 1) are the responsibilities, free first and uniform last.
 
-    ``tangential`` (N,) is the precision along the surface of those that are neither free nor anywhere, and
-    ``likelihood`` (N,) the logarithm of each sample's density.
+    ``tangential`` (N,) is the expected precision along the surface of samples that are neither free nor uniform, and
+    ``log_likelihood`` (N,) that of each sample.
     """
 
-    shares: Array
+    components: Array
     tangential: Array
-    likelihood: Array
+    log_likelihood: Array
 
     @property
     def free(self) -> Array:
         """Probability that each sample was free, (N,)."""
-        return self.shares[:, 0]
+        return self.components[:, 0]
 
 
 def distances(actions: Array, policy: Array) -> Distances:
-    """Where the actions (N, d) are about the spheres of the policy's (N, d)."""
+    """Residuals of the actions (N, d) on the spheres of the policy's predictions (N, d)."""
     lengths = np.linalg.norm(policy, axis=1)
     from_middle = actions - 0.5 * policy
     reach = np.linalg.norm(from_middle, axis=1)
@@ -75,28 +72,28 @@ def distances(actions: Array, policy: Array) -> Distances:
     return Distances(reach - 0.5 * lengths, normal, turn, lengths)
 
 
-def beliefs(actions: Array, policy: Array, place: Distances, variance: float, mixture: Array) -> Beliefs:
-    """What each sample says about its constraint, given the policy.
+def e_step(actions: Array, policy: Array, place: Distances, variance: float, mixture: Array) -> Responsibilities:
+    """Responsibilities of the mixture's components for each sample, given the policy.
 
     Parameters
     ----------
     actions, policy : ndarray, shape (N, d)
     place : Distances
-        Of the one from the other.
+        Of actions and policy.
     variance : float
         σ² of the noise.
     mixture : ndarray, shape (K + 1,) or (N, K + 1)
-        Share of each spread, and of the uniform density, before looking.
+        Mixing proportions: of each spread, and of the uniform component.
     """
     d = actions.shape[1]
     along = np.maximum(((actions - policy) ** 2).sum(axis=1) - place.radial**2, 0.0)
     radial = -0.5 * place.radial**2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
-    variances = variance + np.square(SPREADS) * place.lengths[:, None] ** 2
+    variances = variance + np.square(ANGULAR_SPREADS) * place.lengths[:, None] ** 2
     spread = -0.5 * along[:, None] / variances - 0.5 * (d - 1) * np.log(2.0 * np.pi * variances)
-    # A sphere that noise hides has no smaller area than what noise covers, so that nothing is gained by shrinking it.
+    # The area is at least what noise covers: otherwise shrinking the sphere below the noise would raise the density.
     radius = 0.25 * (place.lengths**2 + 8.0 * variance)
     area = np.log(2.0) + 0.5 * d * np.log(np.pi) - gammaln(0.5 * d) + 0.5 * (d - 1) * np.log(radius)
     joint = radial[:, None] + np.column_stack([spread, -area]) + np.log(mixture + _TINY)
-    likelihood = logsumexp(joint, axis=1)
-    shares = np.exp(joint - likelihood[:, None])
-    return Beliefs(shares, (shares[:, 1:-1] / variances[:, 1:]).sum(axis=1), likelihood)
+    log_likelihood = logsumexp(joint, axis=1)
+    components = np.exp(joint - log_likelihood[:, None])
+    return Responsibilities(components, (components[:, 1:-1] / variances[:, 1:]).sum(axis=1), log_likelihood)

@@ -70,7 +70,7 @@ def _lead(real: bool) -> html.Markup:
         "The true policy is not known, so only the error along the surface can be told (<b>nCPE</b>)."
     )
     simulated = html.markup(
-        "One wish in three dimensions (circle, come back to height, press down) wipes seven plates, and each "
+        "One policy in three dimensions (circle, come back to height, press down) wipes seven plates, and each "
         "plate takes away what points into it. A camera watches with millimetres of noise. The policy is learnt from "
         "the five plates that are tilted about x and tested on the two that are tilted about y. <b>nCPE</b> is its "
         "error along the plate, <b>nUPE</b> its error where nothing is in the way."

@@ -387,5 +387,5 @@ def _samples_needed(recipe: Recipe, interval: float) -> int:
     """Length of the window: odd, and enough for the polynomial; three for central differences."""
     if recipe.differentiate == "central":
         return 3
-    wished = 0 if np.isnan(interval) else round(min(recipe.window_s / interval, MOST_SAMPLES))
-    return max(wished, recipe.order + 1) | 1
+    asked = 0 if np.isnan(interval) else round(min(recipe.window_s / interval, MOST_SAMPLES))
+    return max(asked, recipe.order + 1) | 1
