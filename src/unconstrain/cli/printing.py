@@ -13,15 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+import unconstrain as uc
+
 from ..base.errors import UnconstrainError
 
 if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
     from collections.abc import Iterator
 
-    from ..learners import Solution
     from ..paper.experiments.trials import Progress, Result
-    from ..policies import Policy
-    from ..recordings import Stream
 
 
 class Group(click.Group):
@@ -89,7 +88,7 @@ def _cell(value: Any) -> str:
     return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
-def say_fit(policy: Policy, stream: Stream | None, learner: str) -> None:
+def say_fit(policy: uc.Policy, stream: uc.Stream | None, learner: str) -> None:
     """Say what was learnt, how much the data determined, and how well it holds where held out.
 
     Without a stream nothing is said that would need to look at the samples again.
@@ -128,7 +127,7 @@ def say_fit(policy: Policy, stream: Stream | None, learner: str) -> None:
         )
 
 
-def _said_of_samples(solution: Solution) -> str:
+def _said_of_samples(solution: uc.Solution) -> str:
     """Which way a robust learner went, and what it thinks of the samples."""
     ways = {
         "likelihood": "by likelihood: samples look free, or constrained at random",
@@ -142,7 +141,7 @@ def _said_of_samples(solution: Solution) -> str:
     )
 
 
-def _walked(policy: Policy, stream: Stream) -> tuple[int, int, float]:
+def _walked(policy: uc.Policy, stream: uc.Stream) -> tuple[int, int, float]:
     """Numbers of demonstrations and samples, and the share of their motion that is missed, without weights."""
     names, samples, missed, moved = set(), 0, 0.0, 0.0
     for name, demonstration in stream.named_demonstrations():

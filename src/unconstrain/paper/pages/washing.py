@@ -6,9 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+import unconstrain as uc
+
 from ...base.arrays import Array
 from ...pages import figures, html
-from ...recordings import Demonstration
 from ...risks import null_space_projection, project
 from ..experiments.trials import Result
 from ..experiments.washing import Split, Surface
@@ -25,7 +26,7 @@ class Case(NamedTuple):
 
     split: Split
     surface: Surface
-    demonstration: Demonstration
+    demonstration: uc.Demonstration
     normal: Array
 
     @property
@@ -195,7 +196,7 @@ def _rollouts(splits: list[Split]) -> html.Markup:
     )
 
 
-def _seconds(movement: Demonstration, at: int) -> str:
+def _seconds(movement: uc.Demonstration, at: int) -> str:
     return f"step {at}" if movement.times is None else f"{round(movement.times[at], 1):g} s"
 
 
