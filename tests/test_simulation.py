@@ -11,8 +11,8 @@ from PIL import Image
 
 from unconstrain.base.errors import InvalidDataError, MissingExtraError, SettingError, UnconstrainError
 from unconstrain.motion.containment import Contained
-from unconstrain.pages import figures
 from unconstrain.paper import simulation
+from unconstrain.paper.figures import arms, plates
 from unconstrain.paper.simulation import control, pictures, postures
 from unconstrain.paper.simulation.postures import READY
 from unconstrain.paper.simulation.scene import LINK_MASSES, TOOL
@@ -184,8 +184,8 @@ def test_without_graphics_the_arm_is_lines(wiped, monkeypatch):
     with pytest.raises(UnconstrainError, match="cannot be drawn here"):
         pictures.film(wiped, seconds=0.2)
     _, joints = LWR3.frames(wiped.postures[:2])
-    quad = figures.Quad.around(wiped.positions, wiped.plate.rotation[:, 2])
-    drawn = Image.open(io.BytesIO(figures.arm_on_plate(np.moveaxis(joints, -1, 0), wiped.positions, quad)))
+    quad = plates.Quad.around(wiped.positions, wiped.plate.rotation[:, 2])
+    drawn = Image.open(io.BytesIO(arms.arm_on_plate(np.moveaxis(joints, -1, 0), wiped.positions, quad)))
     assert drawn.format == "PNG"
     assert np.asarray(drawn).std() > 5
 

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ...pages import figures, html
+from ...pages import html
 from ..experiments.regimes import DEFAULT, KNOWN, ORACLE, PAPER
 from ..experiments.trials import Result
+from ..figures import charts
 
 TOP = 10.0
 
@@ -78,7 +79,7 @@ def _cells(result: Result, noise: float, index: int) -> html.Markup:
     regimes = list(dict.fromkeys((row["system"], row["constraint"]) for row in mine))
     found = {(row["method"], row["system"], row["constraint"]): row["to_oracle"] for row in mine}
     values = np.array([[found[method, *regime] for regime in regimes] for method in methods], dtype=np.float64)
-    picture = figures.ratio_table(
+    picture = charts.ratio_table(
         methods,
         [f"{system}, {constraint}" for system, constraint in regimes],
         values,

@@ -9,6 +9,7 @@ import numpy as np
 from ...base.arrays import Array
 from ...pages import figures, html
 from ..experiments.trials import METRICS, Result
+from ..figures import charts
 
 WORDS = {"none": "free", "random": "constrained"}
 TITLES = {"nupe": "nUPE", "ncpe": "nCPE", "ninc": "inconsistency"}
@@ -67,7 +68,7 @@ def dots(result: Result) -> html.Markup:
         }
         title = f"{TITLES[metric]} × 10⁻²"
         groups = [WORDS.get(one, one) for one in constraints]
-        panels.append(figures.dots(groups, values, printed, title=title, label=title))
+        panels.append(charts.dots(groups, values, printed, title=title, label=title))
     return html.picture(
         "errors",
         panels,

@@ -13,6 +13,7 @@ from ...pages import figures, html
 from ...risks import null_space_projection, project
 from ..experiments.trials import Result
 from ..experiments.washing import Split, Surface
+from ..figures import plates
 from ..systems.wiping import WipingPolicy
 from .washing_arm import on_the_arm
 from .washing_scores import bars, scores
@@ -30,9 +31,9 @@ class Case(NamedTuple):
     normal: Array
 
     @property
-    def plate(self) -> figures.Quad:
+    def plate(self) -> plates.Quad:
         """Where the demonstration was, as a piece of its plane."""
-        return figures.Quad.around(self.demonstration.states, self.normal)
+        return plates.Quad.around(self.demonstration.states, self.normal)
 
     @property
     def title(self) -> str:
@@ -95,16 +96,16 @@ def _demonstrations(splits: list[Split]) -> html.Markup:
             "Each translucent plane is the one nearest to a bout; bouts of one colour share a tilt, and each tilt "
         )
         caption += "is held out once."
-    tracks, quads = [], {}
+    tracks, corners = [], {}
     for key, surface in kinds:
         for demo, normals in zip(surface.demonstrations, surface.normals, strict=True):
             tracks.append((key, demo.name, demo.states))
-            quads[demo.name] = figures.Quad.around(demo.states, normals["plane"])
+            corners[demo.name] = plates.Quad.around(demo.states, normals["plane"]).corners
     keys = tuple(dict.fromkeys(key for key, _ in kinds))
     colours = {key: figures.COLOURS.get(key, figures.PALETTE[at % len(figures.PALETTE)]) for at, key in enumerate(keys)}
     return html.picture(
         "demonstrations",
-        [figures.movements(tracks, quads)],
+        [figures.movements(tracks, corners)],
         f"{caption} Positions are relative to the middle of each plate. Drag to turn, scroll to zoom.",
         keys=keys,
         colours=colours,
@@ -183,7 +184,7 @@ def _rollouts(splits: list[Split]) -> html.Markup:
             if len(outside):
                 left.append(f"{figures.LABELS[name]} after {_seconds(run, outside[0])} on {case.title}")
             lines[name] = path[: outside[0] + 1] if len(outside) else path
-        panels.append(figures.paths(lines, reach=reach, title=case.title, labels=_axis_labels(case), height=480))
+        panels.append(plates.paths(lines, reach=reach, title=case.title, labels=_axis_labels(case), height=480))
     longest = next(iter(splits[0].rollouts.values()))
     escaped = f" These left the picture: {'; '.join(left)}." if left else ""
     return html.picture(

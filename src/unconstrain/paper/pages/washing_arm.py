@@ -10,6 +10,7 @@ from ...base.errors import UnconstrainError
 from ...pages import figures, html
 from ..experiments.trials import Result
 from ..experiments.washing import WITHOUT_PHYSICS, Reproduction
+from ..figures import arms, plates
 from ..simulation import BACKENDS, Wipe
 from ..simulation.pictures import animation, film, strip
 from ..systems.arm import LWR3
@@ -69,8 +70,8 @@ def _lines(wipe: Wipe) -> bytes:
     rows = np.linspace(max(0, len(wipe.times) - length), len(wipe.times) - 1, 4).astype(int)
     _, joints = LWR3.frames(wipe.postures[rows])
     track = wipe.positions[last] + wipe.plate.centre
-    plate = figures.Quad.around(track, wipe.plate.rotation[:, 2], margin=1.5)
-    return figures.arm_on_plate(np.moveaxis(joints, -1, 0), track, plate)
+    plate = plates.Quad.around(track, wipe.plate.rotation[:, 2], margin=1.5)
+    return arms.arm_on_plate(np.moveaxis(joints, -1, 0), track, plate)
 
 
 def _tracks(wiped: list[Reproduction]) -> html.Markup:
@@ -78,12 +79,12 @@ def _tracks(wiped: list[Reproduction]) -> html.Markup:
     for one in wiped:
         wipe = one.wipe
         assert wipe is not None
-        plate = figures.Quad.around(wipe.positions, wipe.plate.rotation[:, 2], margin=1.6)
+        plate = plates.Quad.around(wipe.positions, wipe.plate.rotation[:, 2], margin=1.6)
         lines = {} if one.demonstration is None else {"observed": plate.flatten(one.demonstration.states)}
         lines["hybrid"] = plate.flatten(wipe.positions)
         title = f"{one.plate.name} ({'seen' if one.seen else 'unseen'})"
         labels = ("in the plate (m)", "in the plate (m)")
-        panels.append(figures.paths(lines, reach=plate.half, title=title, labels=labels, height=400))
+        panels.append(plates.paths(lines, reach=plate.half, title=title, labels=labels, height=400))
         series = {"hybrid": np.column_stack([wipe.forces])}
         force = figures.over_time(wipe.times, series, ["force (N)"], title="normal force", row_height=310)
         panels.append(force.update_yaxes(rangemode="tozero"))
