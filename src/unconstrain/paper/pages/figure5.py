@@ -9,7 +9,7 @@ from ...pages import figures, html
 from ..experiments import figure5
 from ..experiments.trials import LABELS, Result
 from ..figures import charts
-from . import table1
+from . import parts, table1
 
 TITLES = {metric: LABELS[metric] for metric in ("nupe", "ncpe")}
 ANGLE = "how far constraints vary, θ<sub>max</sub> (rad)"
@@ -80,7 +80,7 @@ def _table(widest: Array, curves: dict[str, table1.Curves], result: Result) -> h
         [
             html.number(angle),
             *(
-                html.mean_sd(curves[metric][method][0][index], curves[metric][method][1][index])
+                parts.mean_sd(curves[metric][method][0][index], curves[metric][method][1][index])
                 for metric in TITLES
                 for method in figures.METHODS
             ),

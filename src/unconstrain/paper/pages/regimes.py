@@ -10,6 +10,7 @@ from ...pages import html
 from ..experiments.regimes import DEFAULT, KNOWN, ORACLE, PAPER
 from ..experiments.trials import Result
 from ..figures import charts
+from . import parts
 
 TOP = 10.0
 
@@ -142,11 +143,11 @@ def _rows(result: Result) -> html.Markup:
                 row["constraint"],
                 f"{row['noise']:.0%}",
                 row["method"],
-                html.mean_sd(row["nupe_mean"], row["nupe_sd"]),
+                parts.mean_sd(row["nupe_mean"], row["nupe_sd"]),
                 html.number(100.0 * row["nupe_geometric"]),
                 html.number(row["to_oracle"]),
-                html.mean_sd(row["ncpe_mean"], row["ncpe_sd"]),
-                html.mean_sd(row["ninc_mean"], row["ninc_sd"]),
+                parts.mean_sd(row["ncpe_mean"], row["ncpe_sd"]),
+                parts.mean_sd(row["ninc_mean"], row["ninc_sd"]),
                 html.number(row["auc_mean"]),
                 html.number(row["coverage_mean"]),
             ]

@@ -10,6 +10,7 @@ from ...base.arrays import Array
 from ...pages import figures, html
 from ..experiments.trials import METRICS, Result
 from ..figures import charts
+from . import parts
 
 WORDS = {"none": "free", "random": "constrained"}
 TITLES = {"nupe": "nUPE", "ncpe": "nCPE", "ninc": "inconsistency"}
@@ -44,9 +45,9 @@ def table(result: Result, trials_of_paper: int) -> html.Markup:
     for index, row in enumerate(result.rows):
         if index and row["method"] != result.rows[index - 1]["method"]:
             rules.append(index)
-        cells = [html.label(row["method"]), WORDS.get(row["constraint"], row["constraint"])]
+        cells = [parts.label(row["method"]), WORDS.get(row["constraint"], row["constraint"])]
         for metric in METRICS:
-            cells += [html.mean_sd(*_pair(row, metric)), html.mean_sd(*_pair(row, f"paper_{metric}"))]
+            cells += [parts.mean_sd(*_pair(row, metric)), parts.mean_sd(*_pair(row, f"paper_{metric}"))]
         rows.append(cells)
     trials = getattr(result.settings, "trials", 1)
     note = f"Mean ± standard deviation over {trials} data sets, all × 10⁻². The paper’s are over {trials_of_paper}."

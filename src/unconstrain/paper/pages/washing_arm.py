@@ -14,6 +14,7 @@ from ..figures import arms, plates
 from ..simulation import BACKENDS, Wipe
 from ..simulation.pictures import animation, film, strip
 from ..systems.arm import LWR3
+from . import parts
 
 STATEMENT = (
     "The hybrid policy gives a velocity at every position; projected onto the plate it becomes joint velocities, "
@@ -43,13 +44,13 @@ def _pictures(shown: Reproduction) -> html.Markup:
     assert wipe is not None
     name = f"plate {shown.plate.name}, which nobody {'wiped' if shown.demonstration is None else 'learnt from'}"
     try:
-        moving = html.image(
+        moving = parts.image(
             "animation", animation(film(wipe)), "gif", f"The arm wipes a plate tilted {shown.plate.name}",
             f"The arm on {name}, as fast as it is. The line is the path of the sponge.",
         )  # fmt: skip
         if shown.demonstration is None:
             return moving
-        return moving + html.image(
+        return moving + parts.image(
             "strip", strip(shown.demonstration, wipe), "png", "A hand wipes a plate; below, the arm wipes it",
             "One turn of the demonstration on this plate (above, positions as the camera saw them), and one of the "
             "reproduction (below), like figure 6 of the paper. The demonstration was not learnt from.",
@@ -61,7 +62,7 @@ def _pictures(shown: Reproduction) -> html.Markup:
             "{osmesa}</code> gives the real picture; <code>unconstrain doctor</code> tells what is missing."
         ).format(name, **BACKENDS)
         shows = f"The arm wipes a plate tilted {shown.plate.name}, as lines"
-        return html.image("arm", _lines(wipe), "png", shows, without)
+        return parts.image("arm", _lines(wipe), "png", shows, without)
 
 
 def _lines(wipe: Wipe) -> bytes:
