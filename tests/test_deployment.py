@@ -20,7 +20,7 @@ import unconstrain as uc
 from conftest import POLICIES
 from samples import draw
 from unconstrain.base.errors import InvalidDataError, MissingExtraError, SettingError
-from unconstrain.deployment import c_source
+from unconstrain.deployment.c99 import c_source
 
 DATA = draw(noise=0.02)
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs the C compiler gcc")

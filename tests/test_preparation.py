@@ -16,17 +16,16 @@ from hypothesis.extra import numpy as hnp
 from unconstrain.base.errors import InvalidDataError, SettingError, UnconstrainError
 from unconstrain.recordings.demonstration import Demonstration, Recording
 from unconstrain.recordings.preparation import (
-    Gap,
     PreparationWarning,
     Recipe,
     differentiate,
-    find_gaps,
-    guess_recipe,
     prepare,
     resample,
     survey,
     trim,
 )
+from unconstrain.recordings.preparation.movements import Gap, find_gaps
+from unconstrain.recordings.preparation.recipes import guess_recipe
 from unconstrain.recordings.readers import read
 
 DATA = Path(os.environ.get("UNCONSTRAIN_DATA", Path(__file__).parents[2] / "shared" / "data"))

@@ -13,9 +13,10 @@ from unconstrain.base.errors import InvalidDataError, MissingExtraError, Setting
 from unconstrain.motion.containment import Contained
 from unconstrain.paper import simulation
 from unconstrain.paper.figures import arms, plates
-from unconstrain.paper.simulation import control, pictures, postures
+from unconstrain.paper.simulation import control, engine, pictures, postures
 from unconstrain.paper.simulation.postures import READY
-from unconstrain.paper.simulation.scene import LINK_MASSES, TOOL
+from unconstrain.paper.simulation.reproduction import centres
+from unconstrain.paper.simulation.scene import LINK_MASSES, TOOL, arm_scene
 from unconstrain.paper.systems.arm import LWR3
 from unconstrain.paper.systems.wiping import HELD_OUT, PLATES, Plate, Strokes, WipingPolicy
 from unconstrain.recordings.demonstration import Demonstration
@@ -30,7 +31,7 @@ def wiped():
 
 
 def test_the_scene_s_arm_is_the_lwr():
-    scene = simulation.arm_scene(PLATES[1])
+    scene = arm_scene(PLATES[1])
     rng = np.random.default_rng(0)
     for posture in rng.uniform(LWR3.lower, LWR3.upper, (5, 7)):
         scene.data.qpos[:7] = posture
@@ -150,11 +151,11 @@ def test_turning_and_drift_of_a_circle_that_wanders():
     movement = Demonstration(circle, 2.0 * np.pi * 0.75 * np.column_stack([-circle[:, 1], circle[:, 0], 0.0 * angle]))
     assert simulation.turning(movement, np.array([0.0, 0.0, 1.0])) == pytest.approx(0.75, rel=1e-3)
     wandering = circle + np.column_stack([0.001 * times, 0.0 * times, 0.0 * times])
-    middles = simulation.centres(wandering, PLATES[0])
+    middles = centres(wandering, PLATES[0])
     assert len(middles) == 10
     assert middles[-1, 0] - middles[0, 0] == pytest.approx(9 * 0.001 / 0.75, rel=0.1)
     with pytest.raises(InvalidDataError, match="expected at least one"):
-        simulation.centres(circle[:60], PLATES[0])
+        centres(circle[:60], PLATES[0])
 
 
 def test_pictures_show_the_arm_moving(wiped):
@@ -191,7 +192,6 @@ def test_without_graphics_the_arm_is_lines(wiped, monkeypatch):
 
 
 def test_the_first_backend_that_works_is_taken(monkeypatch):
-    engine = sys.modules["unconstrain.paper.simulation.engine"]  # the package has a function of that name
     for working, found in (({"egl", "osmesa"}, "egl"), ({"osmesa"}, "osmesa"), (set(), None)):
         engine.backend.cache_clear()
         monkeypatch.setattr(engine, "_works", working.__contains__)
@@ -206,7 +206,7 @@ def test_the_first_backend_that_works_is_taken(monkeypatch):
 def test_without_the_engine_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MissingExtraError, match="sim"):
-        simulation.arm_scene(PLATES[0])
+        arm_scene(PLATES[0])
     monkeypatch.setitem(sys.modules, "mink", None)
     with pytest.raises(MissingExtraError, match=r"mink.*sim"):
         simulation.postures_along(np.zeros((1, 3)), PLATES[0])

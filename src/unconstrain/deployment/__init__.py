@@ -3,8 +3,8 @@
 All are made from a :class:`~unconstrain.ClosedForm`; a new target is one more function of it.
 """
 
-from .c99 import c_source, export_c
-from .onnx_graph import export_onnx, onnx_model
+from .c99 import export_c
+from .onnx_graph import export_onnx
 from .stepping import Step, stepper
 
-__all__ = ["Step", "c_source", "export_c", "export_onnx", "onnx_model", "stepper"]
+__all__ = ["Step", "export_c", "export_onnx", "stepper"]

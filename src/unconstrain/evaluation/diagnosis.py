@@ -14,7 +14,7 @@ from ..base.errors import InvalidDataError
 from ..learners import HIDDEN, Solution, noise_by_differences
 from ..models import choose_variance, cover
 from ..policies import Policy
-from ..recordings import Demonstration, stack, unique_names
+from ..recordings import Demonstration, readers, stack
 
 SMALL = 0.1
 """An undetermined spread below this share of the typical action does not count."""
@@ -253,7 +253,7 @@ def _movements(
 
 
 def _names(demos: list[Demonstration]) -> tuple[str, ...]:
-    return unique_names([demo.name or f"demonstration {index + 1}" for index, demo in enumerate(demos)])
+    return readers.unique_names([demo.name or f"demonstration {index + 1}" for index, demo in enumerate(demos)])
 
 
 def _numbers(values: Array) -> tuple[float, ...]:

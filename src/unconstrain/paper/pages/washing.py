@@ -12,7 +12,8 @@ from ...base.arrays import Array
 from ...pages import figures, html
 from ...risks import null_space_projection, project
 from ..experiments.trials import Result
-from ..experiments.washing import Split, Surface
+from ..experiments.washing.learning import Split
+from ..experiments.washing.surfaces import Surface
 from ..figures import plates
 from ..systems.wiping import WipingPolicy
 from .washing_arm import on_the_arm

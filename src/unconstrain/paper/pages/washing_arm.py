@@ -9,7 +9,8 @@ import numpy as np
 from ...base.errors import UnconstrainError
 from ...pages import figures, html
 from ..experiments.trials import Result
-from ..experiments.washing import WITHOUT_PHYSICS, Reproduction
+from ..experiments.washing import WITHOUT_PHYSICS
+from ..experiments.washing.arm import Reproduction
 from ..figures import arms, plates
 from ..simulation import BACKENDS, Wipe
 from ..simulation.pictures import animation, film, strip

@@ -16,7 +16,7 @@ from ..demonstration import Recording
 from . import hdf5, npz, parquet, text
 from .table import Format, unique_names
 
-__all__ = ["FORMATS", "expand", "read", "read_blocks", "unique_names"]
+__all__ = ["expand", "read", "read_blocks", "unique_names"]
 
 FORMATS = (npz.FORMAT, parquet.FORMAT, hdf5.FORMAT, text.FORMAT)
 
