@@ -6,13 +6,4 @@ from .movements import PreparationWarning, differentiate, prepare, resample, tri
 from .recipes import Recipe, complete_recipe
 from .surveys import survey
 
-__all__ = [
-    "PreparationWarning",
-    "Recipe",
-    "complete_recipe",
-    "differentiate",
-    "prepare",
-    "resample",
-    "survey",
-    "trim",
-]
+__all__ = ["PreparationWarning", "Recipe", "complete_recipe", "differentiate", "prepare", "resample", "survey", "trim"]

@@ -69,10 +69,8 @@ def read_blocks(
         raise SettingError(f"got {group!r} for both group and time, expected two different columns.")
     file = Path(path)
     known = _format(file)
-    if whole or known.blocks is None:
-        yield from known.read(file, group=group, time=time)
-    else:
-        yield from known.blocks(file, group=group, time=time)
+    by_rows = None if whole else known.blocks
+    yield from (by_rows or known.read)(file, group=group, time=time)
 
 
 def expand(paths: PathLike | Iterable[PathLike]) -> list[Path]:
