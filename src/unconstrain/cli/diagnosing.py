@@ -56,8 +56,7 @@ def diagnose(
     if report is not None:
         from ..pages.diagnosis import diagnosis_page
 
-        page = diagnosis_page(found, demonstrations, Path(report).stem, states, actions)
-        write(report, page)
+        write(report, diagnosis_page(found, demonstrations, Path(report).stem, states, actions))
         click.echo(f"report: {report}", err=as_json)
 
 

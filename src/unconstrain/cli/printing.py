@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
@@ -18,8 +18,6 @@ import unconstrain as uc
 from ..base.errors import UnconstrainError
 
 if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
-    from collections.abc import Iterator
-
     from ..paper.experiments.trials import Progress, Result
 
 
