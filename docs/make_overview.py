@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from unconstrain.pages import figures
 from unconstrain.paper.experiments import toy
+from unconstrain.paper.figures.overview import overview
 
 settings = toy.ToySettings()
 demonstrations = toy.demonstrate(settings, np.random.default_rng(2), toy.random_lines)
@@ -14,7 +14,7 @@ learners = toy.learners(settings)
 learnt = toy.policy(settings).fit_demonstrations(demonstrations)
 
 path = Path(__file__).parent / "_static" / "overview.png"
-figures.overview(
+overview(
     path,
     demonstrations,
     settings.system,

@@ -19,7 +19,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import unconstrain as uc
-from unconstrain.pages.figures import COLOURS, LABELS, broken
+from unconstrain.pages.figures import COLOURS, LABELS
+from unconstrain.pages.figures.planes import broken
 from unconstrain.paper.systems.wiping import HELD_OUT, PLATES, demonstrate
 
 plates = {plate.name: plate for plate in PLATES}

@@ -21,7 +21,7 @@ import unconstrain as uc
 from conftest import POLICIES
 from samples import draw
 from unconstrain.base.errors import InvalidDataError, MissingExtraError, SettingError
-from unconstrain.deployment import c_source
+from unconstrain.deployment.c99 import c_source
 
 DATA = draw(noise=0.02)
 FAR = [1.0, 3.0, 30.0, 1e3, 1e8]

@@ -11,6 +11,7 @@ from unconstrain.base.errors import MissingExtraError
 from unconstrain.pages import figures
 from unconstrain.pages.figures.planes import arrow_lines, broken, clipped
 from unconstrain.pages.figures.style import DASHES, MARKERS
+from unconstrain.paper.figures import charts, overview, plates
 from unconstrain.recordings.demonstration import Demonstration
 
 rng = np.random.default_rng(0)
@@ -71,23 +72,23 @@ class TestStrokes:
 class TestPlates:
     @pytest.mark.parametrize("normal", NORMALS, ids=str)
     def test_axes_lie_in_the_plane(self, normal):
-        plate = figures.Quad.around(rng.normal(size=(20, 3)), normal)
+        plate = plates.Quad.around(rng.normal(size=(20, 3)), normal)
         np.testing.assert_allclose(plate.axes.T @ plate.axes, np.eye(2), atol=1e-12)
         np.testing.assert_allclose(normal @ plate.axes, 0.0, atol=1e-12)
 
     @pytest.mark.parametrize("normal", NORMALS, ids=str)
     def test_a_point_in_the_plane_keeps_its_place(self, normal):
-        plate = figures.Quad.around(rng.normal(size=(20, 3)), normal)
+        plate = plates.Quad.around(rng.normal(size=(20, 3)), normal)
         points = plate.grid(5)
         np.testing.assert_allclose(plate.flatten(plate.place(points)), points, atol=1e-12)
 
     def test_it_reaches_around_the_movement(self):
         states = rng.normal(size=(20, 3)) * [1, 1, 0]
-        plate = figures.Quad.around(states, np.array([0.0, 0.0, 1.0]))
+        plate = plates.Quad.around(states, np.array([0.0, 0.0, 1.0]))
         assert (np.abs(plate.flatten(states)) < plate.half).all()
 
     def test_a_movement_that_stays_put_has_a_plate_too(self):
-        plate = figures.Quad.around(np.ones((4, 3)), np.array([0.0, 0.0, 1.0]))
+        plate = plates.Quad.around(np.ones((4, 3)), np.array([0.0, 0.0, 1.0]))
         assert np.isfinite(plate.corners).all()
 
 
@@ -104,13 +105,13 @@ class TestCharts:
     def test_axes_say_what_they_show(self):
         x, ones = np.arange(3.0), np.ones(3)
         curves = dict.fromkeys(figures.METHODS, (ones, ones))
-        made = figures.bands(x, curves, title="nUPE", labels=("angle (rad)", "nUPE"))
+        made = charts.bands(x, curves, title="nUPE", labels=("angle (rad)", "nUPE"))
         assert (made.layout.xaxis.title.text, made.layout.yaxis.title.text) == ("angle (rad)", "nUPE")
 
     def test_bands_never_go_below_zero(self):
         x, ones = np.arange(3.0), np.ones(3)
         for log in (False, True):
-            made = figures.bands(x, {"direct": (ones, 2 * ones)}, title="", labels=("", ""), log=log)
+            made = charts.bands(x, {"direct": (ones, 2 * ones)}, title="", labels=("", ""), log=log)
             assert min(made.data[0].y) >= 0.5 * log
 
     def test_spectra_begin_at_one_and_descend(self):
@@ -161,7 +162,7 @@ class TestMapOfWhatIsKnown:
 class TestRatioTable:
     def test_cells_say_their_number_and_are_coloured_by_its_logarithm(self):
         values = np.array([[1.0, 0.01, np.nan], [1584.3, 3.98e6, 20.0]])
-        cells = figures.ratio_table(["a", "b"], ["x", "y", "z"], values, top=10.0).data[0]
+        cells = charts.ratio_table(["a", "b"], ["x", "y", "z"], values, top=10.0).data[0]
         assert [list(row) for row in cells.text] == [["1", "0.01", ""], ["1584", "4e6", "20"]]
         np.testing.assert_allclose(cells.z, [[0, -1, np.nan], [1, 1, 1]])
 
@@ -171,13 +172,13 @@ class TestOverview:
 
     def test_it_draws_a_file(self, tmp_path):
         demo = Demonstration(self.states, self.states)
-        figures.overview(tmp_path / "a.png", [demo], np.tanh, {"learnt": np.negative}, arrows=5)
+        overview.overview(tmp_path / "a.png", [demo], np.tanh, {"learnt": np.negative}, arrows=5)
         assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
 
     def test_without_matplotlib_it_says_what_to_install(self, tmp_path, monkeypatch):
         monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
         with pytest.raises(MissingExtraError, match=r"'matplotlib', which is not installed.*unconstrain\[viz\]"):
-            figures.overview(tmp_path / "a.png", [], np.tanh, {})
+            overview.overview(tmp_path / "a.png", [], np.tanh, {})
 
 
 def test_without_plotly_pictures_say_what_to_install(monkeypatch):

@@ -15,17 +15,16 @@ from recorded import DATA, needs_data
 from unconstrain.base.errors import InvalidDataError, SettingError, UnconstrainError
 from unconstrain.recordings.demonstration import Demonstration, Recording
 from unconstrain.recordings.preparation import (
-    Gap,
     PreparationWarning,
     Recipe,
     differentiate,
-    find_gaps,
-    guess_recipe,
     prepare,
     resample,
     survey,
     trim,
 )
+from unconstrain.recordings.preparation.movements import Gap, find_gaps
+from unconstrain.recordings.preparation.recipes import guess_recipe
 from unconstrain.recordings.readers import read
 
 TURN = 3.0  # rad/s

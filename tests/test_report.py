@@ -20,7 +20,7 @@ from unconstrain.pages import fit, html
 from unconstrain.paper import pages as report
 from unconstrain.paper.experiments import figure4, figure5, table1, table2, toy
 from unconstrain.paper.experiments.trials import Result
-from unconstrain.paper.pages import washing_arm
+from unconstrain.paper.pages import parts, washing_arm
 from unconstrain.paper.systems.wiping import PLATES, Strokes, demonstrate
 
 SMALL = {"demonstrations": 8, "steps": 10, "per_axis": 4, "folds": 4}
@@ -291,8 +291,8 @@ class TestNumbers:
         assert html.number(value) == text
 
     def test_mean_and_deviation_are_scaled_together(self):
-        assert html.mean_sd(0.00131, 0.00028) == "0.131 ± 0.028"
-        assert html.mean_sd(None, None) == "–"
+        assert parts.mean_sd(0.00131, 0.00028) == "0.131 ± 0.028"
+        assert parts.mean_sd(None, None) == "–"
 
 
 GRAPHS = """

@@ -11,11 +11,12 @@ from PIL import Image
 
 from unconstrain.base.errors import InvalidDataError, MissingExtraError, SettingError, UnconstrainError
 from unconstrain.motion.containment import Contained
-from unconstrain.pages import figures
 from unconstrain.paper import simulation
-from unconstrain.paper.simulation import control, pictures, postures
+from unconstrain.paper.figures import arms, plates
+from unconstrain.paper.simulation import control, engine, pictures, postures
 from unconstrain.paper.simulation.postures import READY
-from unconstrain.paper.simulation.scene import LINK_MASSES, TOOL
+from unconstrain.paper.simulation.reproduction import centres
+from unconstrain.paper.simulation.scene import LINK_MASSES, TOOL, arm_scene
 from unconstrain.paper.systems.arm import LWR3
 from unconstrain.paper.systems.wiping import HELD_OUT, PLATES, Plate, Strokes, WipingPolicy
 from unconstrain.recordings.demonstration import Demonstration
@@ -30,7 +31,7 @@ def wiped():
 
 
 def test_the_scene_s_arm_is_the_lwr():
-    scene = simulation.arm_scene(PLATES[1])
+    scene = arm_scene(PLATES[1])
     rng = np.random.default_rng(0)
     for posture in rng.uniform(LWR3.lower, LWR3.upper, (5, 7)):
         scene.data.qpos[:7] = posture
@@ -149,11 +150,11 @@ def test_turning_and_drift_of_a_circle_that_wanders():
     movement = Demonstration(circle, 2.0 * np.pi * 0.75 * np.column_stack([-circle[:, 1], circle[:, 0], 0.0 * angle]))
     assert simulation.turning(movement, np.array([0.0, 0.0, 1.0])) == pytest.approx(0.75, rel=1e-3)
     wandering = circle + np.column_stack([0.001 * times, 0.0 * times, 0.0 * times])
-    middles = simulation.centres(wandering, PLATES[0])
+    middles = centres(wandering, PLATES[0])
     assert len(middles) == 10
     assert middles[-1, 0] - middles[0, 0] == pytest.approx(9 * 0.001 / 0.75, rel=0.1)
     with pytest.raises(InvalidDataError, match="expected at least one"):
-        simulation.centres(circle[:60], PLATES[0])
+        centres(circle[:60], PLATES[0])
 
 
 def test_pictures_show_the_arm_moving(wiped):
@@ -183,14 +184,13 @@ def test_without_graphics_the_arm_is_lines(wiped, monkeypatch):
     with pytest.raises(UnconstrainError, match="cannot be drawn here"):
         pictures.film(wiped, seconds=0.2)
     _, joints = LWR3.frames(wiped.postures[:2])
-    quad = figures.Quad.around(wiped.positions, wiped.plate.rotation[:, 2])
-    drawn = Image.open(io.BytesIO(figures.arm_on_plate(np.moveaxis(joints, -1, 0), wiped.positions, quad)))
+    quad = plates.Quad.around(wiped.positions, wiped.plate.rotation[:, 2])
+    drawn = Image.open(io.BytesIO(arms.arm_on_plate(np.moveaxis(joints, -1, 0), wiped.positions, quad)))
     assert drawn.format == "PNG"
     assert np.asarray(drawn).std() > 5
 
 
 def test_the_first_backend_that_works_is_taken(monkeypatch):
-    engine = sys.modules["unconstrain.paper.simulation.engine"]  # the package has a function of that name
     for working, found in (({"egl", "osmesa"}, "egl"), ({"osmesa"}, "osmesa"), (set(), None)):
         engine.backend.cache_clear()
         monkeypatch.setattr(engine, "_works", working.__contains__)
@@ -205,7 +205,7 @@ def test_the_first_backend_that_works_is_taken(monkeypatch):
 def test_without_the_engine_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MissingExtraError, match="sim"):
-        simulation.arm_scene(PLATES[0])
+        arm_scene(PLATES[0])
     monkeypatch.setitem(sys.modules, "mink", None)
     with pytest.raises(MissingExtraError, match=r"mink.*sim"):
         simulation.postures_along(np.zeros((1, 3)), PLATES[0])

@@ -1,6 +1,7 @@
 """The public names and where they live: what a type checker sees, and what is imported on first use."""
 
 from . import constraints as constraints
+from . import evaluation as evaluation
 from . import learners as learners
 from . import models as models
 from . import motion as motion
@@ -28,16 +29,20 @@ from .learners import robust as robust
 from .models import Affine as Affine
 from .models import ClosedForm as ClosedForm
 from .models import KMeansRBF as KMeansRBF
+from .models import Model as Model
 from .models import NormalisedRBF as NormalisedRBF
 from .models import ReceptiveFields as ReceptiveFields
 from .models import cover as cover
+from .motion import Contained as Contained
 from .motion import rollout as rollout
 from .paper import datasets as datasets
 from .paper import experiments as experiments
 from .paper import systems as systems
 from .policies import LocallyLinearPolicy as LocallyLinearPolicy
 from .policies import ParametricPolicy as ParametricPolicy
+from .policies import Policy as Policy
 from .recordings import Demonstration as Demonstration
+from .recordings import Recipe as Recipe
 from .recordings import Recording as Recording
 from .recordings import Stream as Stream
 from .recordings import Truth as Truth

@@ -9,41 +9,22 @@ from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
-_NOW = {
-    "arrays": "base.arrays",
-    "batches": "training.batches",
-    "closed_form": "models.formula",
-    "cluster": "training.cluster",
-    "containment": "motion.containment",
-    "datasets": "paper.datasets",
-    "demonstration": "recordings.demonstration",
-    "diagnosis": "evaluation.diagnosis",
-    "errors": "base.errors",
-    "experiments": "paper.experiments",
-    "features": "models.features",
-    "figures": "pages.figures",
-    "metrics": "evaluation.metrics",
-    "moments": "risks.moments",
-    "objectives": "risks.objectives",
-    "preparation": "recordings.preparation",
-    "projection": "risks.projection",
-    "quadratic": "risks.quadratic",
-    "readers": "recordings.readers",
-    "receptive_fields": "models.receptive_fields",
-    "report": "paper.pages",
-    "report.diagnosis": "pages.diagnosis",
-    "report.fit": "pages.fit",
-    "report.html": "pages.html",
-    "robust": "learners.robust",
-    "robust.samples": "training.samples",
-    "robust.uncertainty": "learners.solution",
-    "rollouts": "motion.rollouts",
-    "simulation": "paper.simulation",
-    "streams": "recordings.streams",
-    "systems": "paper.systems",
-    "threads": "base.threads",
-    "validation": "training",
+_MOVED = {
+    "base": "arrays errors threads",
+    "evaluation": "diagnosis metrics",
+    "learners": "robust",
+    "models": "features receptive_fields",
+    "motion": "containment rollouts",
+    "pages": "figures",
+    "paper": "datasets experiments simulation systems",
+    "recordings": "demonstration preparation readers streams",
+    "risks": "moments objectives projection quadratic",
+    "training": "cluster",
 }
+_NOW = {name: f"{room}.{name}" for room, names in _MOVED.items() for name in names.split()}
+_NOW |= {f"report.{name}": f"pages.{name}" for name in ("diagnosis", "fit", "html")}
+_NOW |= {"batches": "training", "closed_form": "models.formula", "report": "paper.pages", "validation": "training"}
+_NOW |= {"robust.samples": "training.samples", "robust.uncertainty": "learners.solution"}
 
 
 class _Former(MetaPathFinder, Loader):

@@ -8,9 +8,11 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import click
+
+import unconstrain as uc
 
 from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainError
 from ..base.files import write
@@ -28,11 +30,6 @@ from .reading import (
     said_recipe,
     stream_of,
 )
-
-if TYPE_CHECKING:  # everything heavy is imported by the command that needs it
-    from ..constraints import Plane
-    from ..policies import Policy
-    from ..recordings import Demonstration
 
 __all__ = ["main"]
 
@@ -57,14 +54,12 @@ def main() -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     """Describe each FILE: columns, rate, gaps, zero actions."""
-    from ..recordings import survey, unique_names
-
     recipe = recipe_of(**reading)
     surveys, first = [], None
     for recording in recordings_one_by_one(files, **reading):
-        surveys.append(survey(recording, recipe))
+        surveys.append(uc.preparation.survey(recording, recipe))
         first = replace(recording, values=recording.values[:1], times=None) if first is None else first
-    names = unique_names(found.name for found in surveys)
+    names = uc.readers.unique_names(found.name for found in surveys)
     surveys = [replace(found, name=name) for found, name in zip(surveys, names, strict=True)]
     if as_json:
         click.echo(json.dumps([asdict(found) for found in surveys], indent=2))
@@ -143,20 +138,16 @@ def fit(
 
     Data larger than memory is read twice, one file or block at a time.
     """
-    from .. import storage
-    from ..recordings import expand
-    from ..training import Folds
-
-    paths = expand(files)
+    paths = uc.readers.expand(files)
     check_writable((output, report), paths)
     learner = learner or default_learner(paths, scheduler, alpha, softness, speed_power)
     check_speed_power(learner, speed_power)
-    chosen = {"learner": learner_of(learner, alpha, softness), "validation": Folds(folds, hold_out)}
+    chosen = {"learner": learner_of(learner, alpha, softness), "validation": uc.Folds(folds, hold_out)}
     fitted = policy_of(model, variance, centres, **chosen)
     stream = stream_of(paths, speed_power, **reading)
     learn(fitted, stream, scheduler)
     notes = {"recipe": stream.recipe.to_dict(), "group": reading["group"], "time": reading["time"]}
-    storage.save(fitted, output, notes)
+    uc.save(fitted, output, notes)
     click.echo(f"Learnt from {said_recipe(stream.recipe)}.")
     say_fit(fitted, stream if scheduler is None else None, learner)
     click.echo(f"policy: {output}")
@@ -177,19 +168,15 @@ def score(policy: str, files: Sequence[str], plane: tuple[float, ...] | None, as
 
     They are prepared as the training data of the policy was.
     """
-    from .. import storage
-    from ..evaluation import metrics
-    from ..recordings import preparation
-
-    learnt, notes = _fitted(policy), storage.load_notes(policy)
-    recipe = preparation.Recipe.from_dict(notes.get("recipe", {}))
+    learnt, notes = _fitted(policy), uc.storage.load_notes(policy)
+    recipe = uc.Recipe.from_dict(notes.get("recipe", {}))
     recordings = recordings_in(files, group=notes.get("group"), time=notes.get("time"))
-    demonstrations = preparation.prepare(recordings, recipe)
+    demonstrations = uc.prepare(recordings, recipe)
     constraint = _plane(plane, learnt.n_outputs_, "one for each action")
 
-    def scores(of: Demonstration | Sequence[Demonstration], name: str, samples: int) -> dict[str, Any]:
-        found = {"demonstration": name, "samples": samples, "ninc": metrics.ninconsistency(learnt, of)}
-        return found | ({"ncpe": metrics.ncpe(learnt, of, constraint)} if constraint is not None else {})
+    def scores(of: uc.Demonstration | Sequence[uc.Demonstration], name: str, samples: int) -> dict[str, Any]:
+        found = {"demonstration": name, "samples": samples, "ninc": uc.ninconsistency(learnt, of)}
+        return found | ({"ncpe": uc.ncpe(learnt, of, constraint)} if constraint is not None else {})
 
     rows = [scores(demo, demo.name, len(demo)) for demo in demonstrations]
     whole = scores(demonstrations, "all", sum(map(len, demonstrations)))
@@ -219,13 +206,11 @@ def rollout(
     policy: str, start: tuple[float, ...], steps: int, dt: float, plane: tuple[float, ...] | None, output: str
 ) -> None:
     """Roll POLICY out, freely or on a plane, and write it as CSV."""
-    from .. import motion, storage
-
-    learnt, recipe = _fitted(policy), storage.load_notes(policy).get("recipe", {})
+    learnt, recipe = _fitted(policy), uc.storage.load_notes(policy).get("recipe", {})
     if len(start) != learnt.n_features_in_:
         raise SettingError(f"--start: got {len(start)} numbers, expected {learnt.n_features_in_}, one for each state.")
     constraint = _plane(plane, len(start), "as many as states")
-    path = motion.rollout(learnt, list(start), steps, dt, constraint)
+    path = uc.rollout(learnt, list(start), steps, dt, constraint)
     states = recipe.get("states") or [f"x{i + 1}" for i in range(len(start))]
     try:
         support = learnt.support(path.states)
@@ -356,28 +341,24 @@ def doctor(as_json: bool) -> None:
 main.add_command(diagnose)
 
 
-def _fitted(path: str) -> Policy:
-    from .. import storage
-
-    policy = storage.load(path)
+def _fitted(path: str) -> uc.Policy:
+    policy = uc.load(path)
     if not hasattr(policy, "solution_"):
         raise ModelFileError(f"{path}: holds a policy that is not fitted. Fit it before saving.")
     return policy
 
 
-def _plane(normal: tuple[float, ...] | None, dimensions: int, meaning: str) -> Plane | None:
+def _plane(normal: tuple[float, ...] | None, dimensions: int, meaning: str) -> uc.constraints.Plane | None:
     import numpy as np
-
-    from ..constraints import Plane
 
     if normal is None:
         return None
     if len(normal) != dimensions:
         raise SettingError(f"--plane: got {len(normal)} numbers, expected {dimensions}, {meaning}.")
-    return Plane(np.array(normal))
+    return uc.constraints.Plane(np.array(normal))
 
 
-def _csv(header: Sequence[str], path: Demonstration) -> str:
+def _csv(header: Sequence[str], path: uc.Demonstration) -> str:
     import numpy as np
 
     text = io.StringIO()

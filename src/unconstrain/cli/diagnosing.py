@@ -5,18 +5,16 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
+
+import unconstrain as uc
 
 from ..base.files import write
 from .fitting import MODELS, check_writable, policy_of
 from .printing import print_table
 from .reading import complete, options_for_reading, recipe_of, recordings_in, said_recipe
-
-if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
-    from ..evaluation import Diagnosis
-
 
 MOST_ROWS = 8
 
@@ -41,17 +39,13 @@ def diagnose(
 
     Learns from each FILE, and also reports where constraints vary too little and which demonstrations look free.
     """
-    from .. import evaluation
-    from ..learners import Robust
-    from ..recordings import expand, prepare
-
-    paths = expand(files)
+    paths = uc.readers.expand(files)
     check_writable((report,), paths)
     recordings = recordings_in(paths, **reading)
     recipe = complete(recipe_of(**reading), recordings[0])
-    demonstrations = prepare(recordings, recipe)
-    policy = policy_of(model, variance, centres, learner=Robust()).fit_demonstrations(demonstrations)
-    found = evaluation.diagnose(policy, demonstrations)
+    demonstrations = uc.prepare(recordings, recipe)
+    policy = policy_of(model, variance, centres, learner=uc.Robust()).fit_demonstrations(demonstrations)
+    found = uc.evaluation.diagnose(policy, demonstrations)
     states = recipe.states or ()
     actions = recipe.actions or tuple(f"v{name}" for name in states)
     if as_json:
@@ -62,15 +56,13 @@ def diagnose(
     if report is not None:
         from ..pages.diagnosis import diagnosis_page
 
-        page = diagnosis_page(found, demonstrations, Path(report).stem, states, actions)
-        write(report, page)
+        write(report, diagnosis_page(found, demonstrations, Path(report).stem, states, actions))
         click.echo(f"report: {report}", err=as_json)
 
 
-def _say(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> None:
-    from ..evaluation import named, sentences
-
-    for line in sentences(found, states, actions):
+def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequence[str]) -> None:
+    named = uc.evaluation.named
+    for line in uc.evaluation.sentences(found, states, actions):
         click.echo(line)
     shown = found.regions[:MOST_ROWS]
     click.echo(f"\nThe {len(shown)} regions of largest undetermined spread, of {len(found.regions)}, largest first:")

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import click
 
+import unconstrain as uc
+
 from ..base.errors import SettingError
-
-if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
-    from ..policies import Policy
-    from ..recordings import Stream
-
 
 MODELS = ("local", "rbf", "linear")
 
@@ -57,19 +54,17 @@ def default_learner(
 
 def learner_of(name: str, alpha: float | Literal["auto"] | None, softness: float | None) -> Any:
     """Make the learner of the options."""
-    from ..learners import Direct, Hybrid, Inconsistency, Robust
-
     given = {key: value for key, value in (("alpha", alpha), ("softness", softness)) if value is not None}
     if name != "hybrid":
         if given:
             raise SettingError(f"--{next(iter(given))}: belongs to the hybrid learner, got --learner {name}.")
-        return {"direct": Direct, "inconsistency": Inconsistency, "robust": Robust}[name]()
+        return {"direct": uc.Direct, "inconsistency": uc.Inconsistency, "robust": uc.Robust}[name]()
     if alpha is not None and softness:
         raise SettingError(
             "--alpha: got --softness too, expected one of them; a softened split has no threshold to choose."
         )
     # A softened split needs no threshold on top.
-    return Hybrid(**given, threshold=0.0 if softness else None)  # type: ignore[arg-type]
+    return uc.Hybrid(**given, threshold=0.0 if softness else None)  # type: ignore[arg-type]
 
 
 def check_writable(outputs: Sequence[str | None], paths: Sequence[str | Path]) -> None:
@@ -81,18 +76,15 @@ def check_writable(outputs: Sequence[str | None], paths: Sequence[str | Path]) -
             raise SettingError(f"{written}: cannot be written, its folder does not exist.")
 
 
-def policy_of(model: str, variance: float | None, centres: int | None, **chosen: Any) -> Policy:
+def policy_of(model: str, variance: float | None, centres: int | None, **chosen: Any) -> uc.Policy:
     """Make the policy of the options."""
-    from .. import policies
-    from ..models import Affine, KMeansRBF
-
     for option, value, needed in (("--variance", variance, "local"), ("--centres", centres, "rbf")):
         if value is not None and model != needed:
             raise SettingError(f"{option}: belongs to --model {needed}, got --model {model}.")
     if model == "local":
-        return policies.LocallyLinearPolicy(variance, **chosen)
-    shape = KMeansRBF(centres or 25) if model == "rbf" else Affine()
-    return policies.ParametricPolicy(shape, **chosen)
+        return uc.LocallyLinearPolicy(variance, **chosen)
+    shape = uc.KMeansRBF(centres or 25) if model == "rbf" else uc.Affine()
+    return uc.ParametricPolicy(shape, **chosen)
 
 
 def check_speed_power(learner: str, speed_power: float) -> None:
@@ -101,12 +93,10 @@ def check_speed_power(learner: str, speed_power: float) -> None:
         raise SettingError("--speed-power: the robust learner weights by speed itself; give another --learner with it.")
 
 
-def learn(policy: Policy, stream: Stream, scheduler: str | None) -> None:
+def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None) -> None:
     """Fit here, or on the cluster of a scheduler."""
     if scheduler is None:
         policy.fit_batches(stream)
         return
-    from ..training import cluster
-
-    with cluster.connected(scheduler) as client:
-        cluster.fit_batches(policy, stream.parts(), client=client)
+    with uc.cluster.connected(scheduler) as client:
+        uc.cluster.fit_batches(policy, stream.parts(), client=client)

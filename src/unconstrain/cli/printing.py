@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
@@ -13,15 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+import unconstrain as uc
+
 from ..base.errors import UnconstrainError
 
 if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
-    from collections.abc import Iterator
-
-    from ..learners import Solution
     from ..paper.experiments.trials import Progress, Result
-    from ..policies import Policy
-    from ..recordings import Stream
 
 
 class Group(click.Group):
@@ -89,7 +86,7 @@ def _cell(value: Any) -> str:
     return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
-def say_fit(policy: Policy, stream: Stream | None, learner: str) -> None:
+def say_fit(policy: uc.Policy, stream: uc.Stream | None, learner: str) -> None:
     """Print the solution, the share that the data determined, and the held-out inconsistency.
 
     Without a stream, whatever needs a further pass over the samples is left out.
@@ -128,7 +125,7 @@ def say_fit(policy: Policy, stream: Stream | None, learner: str) -> None:
         )
 
 
-def _said_of_samples(solution: Solution) -> str:
+def _said_of_samples(solution: uc.Solution) -> str:
     """The candidate that a robust learner took, and its estimates of noise and free samples."""
     ways = {
         "likelihood": "by maximum likelihood: samples look free, or constrained at random",
@@ -142,7 +139,7 @@ def _said_of_samples(solution: Solution) -> str:
     )
 
 
-def _walked(policy: Policy, stream: Stream) -> tuple[int, int, float]:
+def _walked(policy: uc.Policy, stream: uc.Stream) -> tuple[int, int, float]:
     """Numbers of demonstrations and samples, and the unexplained share of their motion, without sample weights."""
     names, samples, unexplained, energy = set(), 0, 0.0, 0.0
     for name, demonstration in stream.named_demonstrations():

@@ -6,14 +6,13 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from ..base.errors import SettingError
+import unconstrain as uc
 
-if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
-    from ..recordings import Recipe, Recording, Stream
+from ..base.errors import SettingError
 
 
 class Names(click.ParamType):  # type: ignore[type-arg]  # generic in the newest click only
@@ -77,27 +76,23 @@ def recipe_of(
     centre: bool = False,
     still: float | None = None,
     **_: Any,
-) -> Recipe:
+) -> uc.Recipe:
     """The recipe of the options."""
-    from ..recordings import Recipe
-
     if differentiate or by:
         if action is not None:
             raise SettingError("--action: got columns, and --differentiate or --by too; give one or the other.")
         by = by or "savgol"
-    recipe = Recipe(state, action, by, rate=rate, centre=centre, still=still)
+    recipe = uc.Recipe(state, action, by, rate=rate, centre=centre, still=still)
     return recipe if window is None else replace(recipe, window_s=window)
 
 
-def complete(recipe: Recipe, recording: Recording) -> Recipe:
+def complete(recipe: uc.Recipe, recording: uc.Recording) -> uc.Recipe:
     """Guess what was not said; what was said has to be there."""
-    from ..recordings import complete_recipe
-
     recording.select([*(recipe.states or ()), *(recipe.actions or ())])
-    return complete_recipe(recipe, recording)
+    return uc.preparation.complete_recipe(recipe, recording)
 
 
-def said_recipe(recipe: Recipe) -> str:
+def said_recipe(recipe: uc.Recipe) -> str:
     """A recipe in words."""
     states = ", ".join(recipe.states or ())
     smoothed = f"savgol, {recipe.window_s:g} s" if recipe.differentiate == "savgol" else "central differences"
@@ -107,27 +102,21 @@ def said_recipe(recipe: Recipe) -> str:
 
 def recordings_in(
     paths: Sequence[str | Path], group: str | None = None, time: str | None = None, **_: Any
-) -> list[Recording]:
+) -> list[uc.Recording]:
     """Read files as the options say."""
-    from ..recordings import read
-
-    return read(paths, group=group, time=time)
+    return uc.read(paths, group=group, time=time)
 
 
 def recordings_one_by_one(
     paths: Sequence[str | Path], group: str | None = None, time: str | None = None, **_: Any
-) -> Iterator[Recording]:
+) -> Iterator[uc.Recording]:
     """Read files as the options say, holding one at a time."""
-    from ..recordings import expand, read_blocks
-
-    for path in expand(paths):
-        yield from read_blocks(path, group=group, time=time, whole=True)
+    for path in uc.readers.expand(paths):
+        yield from uc.readers.read_blocks(path, group=group, time=time, whole=True)
 
 
-def stream_of(paths: Sequence[str | Path], speed_power: float, **reading: Any) -> Stream:
+def stream_of(paths: Sequence[str | Path], speed_power: float, **reading: Any) -> uc.Stream:
     """Files as batches to learn from, as the options say."""
-    from ..recordings import Stream
-
     roles = {"group": reading["group"], "time": reading["time"]}
     asked = recipe_of(**reading)
-    return Stream(paths, complete(asked, Stream(paths, asked, **roles).first), speed_power=speed_power, **roles)
+    return uc.Stream(paths, complete(asked, uc.Stream(paths, asked, **roles).first), speed_power=speed_power, **roles)

@@ -3,7 +3,6 @@
 All are made from a :class:`~unconstrain.ClosedForm`; a new target is one more function of it.
 """
 
-from .c99 import c_source
 from .deployable import Deployable
 
-__all__ = ["Deployable", "c_source"]
+__all__ = ["Deployable"]

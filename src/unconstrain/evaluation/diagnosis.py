@@ -13,7 +13,7 @@ from ..base.arrays import Array
 from ..base.errors import InvalidDataError
 from ..learners import SPHERE_HIDDEN_BY_NOISE, Solution, noise_by_differences
 from ..models import choose_variance, cover
-from ..recordings import Demonstration, stack, unique_names
+from ..recordings import Demonstration, readers, stack
 
 if TYPE_CHECKING:
     from ..policies import Policy
@@ -255,7 +255,7 @@ def _movements(
 
 
 def _names(demos: list[Demonstration]) -> tuple[str, ...]:
-    return unique_names([demo.name or f"demonstration {index + 1}" for index, demo in enumerate(demos)])
+    return readers.unique_names([demo.name or f"demonstration {index + 1}" for index, demo in enumerate(demos)])
 
 
 def _numbers(values: Array) -> tuple[float, ...]:

@@ -5,7 +5,6 @@ Templates put them into HTML. What goes in is text and is escaped, unless it cam
 
 from __future__ import annotations
 
-import base64
 import inspect
 import re
 from collections.abc import Collection, Iterable, Sequence
@@ -94,18 +93,6 @@ def number(value: float | None, digits: int = 3) -> str:
     return shorter.replace("-", "−") + raised
 
 
-def mean_sd(mean: float | None, sd: float | None, scale: float = 100.0) -> str:
-    """Such as ``0.0131 ± 0.002``, after scaling; "–" where there is no mean."""
-    if mean is None:
-        return "–"
-    return f"{number(scale * mean)} ± {number(None if sd is None else scale * sd, 2)}"
-
-
-def label(key: str) -> Markup:
-    """A method or another key with its colour."""
-    return _part("label", LABELS.get(key, key), COLOURS.get(key, PALETTE[0]))
-
-
 def table(
     header: Sequence[str], rows: Sequence[Sequence[str]], *, left: int = 1, note: str = "", rules: Collection[int] = ()
 ) -> Markup:
@@ -157,23 +144,6 @@ def picture(
     named, coloured = LABELS | (labels or {}), COLOURS | (colours or {})
     shown = [_key(key, named.get(key, key), coloured.get(key, PALETTE[0])) for key in keys]
     return _part("picture", name, drawn, caption, shown, least)
-
-
-def image(name: str, data: bytes, kind: str, alternative: str, caption: str) -> Markup:
-    """A picture that is part of the page.
-
-    Parameters
-    ----------
-    name : str
-        Of the picture within the page.
-    data : bytes
-    kind : {"png", "gif"}
-    alternative : str
-        What it shows, for those who cannot see it.
-    caption : str
-    """
-    source = f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"
-    return _part("image", name, source, alternative, caption)
 
 
 def settings_table(settings: Any) -> Markup:

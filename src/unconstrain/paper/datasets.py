@@ -14,9 +14,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+import unconstrain as uc
+
 from ..base.arrays import Array, require_extra
 from ..base.errors import MissingExtraError, ReadError
-from ..recordings import Demonstration, Recipe, Recording, prepare
 
 DATA_VARIABLE = "UNCONSTRAIN_DATA"
 """Environment variable with a folder that holds local copies."""
@@ -77,7 +78,7 @@ class WipingBout:
 
     name: str
     tilt: str
-    demonstration: Demonstration
+    demonstration: uc.Demonstration
     plane_normal: Array
     tool_normal: Array
 
@@ -144,9 +145,11 @@ def _cut(track: _Track, bout: _Bout, rate: float, centre: bool) -> WipingBout:
     positions = track.positions[rows]
     tool = track.tool_axes[rows].mean(axis=0)
     plane = np.linalg.svd(positions - positions.mean(axis=0), full_matrices=False)[2][2]
-    recording = Recording(POSITION, positions, track.interval * np.arange(len(positions), dtype=np.float64), bout.name)
-    recipe = Recipe(states=POSITION, differentiate="savgol", rate=rate, centre=centre)
-    [demonstration] = prepare(recording, recipe)
+    recording = uc.Recording(
+        POSITION, positions, track.interval * np.arange(len(positions), dtype=np.float64), bout.name
+    )
+    recipe = uc.Recipe(states=POSITION, differentiate="savgol", rate=rate, centre=centre)
+    [demonstration] = uc.prepare(recording, recipe)
     return WipingBout(
         name=bout.name,
         tilt=bout.tilt,
@@ -156,7 +159,7 @@ def _cut(track: _Track, bout: _Bout, rate: float, centre: bool) -> WipingBout:
     )
 
 
-def _reversed(demonstration: Demonstration) -> Demonstration:
+def _reversed(demonstration: uc.Demonstration) -> uc.Demonstration:
     """The same way, walked back."""
     times = demonstration.times
     return replace(

@@ -1,14 +1,11 @@
 """Pictures of demonstrations, policies and errors.
 
-They know arrays, demonstrations and callables, not estimators or experiments.
-Interactive ones are plotly figures; :func:`overview` draws with matplotlib.
-Both come with the extra ``viz`` and are imported when first used.
+They know arrays and callables, not estimators or experiments. All are plotly figures, made in one style; plotly comes
+with the extra ``viz`` and is imported when first used.
 """
 
-from .arms import arm_on_plate
-from .curves import RATIO_COLOURS, bands, bars, dots, over_time, ratio_table, ratios, spectra, step_scores
-from .overview import overview
-from .planes import Quad, broken, known_map, paths, vector_field
+from .curves import bars, over_time, spectra, step_scores
+from .planes import known_map, vector_field
 from .spaces import movements
 from .style import COLOURS, LABELS, METHODS, PALETTE
 
@@ -17,20 +14,10 @@ __all__ = [
     "LABELS",
     "METHODS",
     "PALETTE",
-    "RATIO_COLOURS",
-    "Quad",
-    "arm_on_plate",
-    "bands",
     "bars",
-    "broken",
-    "dots",
     "known_map",
     "movements",
     "over_time",
-    "overview",
-    "paths",
-    "ratio_table",
-    "ratios",
     "spectra",
     "step_scores",
     "vector_field",

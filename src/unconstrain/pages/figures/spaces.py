@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import Array
-from .planes import Quad, broken
+from .planes import broken
 from .style import COLOURS, INK, PALETTE, RULE, figure, legend
 
 
 def movements(
     tracks: Sequence[tuple[str, str, Array]],
-    quads: Mapping[str, Quad] | None = None,
+    plates: Mapping[str, Array] | None = None,
     *,
     labels: tuple[str, str, str] = ("x (m)", "y (m)", "z (m)"),
     height: int = 520,
@@ -25,8 +25,8 @@ def movements(
     ----------
     tracks : sequence of (key, name, states)
         The key decides the colour and what is hidden together; states (T, 3).
-    quads : dict, optional
-        Name of a track to its plate, drawn translucent in the same colour.
+    plates : dict, optional
+        Name of a track to the corners (4, 3) of its plate, going round; drawn translucent in the same colour.
     labels : tuple of str
         Of the axes, with their unit.
     height : int
@@ -47,8 +47,8 @@ def movements(
         where = legend(key, first=key not in drawn)
         made.add_scatter3d(x=x, y=y, z=z, mode="lines", line=line, hovertemplate=f"{name}<extra></extra>", **where)
         drawn.add(key)
-        if quads and name in quads:
-            made.add_mesh3d(**_mesh(quads[name]), color=colours[key], opacity=0.13, hoverinfo="skip", legendgroup=key)
+        if plates and name in plates:
+            made.add_mesh3d(**_mesh(plates[name]), color=colours[key], opacity=0.13, hoverinfo="skip", legendgroup=key)
     axis = {"gridcolor": RULE, "backgroundcolor": "white", "color": INK, "title_font_size": 13, "tickfont_size": 11}
     made.update_layout(
         scene={
@@ -63,7 +63,7 @@ def movements(
     return made
 
 
-def _mesh(quad: Quad) -> dict[str, Any]:
-    x, y, z = quad.corners.T
+def _mesh(corners: Array) -> dict[str, Any]:
+    x, y, z = corners.T
     first = np.array([0, 0])
     return {"x": x, "y": y, "z": z, "i": first, "j": np.array([1, 2]), "k": np.array([2, 3])}

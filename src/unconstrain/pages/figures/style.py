@@ -112,3 +112,9 @@ def translucent(colour: str, opacity: float) -> str:
     """A colour such as ``#0072b2`` with an opacity."""
     red, green, blue = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
     return f"rgba({red},{green},{blue},{opacity})"
+
+
+def log_axis(made: Any, **axis: Any) -> None:
+    """Make the vertical axis logarithmic, with a tick for each power of ten unless told otherwise."""
+    # plotly writes powers a quarter larger than other ticks.
+    made.update_yaxes(**{"type": "log", "dtick": 1, "tickfont_size": 10, **axis})

@@ -8,15 +8,10 @@ from typing import Any, cast
 
 import numpy as np
 
+import unconstrain as uc
+
 from ...base.arrays import Array
 from ...base.errors import SettingError
-from ...constraints import Constraint, JacobianRows, PolicyAligned, SwitchingLine
-from ...evaluation import ncpe, ninconsistency, nupe
-from ...learners import Direct, Hybrid, Inconsistency, Robust
-from ...models import Model, NormalisedRBF
-from ...motion import rollout
-from ...policies import LocallyLinearPolicy, ParametricPolicy, Policy
-from ...recordings import Demonstration, stack
 from ...risks import (
     Moments,
     Quadratic,
@@ -28,7 +23,6 @@ from ...risks import (
     unvec,
     vec,
 )
-from ...training import Folds
 from ..systems.arm import LWR3, JointLimitAvoidance
 from ..systems.limit_cycle import LimitCycle
 from ..systems.pendulum import Pendulum
@@ -130,12 +124,12 @@ def trial(
     found = []
     for noise in settings.noise:
         noisy = with_noise(training, noise, rng)
-        policy = _policy(system).set_params(learner=Robust()).fit_demonstrations(noisy)
+        policy = _policy(system).set_params(learner=uc.Robust()).fit_demonstrations(noisy)
         learnt = {
-            "direct": policy.with_learner(Direct()),
-            "inconsistency": policy.with_learner(Inconsistency()),
-            PAPER: policy.with_learner(Hybrid(settings.alpha)),
-            "hybrid, auto": policy.with_learner(Hybrid(alpha="auto")),
+            "direct": policy.with_learner(uc.Direct()),
+            "inconsistency": policy.with_learner(uc.Inconsistency()),
+            PAPER: policy.with_learner(uc.Hybrid(settings.alpha)),
+            "hybrid, auto": policy.with_learner(uc.Hybrid(alpha="auto")),
         }
         of_noise: dict[str, tuple[float, ...]] = {method: _errors(one, test) for method, one in learnt.items()}
         chosen, judged = policy.solution_, learnt["direct"]
@@ -151,21 +145,23 @@ def trial(
 
 def demonstrate(
     system: str, constraint: str, rng: np.random.Generator
-) -> tuple[list[Demonstration], list[Demonstration]]:
+) -> tuple[list[uc.Demonstration], list[uc.Demonstration]]:
     """Demonstrations to learn from and to be tested on, without noise."""
     if system == "arm":
         return _by_arm(constraint, 100, rng), _by_arm(constraint, 50, rng)
     settings, flow = toy.ToySettings(), _SYSTEMS[system]
     starts = rng.uniform(-settings.start, settings.start, (settings.demonstrations, 2))
     draws = [_planar(constraint, flow, index, settings, rng) for index in range(len(starts))]
-    demos: list[Demonstration] = []
+    demos: list[uc.Demonstration] = []
     for start, drawn in zip(starts, draws, strict=True):
         constraints = None if drawn is None else [drawn]
-        demos += rollout(flow, start[None], settings.steps, settings.dt, constraints, name=system)
+        demos += uc.rollout(flow, start[None], settings.steps, settings.dt, constraints, name=system)
     return toy.split(demos, settings.test_share, rng)
 
 
-def with_noise(demonstrations: Sequence[Demonstration], share: float, rng: np.random.Generator) -> list[Demonstration]:
+def with_noise(
+    demonstrations: Sequence[uc.Demonstration], share: float, rng: np.random.Generator
+) -> list[uc.Demonstration]:
     """The same with normal noise on the actions, as a share of the policy's rms spread per coordinate."""
     policies = np.concatenate([demo.truth.policy for demo in demonstrations if demo.truth is not None])
     size = share * float(np.sqrt(((policies - policies.mean(axis=0)) ** 2).mean()))
@@ -252,11 +248,13 @@ def _summary(rows: Sequence[dict[str, Any]], settings: Settings) -> list[dict[st
     return said
 
 
-def _errors(policy: Policy, test: Sequence[Demonstration]) -> tuple[float, float, float]:
-    return nupe(policy, test), ncpe(policy, test), ninconsistency(policy, test)
+def _errors(policy: uc.Policy, test: Sequence[uc.Demonstration]) -> tuple[float, float, float]:
+    return uc.nupe(policy, test), uc.ncpe(policy, test), uc.ninconsistency(policy, test)
 
 
-def _knowledge(policy: Policy, training: Sequence[Demonstration], test: Sequence[Demonstration]) -> tuple[float, float]:
+def _knowledge(
+    policy: uc.Policy, training: Sequence[uc.Demonstration], test: Sequence[uc.Demonstration]
+) -> tuple[float, float]:
     """How well free samples are told from constrained ones, and how often intervals hold the truth; NaN if unknown."""
     free = np.concatenate([_is_free(demo) for demo in training])
     states = np.concatenate([demo.states for demo in test])
@@ -274,13 +272,13 @@ def area_under_curve(scores: Array, labels: Array) -> float:
     return float(roc_auc_score(labels, scores)) if len(np.unique(labels)) == 2 else float("nan")
 
 
-def _is_free(demo: Demonstration) -> Array:
+def _is_free(demo: uc.Demonstration) -> Array:
     assert demo.truth is not None
     d = demo.actions.shape[1]
     return np.abs(demo.truth.projections - np.eye(d)).max(axis=(1, 2)) < 1e-9
 
 
-def _oracle(policy: Policy, test: Sequence[Demonstration], count: int) -> tuple[float, float, float]:
+def _oracle(policy: uc.Policy, test: Sequence[uc.Demonstration], count: int) -> tuple[float, float, float]:
     """The best point of the paper's path, one threshold for all models, chosen by the truth."""
     whole = policy.training_.folds.whole
     path = lexicographic_path(inconsistency(whole), standard_risk(whole))
@@ -288,11 +286,11 @@ def _oracle(policy: Policy, test: Sequence[Demonstration], count: int) -> tuple[
 
 
 def _knowing(
-    policy: Policy, training: Sequence[Demonstration], test: Sequence[Demonstration]
+    policy: uc.Policy, training: Sequence[uc.Demonstration], test: Sequence[uc.Demonstration]
 ) -> tuple[float, float, float]:
     """The constrained error minimised with the true projections, beside as much of the risk as the truth says."""
     N = np.concatenate([demo.truth.projections for demo in training if demo.truth is not None])
-    states, actions, _ = stack(training)
+    states, actions, _ = uc.stack(training)
     model, d = policy.training_.model, actions.shape[1]
     features, members = model.design(states), model.fields.weights(states)
 
@@ -317,15 +315,18 @@ def _knowing(
     return _best(policy, test, [minima[..., k] for k in range(len(_SOFTNESSES))])
 
 
-def _centred(model: Model, moments: Moments) -> Moments:
+def _centred(model: uc.Model, moments: Moments) -> Moments:
     centring = model.centring
     return moments if centring is None else moments.in_features(centring)
 
 
-def _best(policy: Policy, test: Sequence[Demonstration], found: Sequence[Array]) -> tuple[float, float, float]:
+def _best(policy: uc.Policy, test: Sequence[uc.Demonstration], found: Sequence[Array]) -> tuple[float, float, float]:
     """Errors of the weights (M, P), over ``T_m φ``, that are nearest to the truth."""
-    states, truth = stack(test).states, np.concatenate([demo.truth.policy for demo in test if demo.truth is not None])
-    judged = policy.with_learner(Direct())
+    states, truth = (
+        uc.stack(test).states,
+        np.concatenate([demo.truth.policy for demo in test if demo.truth is not None]),
+    )
+    judged = policy.with_learner(uc.Direct())
     plain = best = judged.solution_
     least = np.inf
     for each in found:
@@ -337,34 +338,35 @@ def _best(policy: Policy, test: Sequence[Demonstration], found: Sequence[Array])
     return _errors(judged, test)
 
 
-def _policy(system: str) -> Policy:
+def _policy(system: str) -> uc.Policy:
     if system == "arm":
-        return LocallyLinearPolicy(3.0, 0.7, validation=Folds())
+        return uc.LocallyLinearPolicy(3.0, 0.7, validation=uc.Folds())
     settings = toy.ToySettings()
-    grid = NormalisedRBF.grid(-settings.reach, settings.reach, settings.per_axis, width=settings.width)
-    return ParametricPolicy(grid, validation=Folds(by="demonstration"))
+    grid = uc.NormalisedRBF.grid(-settings.reach, settings.reach, settings.per_axis, width=settings.width)
+    return uc.ParametricPolicy(grid, validation=uc.Folds(by="demonstration"))
 
 
 def _planar(
     kind: str, flow: Callable[[Array], Array], index: int, settings: toy.ToySettings, rng: np.random.Generator
-) -> Constraint | None:
+) -> uc.constraints.Constraint | None:
     duration = settings.steps * settings.dt
     free = {"none": True, "half": index % 2 == 0, "quarter free": index % 4 == 0}
     if free.get(kind, False):
         return None
     if kind == "random" or kind in free:
-        return SwitchingLine.random(rng, duration, settings.switches)
-    return PolicyAligned.random(rng, flow, float(kind), settings.steps, settings.dt)
+        return uc.constraints.SwitchingLine.random(rng, duration, settings.switches)
+    return uc.constraints.PolicyAligned.random(rng, flow, float(kind), settings.steps, settings.dt)
 
 
-def _by_arm(kind: str, count: int, rng: np.random.Generator) -> list[Demonstration]:
+def _by_arm(kind: str, count: int, rng: np.random.Generator) -> list[uc.Demonstration]:
     starts = rng.uniform(-0.5, 0.5, (count, LWR3.joints)) * LWR3.upper
     free = {"none": count, "half": count // 2}.get(kind, 0)
-    demos: list[Demonstration] = []
+    demos: list[uc.Demonstration] = []
     for part, held in ((starts[:free], 0), (starts[free:], _HELD.get(kind, 0))):
-        constraint = JacobianRows(LWR3.jacobian, tuple(range(held))) if held else None
+        constraint = uc.constraints.JacobianRows(LWR3.jacobian, tuple(range(held))) if held else None
         if len(part):
             demos += cast(
-                "list[Demonstration]", rollout(JointLimitAvoidance(0.05, 1.8), part, 100, 0.5, constraint, name="arm")
+                "list[uc.Demonstration]",
+                uc.rollout(JointLimitAvoidance(0.05, 1.8), part, 100, 0.5, constraint, name="arm"),
             )
     return demos

@@ -7,12 +7,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from ...constraints import JacobianRows
-from ...learners import Direct, Hybrid, Inconsistency, Learner
-from ...motion import rollout
-from ...policies import LocallyLinearPolicy
-from ...recordings import Demonstration, stack
-from ...training import Folds
+import unconstrain as uc
+
 from ..systems.arm import LWR3, JointLimitAvoidance
 from .journal import Journal
 from .trials import Progress, Result, errors, row, run_trials
@@ -144,19 +140,21 @@ def headlines(result: Result) -> list[str]:
     return said
 
 
-def learners(settings: Settings) -> dict[str, Learner]:
+def learners(settings: Settings) -> dict[str, uc.Learner]:
     """The three methods."""
-    hybrid = Hybrid(settings.alpha, softness=settings.softness)
-    return {"direct": Direct(), "inconsistency": Inconsistency(), "hybrid": hybrid}
+    hybrid = uc.Hybrid(settings.alpha, softness=settings.softness)
+    return {"direct": uc.Direct(), "inconsistency": uc.Inconsistency(), "hybrid": hybrid}
 
 
-def demonstrate(settings: Settings, held: int, count: int, rng: np.random.Generator) -> list[Demonstration]:
+def demonstrate(settings: Settings, held: int, count: int, rng: np.random.Generator) -> list[uc.Demonstration]:
     """Record the arm while the first ``held`` coordinates of its hand are kept still."""
     starts = rng.uniform(-0.5, 0.5, (count, LWR3.joints)) * LWR3.upper
-    constraint = JacobianRows(LWR3.jacobian, tuple(range(held)))
+    constraint = uc.constraints.JacobianRows(LWR3.jacobian, tuple(range(held)))
     policy = JointLimitAvoidance(settings.gain, settings.power)
     name = f"arm {CONSTRAINTS[held - 1]}"
-    return cast("list[Demonstration]", rollout(policy, starts, settings.steps, settings.dt, constraint, name=name))
+    return cast(
+        "list[uc.Demonstration]", uc.rollout(policy, starts, settings.steps, settings.dt, constraint, name=name)
+    )
 
 
 def trial(settings: Settings, held: int, seed: np.random.SeedSequence) -> dict[str, tuple[float, ...]]:
@@ -164,11 +162,13 @@ def trial(settings: Settings, held: int, seed: np.random.SeedSequence) -> dict[s
     rng = np.random.default_rng([held, *seed.generate_state(4)])
     training = demonstrate(settings, held, settings.demonstrations, rng)
     test = demonstrate(settings, held, settings.test_demonstrations, rng)
-    states, actions, groups = stack(training)
+    states, actions, groups = uc.stack(training)
     found: dict[str, tuple[float, ...]] = {}
     for power, methods in METHODS.items():
         weights = np.linalg.norm(actions, axis=1) ** (power * settings.speed_power)
-        policy = LocallyLinearPolicy(settings.variance, settings.at_least, None, Direct(), Folds(settings.folds))
+        policy = uc.LocallyLinearPolicy(
+            settings.variance, settings.at_least, None, uc.Direct(), uc.Folds(settings.folds)
+        )
         policy.fit(states, actions, weights, groups)
         known = learners(settings)
         found |= {methods[name]: values for name, values in errors(policy, known, test).items()}

@@ -7,16 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...constraints import Constraint, PolicyAligned, SwitchingLine
-from ...learners import Direct, Hybrid, Inconsistency, Learner
-from ...models import NormalisedRBF
-from ...motion import rollout
-from ...policies import ParametricPolicy
-from ...recordings import Demonstration
-from ...training import Folds
+import unconstrain as uc
+
 from ..systems.limit_cycle import LimitCycle
 
-Draw = Callable[["ToySettings", np.random.Generator], Constraint | None]
+Draw = Callable[["ToySettings", np.random.Generator], uc.constraints.Constraint | None]
 
 
 @dataclass(frozen=True)
@@ -72,31 +67,31 @@ def free(settings: ToySettings, rng: np.random.Generator) -> None:
     """No constraint."""
 
 
-def random_lines(settings: ToySettings, rng: np.random.Generator) -> SwitchingLine:
+def random_lines(settings: ToySettings, rng: np.random.Generator) -> uc.constraints.SwitchingLine:
     """Eq. 19."""
-    return SwitchingLine.random(rng, settings.steps * settings.dt, settings.switches)
+    return uc.constraints.SwitchingLine.random(rng, settings.steps * settings.dt, settings.switches)
 
 
 def policy_aligned(widest: float) -> Draw:
     """Eq. 20 with θ uniform in [−widest, widest]."""
 
-    def draw(settings: ToySettings, rng: np.random.Generator) -> PolicyAligned:
-        return PolicyAligned.random(rng, settings.system, widest, settings.steps, settings.dt)
+    def draw(settings: ToySettings, rng: np.random.Generator) -> uc.constraints.PolicyAligned:
+        return uc.constraints.PolicyAligned.random(rng, settings.system, widest, settings.steps, settings.dt)
 
     return draw
 
 
-def demonstrate(settings: ToySettings, rng: np.random.Generator, draw: Draw) -> list[Demonstration]:
+def demonstrate(settings: ToySettings, rng: np.random.Generator, draw: Draw) -> list[uc.Demonstration]:
     """Record demonstrations, each under a constraint of its own."""
     starts = rng.uniform(-settings.start, settings.start, (settings.demonstrations, 2))
     drawn = [draw(settings, rng) for _ in starts]
     constraints = [one for one in drawn if one is not None] or None
-    return rollout(settings.system, starts, settings.steps, settings.dt, constraints, name="toy")
+    return uc.rollout(settings.system, starts, settings.steps, settings.dt, constraints, name="toy")
 
 
 def split(
-    demonstrations: Sequence[Demonstration], share: float, rng: np.random.Generator
-) -> tuple[list[Demonstration], list[Demonstration]]:
+    demonstrations: Sequence[uc.Demonstration], share: float, rng: np.random.Generator
+) -> tuple[list[uc.Demonstration], list[uc.Demonstration]]:
     """Hold a share of all samples out; returns those to learn from and those to test on."""
     kept, tested = [], []
     for demo in demonstrations:
@@ -106,16 +101,16 @@ def split(
     return kept, tested
 
 
-def policy(settings: ToySettings) -> ParametricPolicy:
+def policy(settings: ToySettings) -> uc.ParametricPolicy:
     """36 normalised RBFs on a grid."""
-    grid = NormalisedRBF.grid(-settings.reach, settings.reach, settings.per_axis, width=settings.width)
-    return ParametricPolicy(grid, Direct(), Folds(settings.folds, by="demonstration"))
+    grid = uc.NormalisedRBF.grid(-settings.reach, settings.reach, settings.per_axis, width=settings.width)
+    return uc.ParametricPolicy(grid, uc.Direct(), uc.Folds(settings.folds, by="demonstration"))
 
 
-def learners(settings: ToySettings) -> dict[str, Learner]:
+def learners(settings: ToySettings) -> dict[str, uc.Learner]:
     """The three methods."""
     return {
-        "direct": Direct(),
-        "inconsistency": Inconsistency(),
-        "hybrid": Hybrid(settings.alpha),
+        "direct": uc.Direct(),
+        "inconsistency": uc.Inconsistency(),
+        "hybrid": uc.Hybrid(settings.alpha),
     }

@@ -10,10 +10,8 @@ import numpy as np
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
-from ...evaluation import ncpe, ninconsistency, nupe
-from ...learners import Learner
-from ...policies import Policy
-from ...recordings import Demonstration
+import unconstrain as uc
+
 from .journal import DataClass, Journal
 
 METRICS = ("nupe", "ncpe", "ninc")
@@ -96,13 +94,13 @@ def run_trials(
 
 
 def errors(
-    policy: Policy, learners: Mapping[str, Learner], demonstrations: Sequence[Demonstration]
+    policy: uc.Policy, learners: Mapping[str, uc.Learner], demonstrations: Sequence[uc.Demonstration]
 ) -> dict[str, tuple[float, ...]]:
     """The three normalised errors of each learner, from one set of moments."""
     found = {}
     for name, learner in learners.items():
         learnt = policy.with_learner(learner)
-        found[name] = tuple(metric(learnt, demonstrations) for metric in (nupe, ncpe, ninconsistency))
+        found[name] = tuple(metric(learnt, demonstrations) for metric in (uc.nupe, uc.ncpe, uc.ninconsistency))
     return found
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...pages import figures, html
 from ..experiments.trials import METRICS, Result
+from . import parts
 from .table1 import TITLES
 
 WORDS = {"none": "Unconstrained demonstrations", "random": "Randomly constrained demonstrations"}
@@ -72,7 +73,7 @@ def _table(result: Result) -> html.Markup:
     words = {"none": "free", "random": "constrained"}
     rows = [
         [
-            html.label(row["method"]),
+            parts.label(row["method"]),
             words.get(row["constraint"], row["constraint"]),
             *(html.number(100 * row[f"{metric}_mean"]) for metric in METRICS),
         ]

@@ -8,7 +8,8 @@ from ...base.arrays import Array
 from ...pages import figures, html
 from ..experiments import figure5
 from ..experiments.trials import LABELS, Result
-from . import table1
+from ..figures import charts
+from . import parts, table1
 
 TITLES = {metric: LABELS[metric] for metric in ("nupe", "ncpe")}
 ANGLE = "how far constraints vary, θ<sub>max</sub> (rad)"
@@ -42,8 +43,8 @@ def _errors(widest: Array, curves: dict[str, table1.Curves]) -> html.Markup:
         ours = curves[metric]
         # The inconsistency's nUPE at 0 would flatten everything else.
         top = 1.1 * max(float((mean + sd).max()) for key, (mean, sd) in ours.items() if key != "inconsistency")
-        panels.append(figures.bands(widest, ours, title=f"{title}, linear", labels=(ANGLE, title), top=top))
-        panels.append(figures.bands(widest, ours, title=f"{title}, logarithmic", labels=(ANGLE, title), log=True))
+        panels.append(charts.bands(widest, ours, title=f"{title}, linear", labels=(ANGLE, title), top=top))
+        panels.append(charts.bands(widest, ours, title=f"{title}, logarithmic", labels=(ANGLE, title), log=True))
     return html.picture(
         "errors",
         panels,
@@ -56,7 +57,7 @@ def _errors(widest: Array, curves: dict[str, table1.Curves]) -> html.Markup:
 
 def _ratio(widest: Array, result: Result) -> html.Markup:
     found = {title: figure5.ratios(result, metric) for metric, title in TITLES.items()}
-    made = figures.ratios(
+    made = charts.ratios(
         widest,
         {title: np.array([by_angle[angle] for angle in widest]) for title, by_angle in found.items()},
         labels=(ANGLE, "hybrid / better of the two"),
@@ -68,7 +69,7 @@ def _ratio(widest: Array, result: Result) -> html.Markup:
         "Ratios of the means over the data sets. Far to the left the nCPE of inconsistency alone is minute because it "
         "fits what was seen and nothing else; its policy is useless there, as its nUPE tells.",
         keys=tuple(TITLES.values()),
-        colours=figures.RATIO_COLOURS,
+        colours=charts.RATIO_COLOURS,
     )
 
 
@@ -79,7 +80,7 @@ def _table(widest: Array, curves: dict[str, table1.Curves], result: Result) -> h
         [
             html.number(angle),
             *(
-                html.mean_sd(curves[metric][method][0][index], curves[metric][method][1][index])
+                parts.mean_sd(curves[metric][method][0][index], curves[metric][method][1][index])
                 for metric in TITLES
                 for method in figures.METHODS
             ),

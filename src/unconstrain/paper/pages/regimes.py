@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ...pages import figures, html
+from ...pages import html
 from ..experiments.regimes import DEFAULT, KNOWN, ORACLE, PAPER
 from ..experiments.trials import Result
+from ..figures import charts
+from . import parts
 
 TOP = 10.0
 
@@ -78,7 +80,7 @@ def _cells(result: Result, noise: float, index: int) -> html.Markup:
     regimes = list(dict.fromkeys((row["system"], row["constraint"]) for row in mine))
     found = {(row["method"], row["system"], row["constraint"]): row["to_oracle"] for row in mine}
     values = np.array([[found[method, *regime] for regime in regimes] for method in methods], dtype=np.float64)
-    picture = figures.ratio_table(
+    picture = charts.ratio_table(
         methods,
         [f"{system}, {constraint}" for system, constraint in regimes],
         values,
@@ -141,11 +143,11 @@ def _rows(result: Result) -> html.Markup:
                 row["constraint"],
                 f"{row['noise']:.0%}",
                 row["method"],
-                html.mean_sd(row["nupe_mean"], row["nupe_sd"]),
+                parts.mean_sd(row["nupe_mean"], row["nupe_sd"]),
                 html.number(100.0 * row["nupe_geometric"]),
                 html.number(row["to_oracle"]),
-                html.mean_sd(row["ncpe_mean"], row["ncpe_sd"]),
-                html.mean_sd(row["ninc_mean"], row["ninc_sd"]),
+                parts.mean_sd(row["ncpe_mean"], row["ncpe_sd"]),
+                parts.mean_sd(row["ninc_mean"], row["ninc_sd"]),
                 html.number(row["auc_mean"]),
                 html.number(row["coverage_mean"]),
             ]

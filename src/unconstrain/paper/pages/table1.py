@@ -9,6 +9,8 @@ import numpy as np
 from ...base.arrays import Array
 from ...pages import figures, html
 from ..experiments.trials import METRICS, Result
+from ..figures import charts
+from . import parts
 
 WORDS = {"none": "free", "random": "constrained"}
 TITLES = {"nupe": "nUPE", "ncpe": "nCPE", "ninc": "inconsistency"}
@@ -43,9 +45,9 @@ def table(result: Result, trials_of_paper: int) -> html.Markup:
     for index, row in enumerate(result.rows):
         if index and row["method"] != result.rows[index - 1]["method"]:
             rules.append(index)
-        cells = [html.label(row["method"]), WORDS.get(row["constraint"], row["constraint"])]
+        cells = [parts.label(row["method"]), WORDS.get(row["constraint"], row["constraint"])]
         for metric in METRICS:
-            cells += [html.mean_sd(*_pair(row, metric)), html.mean_sd(*_pair(row, f"paper_{metric}"))]
+            cells += [parts.mean_sd(*_pair(row, metric)), parts.mean_sd(*_pair(row, f"paper_{metric}"))]
         rows.append(cells)
     trials = getattr(result.settings, "trials", 1)
     note = f"Mean ± standard deviation over {trials} data sets, all × 10⁻². The paper’s are over {trials_of_paper}."
@@ -67,7 +69,7 @@ def dots(result: Result) -> html.Markup:
         }
         title = f"{TITLES[metric]} × 10⁻²"
         groups = [WORDS.get(one, one) for one in constraints]
-        panels.append(figures.dots(groups, values, printed, title=title, label=title))
+        panels.append(charts.dots(groups, values, printed, title=title, label=title))
     return html.picture(
         "errors",
         panels,

@@ -7,6 +7,7 @@ import numpy as np
 from ...pages import figures, html
 from ..experiments import table2
 from ..experiments.trials import Result
+from ..figures import charts
 from . import table1
 
 HELD = "coordinates of the hand that are held"
@@ -36,7 +37,7 @@ def _curves(result: Result) -> html.Markup:
     panels = []
     for metric, title in (("nupe", "nUPE"), ("ncpe", "nCPE")):
         curves = table1.curves(result.rows, metric)
-        panels.append(figures.bands(held, curves, title=title, labels=(HELD, title), log=True))
+        panels.append(charts.bands(held, curves, title=title, labels=(HELD, title), log=True))
     return html.picture(
         "curves",
         panels,

@@ -6,12 +6,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+import unconstrain as uc
+
 from ...base.arrays import Array
 from ...pages import figures, html
-from ...recordings import Demonstration
 from ...risks import null_space_projection, project
 from ..experiments.trials import Result
-from ..experiments.washing import Split, Surface
+from ..experiments.washing.learning import Split
+from ..experiments.washing.surfaces import Surface
+from ..figures import plates
 from ..systems.wiping import WipingPolicy
 from .washing_arm import on_the_arm
 from .washing_scores import bars, scores
@@ -25,13 +28,13 @@ class Case(NamedTuple):
 
     split: Split
     surface: Surface
-    demonstration: Demonstration
+    demonstration: uc.Demonstration
     normal: Array
 
     @property
-    def plate(self) -> figures.Quad:
+    def plate(self) -> plates.Quad:
         """Where the demonstration was, as a piece of its plane."""
-        return figures.Quad.around(self.demonstration.states, self.normal)
+        return plates.Quad.around(self.demonstration.states, self.normal)
 
     @property
     def title(self) -> str:
@@ -94,16 +97,16 @@ def _demonstrations(splits: list[Split]) -> html.Markup:
             "Each translucent plane is the one nearest to a bout; bouts of one colour share a tilt, and each tilt "
         )
         caption += "is held out once."
-    tracks, quads = [], {}
+    tracks, corners = [], {}
     for key, surface in kinds:
         for demo, normals in zip(surface.demonstrations, surface.normals, strict=True):
             tracks.append((key, demo.name, demo.states))
-            quads[demo.name] = figures.Quad.around(demo.states, normals["plane"])
+            corners[demo.name] = plates.Quad.around(demo.states, normals["plane"]).corners
     keys = tuple(dict.fromkeys(key for key, _ in kinds))
     colours = {key: figures.COLOURS.get(key, figures.PALETTE[at % len(figures.PALETTE)]) for at, key in enumerate(keys)}
     return html.picture(
         "demonstrations",
-        [figures.movements(tracks, quads)],
+        [figures.movements(tracks, corners)],
         f"{caption} Positions are relative to the middle of each plate. Drag to turn, scroll to zoom.",
         keys=keys,
         colours=colours,
@@ -182,7 +185,7 @@ def _rollouts(splits: list[Split]) -> html.Markup:
             if len(outside):
                 left.append(f"{figures.LABELS[name]} after {_seconds(run, outside[0])} on {case.title}")
             lines[name] = path[: outside[0] + 1] if len(outside) else path
-        panels.append(figures.paths(lines, reach=reach, title=case.title, labels=_axis_labels(case), height=480))
+        panels.append(plates.paths(lines, reach=reach, title=case.title, labels=_axis_labels(case), height=480))
     longest = next(iter(splits[0].rollouts.values()))
     escaped = f" These left the picture: {'; '.join(left)}." if left else ""
     return html.picture(
@@ -195,7 +198,7 @@ def _rollouts(splits: list[Split]) -> html.Markup:
     )
 
 
-def _seconds(movement: Demonstration, at: int) -> str:
+def _seconds(movement: uc.Demonstration, at: int) -> str:
     return f"step {at}" if movement.times is None else f"{round(movement.times[at], 1):g} s"
 
 

@@ -9,10 +9,13 @@ import numpy as np
 from ...base.errors import UnconstrainError
 from ...pages import figures, html
 from ..experiments.trials import Result
-from ..experiments.washing import WITHOUT_PHYSICS, Reproduction
+from ..experiments.washing import WITHOUT_PHYSICS
+from ..experiments.washing.arm import Reproduction
+from ..figures import arms, plates
 from ..simulation import BACKENDS, Wipe
 from ..simulation.pictures import animation, film, strip
 from ..systems.arm import LWR3
+from . import parts
 
 STATEMENT = (
     "The hybrid policy gives a velocity at every position; projected onto the plate it becomes joint velocities, "
@@ -40,13 +43,13 @@ def on_the_arm(result: Result) -> list[html.Markup]:
 def _pictures(shown: Reproduction, wipe: Wipe) -> html.Markup:
     name = f"plate {shown.plate.name}, which nobody {'wiped' if shown.demonstration is None else 'learnt from'}"
     try:
-        moving = html.image(
+        moving = parts.image(
             "animation", animation(film(wipe)), "gif", f"The arm wipes a plate tilted {shown.plate.name}",
             f"The arm on {name}, as fast as it is. The line is the path of the sponge.",
         )  # fmt: skip
         if shown.demonstration is None:
             return moving
-        return moving + html.image(
+        return moving + parts.image(
             "strip", strip(shown.demonstration, wipe), "png", "A hand wipes a plate; below, the arm wipes it",
             "One turn of the demonstration on this plate (above, positions as the camera saw them), and one of the "
             "reproduction (below), like figure 6 of the paper. The demonstration was not learnt from.",
@@ -58,7 +61,7 @@ def _pictures(shown: Reproduction, wipe: Wipe) -> html.Markup:
             "{osmesa}</code> gives the real picture; <code>unconstrain doctor</code> tells what is missing."
         ).format(name, **BACKENDS)
         shows = f"The arm wipes a plate tilted {shown.plate.name}, as lines"
-        return html.image("arm", _lines(wipe), "png", shows, without)
+        return parts.image("arm", _lines(wipe), "png", shows, without)
 
 
 def _lines(wipe: Wipe) -> bytes:
@@ -67,19 +70,19 @@ def _lines(wipe: Wipe) -> bytes:
     rows = np.linspace(max(0, len(wipe.times) - length), len(wipe.times) - 1, 4).astype(int)
     _, joints = LWR3.frames(wipe.postures[rows])
     track = wipe.positions[last] + wipe.plate.centre
-    plate = figures.Quad.around(track, wipe.plate.rotation[:, 2], margin=1.5)
-    return figures.arm_on_plate(np.moveaxis(joints, -1, 0), track, plate)
+    plate = plates.Quad.around(track, wipe.plate.rotation[:, 2], margin=1.5)
+    return arms.arm_on_plate(np.moveaxis(joints, -1, 0), track, plate)
 
 
 def _tracks(wiped: list[tuple[Reproduction, Wipe]]) -> html.Markup:
     panels = []
     for one, wipe in wiped:
-        plate = figures.Quad.around(wipe.positions, wipe.plate.rotation[:, 2], margin=1.6)
+        plate = plates.Quad.around(wipe.positions, wipe.plate.rotation[:, 2], margin=1.6)
         lines = {} if one.demonstration is None else {"observed": plate.flatten(one.demonstration.states)}
         lines["hybrid"] = plate.flatten(wipe.positions)
         title = f"{one.plate.name} ({'seen' if one.seen else 'unseen'})"
         labels = ("in the plate (m)", "in the plate (m)")
-        panels.append(figures.paths(lines, reach=plate.half, title=title, labels=labels, height=400))
+        panels.append(plates.paths(lines, reach=plate.half, title=title, labels=labels, height=400))
         series = {"hybrid": np.column_stack([wipe.forces])}
         force = figures.over_time(wipe.times, series, ["force (N)"], title="normal force", row_height=310)
         panels.append(force.update_yaxes(rangemode="tozero"))

@@ -3,26 +3,9 @@
 Needs the extra ``sim``.
 """
 
-from .control import Controller, Gains
-from .engine import BACKENDS, backend, engine
+from .engine import BACKENDS, backend
 from .hand import demonstrate
 from .postures import postures_along
-from .reproduction import Wipe, centres, turning, wipe
-from .scene import Scene, arm_scene, hand_scene
+from .reproduction import Wipe, turning, wipe
 
-__all__ = [
-    "BACKENDS",
-    "Controller",
-    "Gains",
-    "Scene",
-    "Wipe",
-    "arm_scene",
-    "backend",
-    "centres",
-    "demonstrate",
-    "engine",
-    "hand_scene",
-    "postures_along",
-    "turning",
-    "wipe",
-]
+__all__ = ["BACKENDS", "Wipe", "backend", "demonstrate", "postures_along", "turning", "wipe"]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+import unconstrain as uc
+
 from ...base.arrays import Array
-from ...recordings import Demonstration, Recording
 from ..systems.wiping import Plate, Strokes, WipingPolicy, observed, slow_noise
 from .engine import engine
 from .scene import TIME_STEP, Scene, hand_scene
@@ -22,7 +23,7 @@ SETTLING_S = 0.2
 
 def demonstrate(
     plate: Plate, rng: np.random.Generator, policy: WipingPolicy | None = None, strokes: Strokes | None = None
-) -> Demonstration:
+) -> uc.Demonstration:
     """Wipe a plate in a few strokes, and be watched doing it; needs the extra ``sim``.
 
     The hand moves freely in three directions. It is pushed towards the
@@ -48,7 +49,7 @@ def demonstrate(
     return observed(plate, wipe, recordings, how)
 
 
-def _stroke(scene: Scene, wipe: WipingPolicy, how: Strokes, rng: np.random.Generator) -> Recording:
+def _stroke(scene: Scene, wipe: WipingPolicy, how: Strokes, rng: np.random.Generator) -> uc.Recording:
     """Put the sponge down somewhere and wipe: what the camera sees."""
     mujoco = engine()
     model, data, normal = scene.model, scene.data, scene.plate.rotation[:, 2]

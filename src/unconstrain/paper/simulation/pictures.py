@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
+import unconstrain as uc
+
 from ...base.arrays import Array, require_extra
 from ...base.errors import InvalidDataError, UnconstrainError
-from ...recordings import Demonstration
 from ..systems.wiping import Plate
 from .engine import backend, engine
 from .reproduction import Wipe
@@ -61,7 +62,7 @@ def animation(frames: Sequence[Array]) -> bytes:
     return stream.getvalue()
 
 
-def strip(demonstration: Demonstration, wipe: Wipe, count: int = 4, width: int = 400, height: int = 300) -> bytes:
+def strip(demonstration: uc.Demonstration, wipe: Wipe, count: int = 4, width: int = 400, height: int = 300) -> bytes:
     """A hand that demonstrates above, the arm that reproduces below: one turn of each, as a PNG (figure 6).
 
     Parameters

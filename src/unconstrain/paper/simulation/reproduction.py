@@ -9,10 +9,10 @@ from itertools import pairwise
 
 import numpy as np
 
+import unconstrain as uc
+
 from ...base.arrays import LARGEST, Array
 from ...base.errors import InvalidDataError, SettingError
-from ...motion import rollout
-from ...recordings import Demonstration
 from ..systems.arm import LWR3
 from ..systems.wiping import Plate
 from .control import Controller, Gains
@@ -72,7 +72,7 @@ class Wipe:
             from the planned path.
         """
         steps = np.diff(self.times)[:, None]
-        motion = Demonstration(self.positions[:-1], np.diff(self.positions, axis=0) / steps)
+        motion = uc.Demonstration(self.positions[:-1], np.diff(self.positions, axis=0) / steps)
         middles = centres(self.positions, self.plate)
         return {
             "contact_share": float((self.forces > 0).mean()),
@@ -126,7 +126,7 @@ def wipe(
     return Wipe(plate, times, positions, forces, postures, planned, torques, speed)
 
 
-def turning(movement: Demonstration, normal: Array) -> float:
+def turning(movement: uc.Demonstration, normal: Array) -> float:
     """Turns per second about the middle of a movement on a plane: its angular momentum over its moment of inertia."""
     lever = movement.states - movement.states.mean(axis=0)
     momentum = np.cross(lever, movement.actions) @ normal
@@ -164,7 +164,7 @@ def _plan(policy: Callable[[Array], Array], plate: Plate, start: Array, duration
     every = RECORD_EVERY * TIME_STEP
     samples = round(duration / every)
     try:
-        path = rollout(policy, start, samples, every, plate.constraint).states
+        path = uc.rollout(policy, start, samples, every, plate.constraint).states
     except InvalidDataError:
         path = np.full((samples, 3), LARGEST)
     outside = np.abs(path @ plate.rotation[:, :2]).max(axis=1) > HALF_PLATE

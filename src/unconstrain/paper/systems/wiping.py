@@ -13,10 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import unconstrain as uc
+
 from ...base.arrays import Array
-from ...constraints import Plane
-from ...motion import rollout
-from ...recordings import Demonstration, Recipe, Recording, Truth, prepare, stack
 from ...risks import null_space_projection
 
 
@@ -86,9 +85,9 @@ class Plate:
         return about_y @ about_x
 
     @property
-    def constraint(self) -> Plane:
+    def constraint(self) -> uc.constraints.Plane:
         """No motion along the normal."""
-        return Plane(self.rotation[:, 2])
+        return uc.constraints.Plane(self.rotation[:, 2])
 
 
 PLATES = tuple(Plate(*tilts) for tilts in ((0, 0), (16, 0), (-16, 0), (27, 0), (-27, 0), (0, 16), (0, -16)))
@@ -145,17 +144,17 @@ class Strokes:
         angle, radius = rng.uniform(0.0, 2.0 * np.pi), self.reach * wipe.radius * np.sqrt(rng.uniform(0.01, 1.0))
         return plate.rotation[:, :2] @ (radius * np.array([np.cos(angle), np.sin(angle)]))
 
-    def watched(self, positions: Array, name: str, rng: np.random.Generator) -> Recording:
+    def watched(self, positions: Array, name: str, rng: np.random.Generator) -> uc.Recording:
         """What the camera makes of positions (T, 3) at its frames."""
         seen = positions + self.noise * rng.standard_normal(positions.shape)
         kept = rng.uniform(size=len(seen)) >= self.dropped
         kept[[0, -1]] = True
-        return Recording(("x", "y", "z"), seen[kept], np.flatnonzero(kept) / self.rate, name)
+        return uc.Recording(("x", "y", "z"), seen[kept], np.flatnonzero(kept) / self.rate, name)
 
 
 def demonstrate(
     plate: Plate, rng: np.random.Generator, policy: WipingPolicy | None = None, strokes: Strokes | None = None
-) -> Demonstration:
+) -> uc.Demonstration:
     """Wipe a plate in a few strokes, and be watched doing it.
 
     Kinematics alone: the sponge does exactly what the hand wants, projected
@@ -178,13 +177,13 @@ def demonstrate(
     return observed(plate, wipe, [_stroke(plate, wipe, how, rng) for _ in range(how.count)], how)
 
 
-def observed(plate: Plate, wipe: WipingPolicy, recordings: Sequence[Recording], how: Strokes) -> Demonstration:
+def observed(plate: Plate, wipe: WipingPolicy, recordings: Sequence[uc.Recording], how: Strokes) -> uc.Demonstration:
     """Turn what the camera saw of a plate's strokes into one demonstration, with its truth."""
-    recipe = Recipe(states=("x", "y", "z"), differentiate="savgol", window_s=how.window_s, rate=how.rate)
-    states, actions, _ = stack(prepare(recordings, recipe))
+    recipe = uc.Recipe(states=("x", "y", "z"), differentiate="savgol", window_s=how.window_s, rate=how.rate)
+    states, actions, _ = uc.stack(uc.prepare(recordings, recipe))
     projection = null_space_projection(plate.constraint(states[:1], np.zeros(1)))
-    truth = Truth(wipe(states), np.repeat(projection, len(states), axis=0))
-    return Demonstration(states, actions, np.arange(len(states)) / how.rate, truth, plate.name)
+    truth = uc.Truth(wipe(states), np.repeat(projection, len(states), axis=0))
+    return uc.Demonstration(states, actions, np.arange(len(states)) / how.rate, truth, plate.name)
 
 
 def slow_noise(rng: np.random.Generator, steps: int, dt: float, memory: float = 0.5) -> Array:
@@ -195,7 +194,7 @@ def slow_noise(rng: np.random.Generator, steps: int, dt: float, memory: float = 
     return np.asarray(lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.standard_normal((steps, 3)), axis=0))
 
 
-def _stroke(plate: Plate, wipe: WipingPolicy, how: Strokes, rng: np.random.Generator) -> Recording:
+def _stroke(plate: Plate, wipe: WipingPolicy, how: Strokes, rng: np.random.Generator) -> uc.Recording:
     """Put the sponge down somewhere and wipe: what the camera sees."""
     substeps = 10
     dt = 1.0 / (how.rate * substeps)
@@ -205,5 +204,5 @@ def _stroke(plate: Plate, wipe: WipingPolicy, how: Strokes, rng: np.random.Gener
         return wipe(states) + next(drift)
 
     start = how.put_down(plate, wipe, rng)
-    track = rollout(hand, start, how.samples * substeps, dt, plate.constraint)
+    track = uc.rollout(hand, start, how.samples * substeps, dt, plate.constraint)
     return how.watched(track.states[::substeps], plate.name, rng)

@@ -2,21 +2,8 @@
 
 from __future__ import annotations
 
-from .movements import Gap, PreparationWarning, differentiate, find_gaps, prepare, resample, trim
-from .recipes import Recipe, complete_recipe, guess_recipe
-from .surveys import Survey, survey
+from .movements import PreparationWarning, differentiate, prepare, resample, trim
+from .recipes import Recipe, complete_recipe
+from .surveys import survey
 
-__all__ = [
-    "Gap",
-    "PreparationWarning",
-    "Recipe",
-    "Survey",
-    "complete_recipe",
-    "differentiate",
-    "find_gaps",
-    "guess_recipe",
-    "prepare",
-    "resample",
-    "survey",
-    "trim",
-]
+__all__ = ["PreparationWarning", "Recipe", "complete_recipe", "differentiate", "prepare", "resample", "survey", "trim"]

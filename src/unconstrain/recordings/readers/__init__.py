@@ -16,7 +16,7 @@ from ..demonstration import Recording
 from . import hdf5, npz, parquet, text
 from .table import Format, unique_names
 
-__all__ = ["FORMATS", "expand", "read", "read_blocks"]
+__all__ = ["expand", "read", "read_blocks", "unique_names"]
 
 FORMATS = (npz.FORMAT, parquet.FORMAT, hdf5.FORMAT, text.FORMAT)
 
@@ -69,10 +69,8 @@ def read_blocks(
         raise SettingError(f"got {group!r} for both group and time, expected two different columns.")
     file = Path(path)
     known = _format(file)
-    if whole or known.blocks is None:
-        yield from known.read(file, group=group, time=time)
-    else:
-        yield from known.blocks(file, group=group, time=time)
+    by_rows = None if whole else known.blocks
+    yield from (by_rows or known.read)(file, group=group, time=time)
 
 
 def expand(paths: PathLike | Iterable[PathLike]) -> list[Path]:

@@ -24,31 +24,13 @@ _SHORT = {"states": "x", "actions": "u"}
 _ROLES = {"groups": "group", "times": "time"}
 
 
-def read_hdf5(path: Path, *, group: str | None = None, time: str | None = None) -> list[Recording]:
-    """Read one file whole.
-
-    Parameters
-    ----------
-    path : Path
-    group, time : str, optional
-        Data sets that tell the demonstrations apart and hold the time stamps, where their names do not say so.
-
-    Returns
-    -------
-    list of Recording
-
-    Raises
-    ------
-    MissingExtraError
-        If h5py is not installed.
-    ReadError
-        If it is no such file, or holds no numbers.
-    """
-    return list(_recordings(path, group, time, None))
+def read_hdf5(path: Path, *, group: str | None = None, time: str | None = None) -> Iterator[Recording]:
+    """Read one file whole; see :class:`~.table.ReadFile`."""
+    return _recordings(path, group, time, None)
 
 
 def read_hdf5_blocks(path: Path, *, group: str | None = None, time: str | None = None) -> Iterator[Recording]:
-    """Go through one file, never holding more than :data:`~unconstrain.base.arrays.BLOCK_ROWS` rows."""
+    """Go through one file by some rows at a time."""
     return _recordings(path, group, time, BLOCK_ROWS)
 
 

@@ -17,7 +17,6 @@ from .table import Format, seconds, split_by_group
 
 Contents = dict[str, NDArray[np.generic]]
 
-_MAGIC = b"PK\x03\x04"
 _EXPECTED = "Expected a NumPy archive, as from numpy.savez(path, states=..., actions=..., times=..., groups=...)"
 
 
@@ -95,8 +94,4 @@ def _groups(path: Path, contents: Contents, key: str) -> list[str]:
         raise ReadError(f"{path}: {key} holds damaged text ({error}).") from error
 
 
-def _recognises(head: bytes) -> bool:
-    return head.startswith(_MAGIC)
-
-
-FORMAT = Format((".npz",), _recognises, read_npz)
+FORMAT = Format((".npz",), lambda head: head.startswith(b"PK\x03\x04"), read_npz)

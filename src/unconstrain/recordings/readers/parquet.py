@@ -14,35 +14,17 @@ import numpy as np
 from ...base.arrays import BLOCK_ROWS, Array, require_extra
 from ...base.errors import ReadError
 from ..demonstration import Recording
-from .table import Format, find_roles, listed, seconds, split_by_group, unique_names
+from .table import UNITS, Format, find_roles, listed, seconds, split_by_group, unique_names
 
 
 def read_parquet(path: Path, *, group: str | None = None, time: str | None = None) -> list[Recording]:
-    """Read one file whole.
-
-    Parameters
-    ----------
-    path : Path
-    group, time : str, optional
-        As :func:`~unconstrain.recordings.readers.text.read_text` takes them.
-
-    Returns
-    -------
-    list of Recording
-
-    Raises
-    ------
-    MissingExtraError
-        If pyarrow is not installed.
-    ReadError
-        If it is no such file, or holds no numbers.
-    """
+    """Read one file whole; see :class:`~.table.ReadFile`."""
     with _opened(path) as file:
         return _recordings(_checked(path, file.read), path, group, time)
 
 
 def read_parquet_blocks(path: Path, *, group: str | None = None, time: str | None = None) -> Iterator[Recording]:
-    """Go through one file, never holding more than a block of :data:`~unconstrain.base.arrays.BLOCK_ROWS` rows."""
+    """Go through one file by some rows at a time."""
     with _opened(path) as file:
         batches = file.iter_batches(batch_size=BLOCK_ROWS, use_threads=False)
         while (batch := _checked(path, lambda: next(batches, None))) is not None:
@@ -105,7 +87,7 @@ def _times(column: Any, title: str, path: Path) -> Array:
     from pyarrow import int64, types
 
     if types.is_timestamp(column.type) or types.is_duration(column.type):
-        unit = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[column.type.unit]
+        unit = UNITS[column.type.unit]
         stamps = _float64(column.cast(int64()))
         return (stamps - stamps[np.isfinite(stamps)][:1].sum()) * unit
     if not _is_number(column.type):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -29,28 +29,36 @@ _UNIT_IN_NAME = re.compile(r"[_ \[(](s|ms|us|ns)[\])]?$", re.IGNORECASE)
 class ReadFile(Protocol):
     """What a format must be able to do."""
 
-    def __call__(self, path: Path, *, group: str | None = None, time: str | None = None) -> list[Recording]:
-        """Read one file into its recordings."""
+    def __call__(self, path: Path, *, group: str | None = None, time: str | None = None) -> Iterable[Recording]:
+        """Read one file into its recordings; of blocks, those that are called the same are one recording.
 
+        Parameters
+        ----------
+        path : Path
+        group, time : str, optional
+            Columns that tell the demonstrations apart and hold the time stamps, where their names do not say so.
 
-class ReadBlocks(Protocol):
-    """What a format can do whose files may be larger than memory."""
-
-    def __call__(self, path: Path, *, group: str | None = None, time: str | None = None) -> Iterator[Recording]:
-        """Go through a file by some rows at a time; what is called the same is one recording."""
+        Raises
+        ------
+        MissingExtraError
+            If the library that reads this format is not installed.
+        ReadError
+            If it is no such file, or holds no numbers; the message names the file.
+        """
 
 
 class Format(NamedTuple):
     """A file format: how to know it, and how to read it.
 
-    ``suffixes`` in small letters with the dot; ``recognises`` looks at the
-    first bytes of a file whose suffix says nothing; ``blocks`` is optional.
+    ``suffixes`` in small letters with the dot; ``recognises`` looks at the first bytes of a file whose suffix says
+    nothing; ``read`` reads it whole, ``blocks``, if given, by no more than :data:`~unconstrain.base.arrays.BLOCK_ROWS`
+    rows at a time.
     """
 
     suffixes: tuple[str, ...]
     recognises: Callable[[bytes], bool]
     read: ReadFile
-    blocks: ReadBlocks | None = None
+    blocks: ReadFile | None = None
 
 
 def find_roles(names: Sequence[str], group: str | None, time: str | None, path: Path) -> tuple[int | None, int | None]:

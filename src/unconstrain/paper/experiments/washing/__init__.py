@@ -17,11 +17,7 @@ from ....base.errors import SettingError
 from ...systems.wiping import Plate
 from ..trials import Progress, Result, run_trials
 from . import arm, learning, surfaces
-from .arm import Reproduction
-from .learning import Split
-from .surfaces import Surface, has_physics
-
-__all__ = ["WITHOUT_PHYSICS", "Reproduction", "Settings", "Split", "Surface", "headlines", "run"]
+from .surfaces import has_physics
 
 
 @dataclass(frozen=True)

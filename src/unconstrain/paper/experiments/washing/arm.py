@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+import unconstrain as uc
+
 from ....base.arrays import Array
 from ....base.errors import SettingError
-from ....motion import Contained
-from ....policies import Policy
-from ....recordings import Demonstration
 from ... import simulation
 from ...simulation import Wipe, turning
 from ...systems.wiping import HELD_OUT, PLATES, Plate, WipingPolicy
@@ -59,7 +58,7 @@ class Reproduction:
     seen: bool
     wipe: Wipe | None
     failed: str
-    demonstration: Demonstration | None
+    demonstration: uc.Demonstration | None
     frequency: float
     spread: float
 
@@ -118,7 +117,7 @@ def jobs(settings: Settings, wiped: Sequence[Plate], splits: Sequence[Split]) ->
 def reproduce(
     settings: Settings,
     trial: int,
-    policy: Policy,
+    policy: uc.Policy,
     training: Sequence[Surface],
     plate: Plate,
     shown: Sequence[Surface],
@@ -133,7 +132,7 @@ def reproduce(
     frequency = float(np.mean([abs(turning(demo, normal)) for demo, normal in pairs]))
     spread = float(np.mean([np.sqrt(demo.states.var(axis=0).sum()) for demo, _ in pairs]))
     wipe, failed = None, ""
-    kept = Contained(_in_the_loop(policy), _states(training), settings.reach)
+    kept = uc.Contained(_in_the_loop(policy), _states(training), settings.reach)
     try:
         wipe = simulation.wipe(kept, plate, pairs[0][0].states[-1], settings.cycles / frequency)
     except SettingError as error:
@@ -142,7 +141,7 @@ def reproduce(
     return Reproduction(trial, plate, seen, wipe, failed, demonstration, frequency, spread)
 
 
-def _in_the_loop(policy: Policy) -> Callable[[Array], Array]:
+def _in_the_loop(policy: uc.Policy) -> Callable[[Array], Array]:
     """The policy as a control loop calls it, one state at a time: ``predict`` spends most of its time on checks."""
     return lambda states: np.stack([policy.step(state) for state in states])
 

@@ -8,15 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+import unconstrain as uc
+
 from ....base.arrays import Array
 from ....base.errors import InvalidDataError
-from ....constraints import Plane
-from ....evaluation import cpe, ncpe, nupe
-from ....learners import Direct, Hybrid, Inconsistency, Learner, Robust
-from ....motion import rollout
-from ....policies import LocallyLinearPolicy, Policy
-from ....recordings import Demonstration
-from ....training import Folds
 from .surfaces import Surface, simulated_split
 
 if TYPE_CHECKING:
@@ -38,8 +33,8 @@ class Split:
 
     training: tuple[Surface, ...]
     held_out: tuple[Surface, ...]
-    policies: dict[str, Policy]
-    rollouts: dict[str, Demonstration]
+    policies: dict[str, uc.Policy]
+    rollouts: dict[str, uc.Demonstration]
 
     @property
     def surfaces(self) -> tuple[Surface, ...]:
@@ -47,12 +42,12 @@ class Split:
         return (*self.training, *self.held_out)
 
 
-def learners(settings: Settings) -> dict[str, Learner]:
+def learners(settings: Settings) -> dict[str, uc.Learner]:
     """The three methods."""
     return {
-        "direct": Direct(),
-        "inconsistency": Inconsistency(),
-        "hybrid": Hybrid(threshold=settings.threshold, softness=settings.softness),
+        "direct": uc.Direct(),
+        "inconsistency": uc.Inconsistency(),
+        "hybrid": uc.Hybrid(threshold=settings.threshold, softness=settings.softness),
     }
 
 
@@ -66,14 +61,15 @@ def learn(settings: Settings, training: Sequence[Surface], held_out: Sequence[Su
     policies = fitted(settings, training)
     first, normal = held_out[0].demonstrations[0], held_out[0].normals[0]["plane"]
     rollouts = {
-        name: _followed(policies[name], first.states[0], Plane(normal), settings, name) for name in learners(settings)
+        name: _followed(policies[name], first.states[0], uc.constraints.Plane(normal), settings, name)
+        for name in learners(settings)
     }
     return Split(tuple(training), tuple(held_out), policies, rollouts)
 
 
-def fitted(settings: Settings, training: Sequence[Surface]) -> dict[str, Policy]:
+def fitted(settings: Settings, training: Sequence[Surface]) -> dict[str, uc.Policy]:
     """Method to policy, all from the same samples; "robust" is what is learnt with nothing set for this job."""
-    base = LocallyLinearPolicy(settings.variance, settings.at_least, learner=Robust(), validation=Folds())
+    base = uc.LocallyLinearPolicy(settings.variance, settings.at_least, learner=uc.Robust(), validation=uc.Folds())
     base.fit_demonstrations([demo for surface in training for demo in surface.demonstrations])
     return {name: base.with_learner(learner) for name, learner in learners(settings).items()} | {"robust": base}
 
@@ -84,7 +80,7 @@ def simulated_rows(splits: Sequence[Split]) -> list[dict[str, Any]]:
     for method in splits[0].policies:
         for at, surface in enumerate(splits[0].surfaces):
             row: dict[str, Any] = {"method": method, "surface": surface.name, "seen": surface in splits[0].training}
-            for name, metric in (("ncpe", ncpe), ("nupe", nupe)):
+            for name, metric in (("ncpe", uc.ncpe), ("nupe", uc.nupe)):
                 values = [metric(split.policies[method], split.surfaces[at].demonstrations) for split in splits]
                 row[name] = float(np.mean(values))
                 row[f"{name}_sd"] = float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
@@ -110,20 +106,22 @@ def recorded_rows(splits: Sequence[Split]) -> list[dict[str, Any]]:
     ]
 
 
-def _followed(policy: Policy, start: Array, plane: Plane, settings: Settings, name: str) -> Demonstration:
+def _followed(
+    policy: uc.Policy, start: Array, plane: uc.constraints.Plane, settings: Settings, name: str
+) -> uc.Demonstration:
     """Follow a policy in steps much shorter than the camera's: a circle in long straight steps runs outwards."""
     fine, steps = settings.substeps, settings.steps
     while True:
         try:
-            path = rollout(policy, start, fine * steps, 1 / (fine * settings.rate), plane, name=name)
+            path = uc.rollout(policy, start, fine * steps, 1 / (fine * settings.rate), plane, name=name)
         except InvalidDataError:  # it runs away; show how it begins to
             steps = max(1, steps // 2)
         else:
             return path[::fine]
 
 
-def _ncpe_of_bouts(policy: Policy, surface: Surface, kind: str) -> float:
+def _ncpe_of_bouts(policy: uc.Policy, surface: Surface, kind: str) -> float:
     """NCPE of a surface whose bouts have each a normal of their own: all errors over all motion."""
     pairs = list(zip(surface.demonstrations, surface.normals, strict=True))
-    missed = sum(cpe(policy, demo, Plane(normals[kind])) for demo, normals in pairs)
+    missed = sum(uc.cpe(policy, demo, uc.constraints.Plane(normals[kind])) for demo, normals in pairs)
     return missed / sum(float(((demo.actions - demo.actions.mean(axis=0)) ** 2).sum()) for demo, _ in pairs)

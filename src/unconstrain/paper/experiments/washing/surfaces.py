@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+import unconstrain as uc
+
 from ....base.arrays import Array
-from ....recordings import Demonstration
 from ... import simulation
 from ...datasets import load_rim_wiping
 from ...systems import wiping
@@ -32,7 +33,7 @@ class Surface:
     """
 
     name: str
-    demonstrations: tuple[Demonstration, ...]
+    demonstrations: tuple[uc.Demonstration, ...]
     normals: tuple[dict[str, Array], ...]
 
 
@@ -70,5 +71,5 @@ def recorded_splits(settings: Settings) -> list[tuple[list[Surface], list[Surfac
     return [([s for s in surfaces if s is not out], [out]) for out in surfaces]
 
 
-def _surface(plate: Plate, demonstration: Demonstration) -> Surface:
+def _surface(plate: Plate, demonstration: uc.Demonstration) -> Surface:
     return Surface(plate.name, (demonstration,), ({"plane": plate.rotation[:, 2]},))

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+import unconstrain as uc
+
 from ...base.arrays import Array, require_extra
-from ...recordings import Demonstration
+from ...pages.figures.style import COLOURS, INK
 from ...risks import unit_actions
-from .style import COLOURS, INK
 
 WORST = 60.0
 """Angular errors are coloured up to here, degrees."""
@@ -24,7 +25,7 @@ _Policy = Callable[[Array], Array]
 
 def overview(
     path: str | os.PathLike[str],
-    demonstrations: Sequence[Demonstration],
+    demonstrations: Sequence[uc.Demonstration],
     truth: _Policy,
     learnt: Mapping[str, _Policy],
     *,
@@ -80,7 +81,7 @@ def _colour_bar(drawing: Any, coloured: Any) -> None:
     bar.outline.set_visible(False)
 
 
-def _recorded(panel: Any, demonstrations: Sequence[Demonstration]) -> None:
+def _recorded(panel: Any, demonstrations: Sequence[uc.Demonstration]) -> None:
     for demo in demonstrations:
         panel.plot(*demo.states.T, color=COLOURS["training"], linewidth=2.2, solid_capstyle="round")
         panel.plot(*demo.states[0], "o", color=COLOURS["training"], markersize=5)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 
 from ...base.arrays import Array, require_extra
-from .planes import Quad
-from .style import COLOURS, INK
+from ...pages.figures.style import COLOURS, INK
+from .plates import Quad
 
 
 def arm_on_plate(joints: Array, track: Array, plate: Quad) -> bytes:
