@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable
+from importlib import resources
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
@@ -72,8 +73,15 @@ def c_source(form: ClosedForm, name: str, states: Array, actions: Array) -> str:
         "test_actions": _braced(actions),
         "tolerance": float(TOLERANCE * np.abs(actions).max()).hex(),
     }
-    body = _AFFINE if form.exponents is None else _BLENDED_MAPS if form.is_affine else _BLENDED_CONSTANTS
-    return re.sub(r"@([a-z_]+|NAME)@", lambda found: fill[found[1]], _HEAD + body + _SELF_TEST)
+    blended = ("shares", "maps" if form.is_affine else "constants")
+    body = ("affine",) if form.exponents is None else blended
+    source = "".join(_template(part) for part in ("head", *body, "self_test"))
+    return re.sub(r"@([a-z_]+|NAME)@", lambda found: fill[found[1]], source)
+
+
+def _template(part: str) -> str:
+    """C with ``@WORDS@`` to fill in."""
+    return (resources.files(__package__) / "templates" / f"{part}.c.in").read_text()
 
 
 def _probes(form: ClosedForm) -> Array:
@@ -96,163 +104,3 @@ def _version() -> str:
         return version("unconstrain")
     except PackageNotFoundError:
         return "from its sources"
-
-
-_HEAD = """\
-/*
- * @what@; written by unconstrain @version@.
- *
- *     void @name@_step(const double state[@n@], double action[@d@]);
- *
- * C99, needs only exp() of the standard library. No allocation, no state: safe in any number of threads.
- * The action may be written over the state. Finite for every finite state of sensible size; NaN gives NaN.
- *
- * Test: cc -std=c99 -O2 -D@macro@ FILE.c -lm -o test && ./test
- */
-#include <math.h>
-
-enum { @NAME@_STATES = @n@, @NAME@_ACTIONS = @d@, @NAME@_MODELS = @models@ };
-
-#ifdef __cplusplus
-extern "C"
-#endif
-void @name@_step(const double state[@n@], double action[@d@]);
-
-static const double @NAME@_ORIGIN[@NAME@_STATES] = @origin@;
-
-"""
-
-_AFFINE = """\
-/* The map, its constant in the last column. */
-static const double @NAME@_MAP[@NAME@_MODELS][@NAME@_ACTIONS][@NAME@_STATES + 1] = @maps@;
-
-void @name@_step(const double state[@n@], double action[@d@])
-{
-    double z[@NAME@_STATES];
-    int i, k;
-
-    for (i = 0; i < @NAME@_STATES; i++)
-        z[i] = state[i] - @NAME@_ORIGIN[i];
-    for (k = 0; k < @NAME@_ACTIONS; k++) {
-        double sum = @NAME@_MAP[0][k][@NAME@_STATES];
-        for (i = 0; i < @NAME@_STATES; i++)
-            sum += @NAME@_MAP[0][k][i] * z[i];
-        action[k] = sum;
-    }
-}
-"""
-
-_SHARES = """\
-/* Exponents of the kernels are affine in the state; the constant is in the last column. */
-static const double @NAME@_SLOPES[@NAME@_MODELS][@NAME@_STATES + 1] = @slopes@;
-
-/* Shares of the models, not yet divided by their sum, which is returned. Relative to the largest: none overflows. */
-static double @name@_shares(const double z[@NAME@_STATES], double share[@NAME@_MODELS])
-{
-    double largest, sum = 0.0;
-    int i, m;
-
-    for (m = 0; m < @NAME@_MODELS; m++) {
-        double exponent = @NAME@_SLOPES[m][@NAME@_STATES];
-        for (i = 0; i < @NAME@_STATES; i++)
-            exponent += @NAME@_SLOPES[m][i] * z[i];
-        share[m] = exponent;
-    }
-    largest = share[0];
-    for (m = 1; m < @NAME@_MODELS; m++)
-        if (share[m] > largest)
-            largest = share[m];
-    for (m = 0; m < @NAME@_MODELS; m++) {
-        share[m] = exp(share[m] - largest);
-        sum += share[m];
-    }
-    return sum;
-}
-
-"""
-
-_BLENDED_CONSTANTS = (
-    _SHARES
-    + """\
-/* What each model says. */
-static const double @NAME@_CONSTANTS[@NAME@_MODELS][@NAME@_ACTIONS] = @maps@;
-
-void @name@_step(const double state[@n@], double action[@d@])
-{
-    double z[@NAME@_STATES], share[@NAME@_MODELS], sum;
-    int i, k, m;
-
-    for (i = 0; i < @NAME@_STATES; i++)
-        z[i] = state[i] - @NAME@_ORIGIN[i];
-    sum = @name@_shares(z, share);
-    for (k = 0; k < @NAME@_ACTIONS; k++)
-        action[k] = 0.0;
-    for (m = 0; m < @NAME@_MODELS; m++)
-        for (k = 0; k < @NAME@_ACTIONS; k++)
-            action[k] += share[m] * @NAME@_CONSTANTS[m][k];
-    for (k = 0; k < @NAME@_ACTIONS; k++)
-        action[k] /= sum;
-}
-"""
-)
-
-_BLENDED_MAPS = (
-    _SHARES
-    + """\
-/* The map of each model, its constant in the last column. */
-static const double @NAME@_MAPS[@NAME@_MODELS][@NAME@_ACTIONS][@NAME@_STATES + 1] = @maps@;
-
-void @name@_step(const double state[@n@], double action[@d@])
-{
-    double z[@NAME@_STATES], share[@NAME@_MODELS], blend[@NAME@_ACTIONS][@NAME@_STATES + 1], sum;
-    int i, k, m;
-
-    for (i = 0; i < @NAME@_STATES; i++)
-        z[i] = state[i] - @NAME@_ORIGIN[i];
-    sum = @name@_shares(z, share);
-    for (k = 0; k < @NAME@_ACTIONS; k++)
-        for (i = 0; i <= @NAME@_STATES; i++)
-            blend[k][i] = share[0] * @NAME@_MAPS[0][k][i];
-    for (m = 1; m < @NAME@_MODELS; m++)
-        for (k = 0; k < @NAME@_ACTIONS; k++)
-            for (i = 0; i <= @NAME@_STATES; i++)
-                blend[k][i] += share[m] * @NAME@_MAPS[m][k][i];
-    for (k = 0; k < @NAME@_ACTIONS; k++) {
-        double whole = blend[k][@NAME@_STATES];
-        for (i = 0; i < @NAME@_STATES; i++)
-            whole += blend[k][i] * z[i];
-        action[k] = whole / sum;
-    }
-}
-"""
-)
-
-_SELF_TEST = """\
-
-#ifdef @macro@
-#include <stdio.h>
-
-enum { @NAME@_TESTS = @tests@ };
-
-static const double @NAME@_TEST_STATES[@NAME@_TESTS][@NAME@_STATES] = @test_states@;
-static const double @NAME@_TEST_ACTIONS[@NAME@_TESTS][@NAME@_ACTIONS] = @test_actions@;
-
-int main(void)
-{
-    const double tolerance = @tolerance@;
-    double action[@NAME@_ACTIONS], worst = 0.0;
-    int k, t;
-
-    for (t = 0; t < @NAME@_TESTS; t++) {
-        @name@_step(@NAME@_TEST_STATES[t], action);
-        for (k = 0; k < @NAME@_ACTIONS; k++) {
-            const double error = fabs(action[k] - @NAME@_TEST_ACTIONS[t][k]);
-            if (!(error <= worst)) /* NaN, too, is worse */
-                worst = error;
-        }
-    }
-    printf("largest error %.3g, tolerance %.3g\\n", worst, tolerance);
-    return worst <= tolerance ? 0 : 1;
-}
-#endif
-"""
