@@ -20,7 +20,7 @@ import unconstrain as uc
 from samples import draw
 from unconstrain.base.errors import InvalidDataError, SettingError, UnconstrainError
 from unconstrain.paper.systems.limit_cycle import LimitCycle
-from unconstrain.training import PLACING_SAMPLES
+from unconstrain.training.first_look import PLACING_SAMPLES
 
 POLICIES = [uc.ParametricPolicy, uc.LocallyLinearPolicy]
 

@@ -13,8 +13,8 @@ from unconstrain.base.errors import InvalidDataError, MissingExtraError, Setting
 from unconstrain.motion.containment import Contained
 from unconstrain.paper import simulation
 from unconstrain.paper.figures import arms, plates
-from unconstrain.paper.simulation import control, engine, pictures, postures
-from unconstrain.paper.simulation.postures import READY
+from unconstrain.paper.simulation import control, engine, pictures, postures, reproduction
+from unconstrain.paper.simulation.postures import READY, postures_along
 from unconstrain.paper.simulation.reproduction import centres
 from unconstrain.paper.simulation.scene import LINK_MASSES, TOOL, arm_scene
 from unconstrain.paper.systems.arm import LWR3
@@ -65,7 +65,7 @@ def test_postures_put_the_sponge_flat_on_every_point():
     plate = Plate(10.0, -8.0)
     angles = np.linspace(0.0, 2.0 * np.pi, 9)
     points = 0.1 * np.column_stack([np.cos(angles), np.sin(angles)]) @ plate.rotation[:, :2].T
-    rest, postures = simulation.postures_along(points, plate)
+    rest, postures = postures_along(points, plate)
     assert ((postures > LWR3.lower) & (postures < LWR3.upper)).all()
     rotations, positions = LWR3.frames(np.vstack([rest, postures]))
     tool = rotations[-1, :, 2].T
@@ -83,7 +83,7 @@ def test_postures_put_the_sponge_flat_on_every_point():
 )
 def test_a_plate_out_of_reach_is_refused_with_the_reason(plate, said):
     with pytest.raises(SettingError, match=said):
-        simulation.postures_along(np.zeros((1, 3)), plate)
+        postures_along(np.zeros((1, 3)), plate)
 
 
 def tool_tasks(posture, plate):
@@ -132,7 +132,7 @@ def test_the_arm_keeps_contact_and_follows_the_plan(wiped):
     assert found["drift_m"] < 0.005
     planned = Demonstration(wiped.planned[:-1], np.diff(wiped.planned, axis=0) / 0.01)
     normal = wiped.plate.rotation[:, 2]
-    assert found["frequency"] == pytest.approx(simulation.turning(planned, normal), rel=0.02)
+    assert found["frequency"] == pytest.approx(reproduction.turning(planned, normal), rel=0.02)
     assert np.abs(wiped.positions @ normal).max() < 0.003
     assert ((wiped.postures > LWR3.lower) & (wiped.postures < LWR3.upper)).all()
 
@@ -148,7 +148,7 @@ def test_turning_and_drift_of_a_circle_that_wanders():
     angle = 2.0 * np.pi * 0.75 * times
     circle = 0.1 * np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
     movement = Demonstration(circle, 2.0 * np.pi * 0.75 * np.column_stack([-circle[:, 1], circle[:, 0], 0.0 * angle]))
-    assert simulation.turning(movement, np.array([0.0, 0.0, 1.0])) == pytest.approx(0.75, rel=1e-3)
+    assert reproduction.turning(movement, np.array([0.0, 0.0, 1.0])) == pytest.approx(0.75, rel=1e-3)
     wandering = circle + np.column_stack([0.001 * times, 0.0 * times, 0.0 * times])
     middles = centres(wandering, PLATES[0])
     assert len(middles) == 10
@@ -208,7 +208,7 @@ def test_without_the_engine_the_extra_is_named(monkeypatch):
         arm_scene(PLATES[0])
     monkeypatch.setitem(sys.modules, "mink", None)
     with pytest.raises(MissingExtraError, match=r"mink.*sim"):
-        simulation.postures_along(np.zeros((1, 3)), PLATES[0])
+        postures_along(np.zeros((1, 3)), PLATES[0])
 
 
 def test_contained_changes_nothing_near_the_data_and_comes_back_from_afar():

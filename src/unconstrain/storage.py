@@ -28,7 +28,7 @@ from .policies import LocallyLinearPolicy, ParametricPolicy, Policy
 from .risks import FoldedMoments, Moments
 from .training import Folds, HeldOut, Split, Training
 
-__all__ = ["VERSION", "load", "load_notes", "register", "save"]
+__all__ = ["load", "load_notes", "register", "save"]
 
 VERSION = 2
 """Of the file format. Older files stay readable; newer ones are refused."""

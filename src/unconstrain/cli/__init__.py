@@ -31,8 +31,6 @@ from .reading import (
     stream_of,
 )
 
-__all__ = ["main"]
-
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
 
 

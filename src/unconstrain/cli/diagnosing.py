@@ -61,8 +61,8 @@ def diagnose(
 
 
 def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequence[str]) -> None:
-    named = uc.evaluation.named
-    for line in uc.evaluation.sentences(found, states, actions):
+    named = uc.evaluation.diagnosis.named
+    for line in uc.evaluation.diagnosis.sentences(found, states, actions):
         click.echo(line)
     shown = found.regions[:MOST_ROWS]
     click.echo(f"\nThe {len(shown)} regions of largest undetermined spread, of {len(found.regions)}, largest first:")

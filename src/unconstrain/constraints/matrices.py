@@ -11,8 +11,6 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 from ..base.arrays import Array
 from ..base.errors import InvalidDataError, SettingError
 
-__all__ = ["constraint_matrices"]
-
 
 class _UnknownTimes(NDArrayOperatorsMixin):
     """Stands where nobody recorded the times: it has a length, and whoever reads a value is refused."""

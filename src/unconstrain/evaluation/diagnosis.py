@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InvalidDataError
-from ..learners import SPHERE_HIDDEN_BY_NOISE, Solution, noise_by_differences
+from ..learners import Solution, robust
 from ..models import choose_variance, cover
 from ..recordings import Demonstration, readers, stack
 
@@ -170,7 +170,7 @@ def diagnose(policy: Policy, demonstrations: Sequence[Demonstration]) -> Diagnos
         refuted=belief.refuted,
         noise=solution.noise,
         noise_share=float(np.sqrt(d)) * solution.noise / typical,
-        jitter=float(np.sqrt(noise_by_differences(actions, groups))),
+        jitter=float(np.sqrt(robust.noise_by_differences(actions, groups))),
         typical=typical,
         directions=models * solution.directions,
         directions_determined=solution.determined_share,
@@ -282,7 +282,8 @@ def sentences(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -
 
 def _about_noise(found: Diagnosis) -> str:
     verdict = "little" if found.noise_share < SMALL else "some" if found.noise_share < 3 * SMALL else "much"
-    hidden = " So much noise makes the following unreliable." if found.noise_share > SPHERE_HIDDEN_BY_NOISE else ""
+    too_much = found.noise_share > robust.SPHERE_HIDDEN_BY_NOISE
+    hidden = " So much noise makes the following unreliable." if too_much else ""
     said = (
         f"Noise: {verdict}, {found.noise:.3g} on each action coordinate, {found.noise_share:.1%} of a typical action "
         f"({found.typical:.3g}) in all.{hidden}"
@@ -306,7 +307,7 @@ def _about_method(found: Diagnosis) -> str:
     corrected = found.method == "noise-corrected"
     kind = "from noise-corrected moments" if corrected else "softened, since its residuals are not noise"
     why = "or nearly all samples are in its uniform component"
-    if found.noise_share > SPHERE_HIDDEN_BY_NOISE:
+    if found.noise_share > robust.SPHERE_HIDDEN_BY_NOISE:
         why = "and so much noise hides which samples are free"
     elif found.refuted:
         why = "so constraints do not seem to vary at random"
@@ -316,7 +317,7 @@ def _about_method(found: Diagnosis) -> str:
 def _about_variability(found: Diagnosis) -> str:
     share = found.states_determined
     verdict = "rich enough" if share > 0.95 else "rich enough in most places" if share > 0.7 else "not rich enough"
-    if found.noise_share > SPHERE_HIDDEN_BY_NOISE:
+    if found.noise_share > robust.SPHERE_HIDDEN_BY_NOISE:
         verdict = "unknown under so much noise"
     return (
         f"Variability of the constraints: {verdict}. The data determines {found.directions_determined:.0%} of "

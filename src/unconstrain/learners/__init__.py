@@ -6,19 +6,10 @@ from .hybrid import Hybrid
 from .inconsistency import Inconsistency
 from .learner import Learner
 from .named import named
-from .robust import (
-    SPHERE_HIDDEN_BY_NOISE,
-    Likelihood,
-    NoiseCorrected,
-    Robust,
-    Segments,
-    Uncertainty,
-    noise_by_differences,
-)
-from .solution import Belief, Solution
+from .robust import Likelihood, NoiseCorrected, Robust, Segments
+from .solution import Belief, Solution, Uncertainty
 
 __all__ = [
-    "SPHERE_HIDDEN_BY_NOISE",
     "Belief",
     "Direct",
     "Hybrid",
@@ -31,6 +22,5 @@ __all__ = [
     "Solution",
     "Uncertainty",
     "named",
-    "noise_by_differences",
     "robust",
 ]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.errors import InvalidDataError
-from ..evaluation import CONSTRAINED, FREE, SMALL, Diagnosis, diagnose, named, sentences
+from ..evaluation import Diagnosis, diagnose, diagnosis
 from ..recordings import Demonstration, stack
 from . import figures, html
 
@@ -53,7 +53,7 @@ def diagnosis_page(
         "they determine the unconstrained policy: the noise, where constraints vary too little, and which further "
         "demonstration would help most.",
         _tiles(found, demos),
-        html.bullets(sentences(found, states, actions)),
+        html.bullets(diagnosis.sentences(found, states, actions)),
         html.section("Where the policy is not determined", _map(found, demos, states, actions)),
         html.section("What to record next", _next(found, states, actions)),
         html.section("Free or constrained", _freedom(found)),
@@ -69,7 +69,7 @@ def unknown(policy: Policy, demos: list[Demonstration]) -> list[html.Markup]:
         return [html.paragraph(f"Nothing can be said about that: {error}")]
     states = [f"state {index + 1}" for index in range(demos[0].states.shape[1])]
     actions = [f"action {index + 1}" for index in range(demos[0].actions.shape[1])]
-    told = map(html.paragraph, sentences(found, states, actions))
+    told = map(html.paragraph, diagnosis.sentences(found, states, actions))
     return [*told, _map(found, demos, states, actions), _next(found, states, actions)]
 
 
@@ -90,6 +90,7 @@ def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], ac
     recorded = stack(demos).states
     regions = found.regions[:MOST_REGIONS]
     worst = np.array([region.state for region in regions])
+    named = diagnosis.named
     texts = [escape(f"{named(one.state, states)}: leave {named(one.direction, actions)} free") for one in regions]
     if recorded.shape[1] == 1:
         recorded, worst = (np.column_stack([one, np.zeros(len(one))]) for one in (recorded, worst))
@@ -108,7 +109,7 @@ def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], ac
         scale="undetermined spread / typical action",
         texts=texts,
         directions=ways,
-        top=SMALL,
+        top=diagnosis.SMALL,
     )
     caption = (
         "Each dot is a recorded state. Its colour is the undetermined standard deviation, without that from noise, as "
@@ -164,8 +165,8 @@ def _freedom(found: Diagnosis) -> html.Markup:
     more = f" The first {len(shown)} of {len(found.movements)} are drawn." if len(found.movements) > len(shown) else ""
     caption = (
         "One bar for each demonstration, the mean over its samples: above "
-        f"{FREE:g} it looks free, below {CONSTRAINED:g} constrained. A constraint that changes an action by less "
-        f"than the noise looks free.{more}"
+        f"{diagnosis.FREE:g} it looks free, below {diagnosis.CONSTRAINED:g} constrained. A constraint that changes an "
+        f"action by less than the noise looks free.{more}"
     )
     return html.picture("free", [picture], caption)
 

@@ -2,13 +2,12 @@
 
 from . import cluster
 from .batches import Batch
-from .first_look import PLACING_SAMPLES, FirstLook, Seen, are_typical
+from .first_look import FirstLook, Seen, are_typical
 from .folds import Folds, HeldOut, Split, Validation
 from .samples import Samples
 from .training import Training
 
 __all__ = [
-    "PLACING_SAMPLES",
     "Batch",
     "FirstLook",
     "Folds",

@@ -12,8 +12,9 @@ from ..experiments.trials import Result
 from ..experiments.washing import WITHOUT_PHYSICS
 from ..experiments.washing.arm import Reproduction
 from ..figures import arms, plates
-from ..simulation import BACKENDS, Wipe
+from ..simulation import BACKENDS
 from ..simulation.pictures import animation, film, strip
+from ..simulation.reproduction import Wipe
 from ..systems.arm import LWR3
 from . import parts
 

@@ -5,7 +5,6 @@ Needs the extra ``sim``.
 
 from .engine import BACKENDS, backend
 from .hand import demonstrate
-from .postures import postures_along
-from .reproduction import Wipe, turning, wipe
+from .reproduction import wipe
 
-__all__ = ["BACKENDS", "Wipe", "backend", "demonstrate", "postures_along", "turning", "wipe"]
+__all__ = ["BACKENDS", "backend", "demonstrate", "wipe"]

@@ -13,7 +13,8 @@ import unconstrain as uc
 from ....base.arrays import Array
 from ....base.errors import SettingError
 from ... import simulation
-from ...simulation import Wipe, turning
+from ...simulation.postures import postures_along
+from ...simulation.reproduction import Wipe, turning
 from ...systems.wiping import HELD_OUT, PLATES, Plate, WipingPolicy
 from .learning import Split, fitted
 from .surfaces import Surface
@@ -90,7 +91,7 @@ def check_reach(plate: Plate) -> None:
     """Refuse a plate on which the arm cannot wipe a circle, before anything long is begun."""
     angles = np.linspace(0.0, 2.0 * np.pi, 24)
     circle = WipingPolicy().radius * np.column_stack([np.cos(angles), np.sin(angles)]) @ plate.rotation[:, :2].T
-    simulation.postures_along(circle, plate)
+    postures_along(circle, plate)
 
 
 def jobs(settings: Settings, wiped: Sequence[Plate], splits: Sequence[Split]) -> list[tuple[Any, ...]]:
