@@ -9,8 +9,9 @@ from scipy.stats import mannwhitneyu
 import unconstrain as uc
 from test_report import References, opened
 from unconstrain.base.errors import SettingError
-from unconstrain.cli import printing
+from unconstrain.cli.printing import print_table
 from unconstrain.pages import html
+from unconstrain.paper import commands
 from unconstrain.paper import pages as report
 from unconstrain.paper.experiments import regimes
 
@@ -128,7 +129,7 @@ def test_the_area_is_the_statistic_of_mann_and_whitney():
 
 
 def test_the_table_prints_what_is_not_known_as_a_dash(result, capsys):
-    printing._print_result(result)
+    print_table(*commands.summary(result))
     assert capsys.readouterr().out.count("oracle") >= 4
 
 

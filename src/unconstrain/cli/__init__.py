@@ -19,7 +19,7 @@ from ..base.files import write
 from ..paper import experiments
 from .diagnosing import diagnose
 from .fitting import MODELS, Alpha, check_speed_power, check_writable, default_learner, learn, learner_of, policy_of
-from .printing import Group, deliver, number, print_table, progress_bar, say_fit
+from .printing import Group, number, print_table, say_fit
 from .reading import (
     Numbers,
     complete,
@@ -260,35 +260,14 @@ def export(policy: str, output: str, name: str | None) -> None:
     show_default=True,
     help="Folder for NAME.json and NAME.html.",
 )
-def reproduce(experiment: str, trials: int | None, seed: int, only: tuple[str, ...], workers: int, out: str) -> None:
+def reproduce(experiment: str, out: str, **settings: Any) -> None:
     """Run one of the paper's experiments, beside its printed values.
 
     An interrupted run continues where it stopped.
     """
-    from ..paper.experiments.journal import Journal
+    from ..paper import commands
 
-    if workers == 0:
-        raise SettingError("--workers: got 0, expected a number of processes, or -1 for one on each core.")
-    module = experiments.find(experiment)
-    settings = replace(module.Settings(), seed=seed)
-    if trials is not None:
-        if not hasattr(settings, "trials"):
-            raise SettingError(f"--trials: {experiment} is a single data set.")
-        settings = replace(settings, trials=trials)
-    if only:
-        if not hasattr(settings, "only"):
-            raise SettingError(f"--only: {experiment} has no parts to choose from.")
-        settings = replace(settings, only=only)
-    if experiment not in experiments.JOURNALED:
-        with progress_bar(experiment) as progress:
-            result = module.run(settings, workers, progress)
-        deliver(result, module.headlines(result), out)
-        return
-    journal = Journal(Path(out) / f".{experiment}.trials", settings)
-    with progress_bar(experiment) as progress:
-        result = module.run(settings, workers, progress, journal)
-    if deliver(result, module.headlines(result), out):
-        journal.finish()
+    commands.reproduce(experiment, out, print_table, **settings)
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain demo --real --download --out wiping")
@@ -299,26 +278,14 @@ def reproduce(experiment: str, trials: int | None, seed: int, only: tuple[str, .
 @click.option(
     "--out", type=click.Path(file_okay=False), default="demo", show_default=True, help="Folder for the report."
 )
-def demo(real: bool, download: bool, plate: tuple[float, ...] | None, seed: int, out: str) -> None:
+def demo(out: str, **settings: Any) -> None:
     """Wash a car: learn on some surfaces, test on others.
 
     Writes a report (HTML).
     """
-    from ..paper.experiments import washing
+    from ..paper import commands
 
-    if plate is not None and len(plate) != 2:
-        raise SettingError(f"--plate: got {len(plate)} numbers, expected two, the tilts about x and y in degrees.")
-    tilts = None if plate is None else (plate[0], plate[1])
-    try:
-        with progress_bar("washing") as progress:
-            result = washing.run(
-                washing.Settings(real=real, download=download, trials=1, seed=seed, plate=tilts), 1, progress
-            )
-    except ReadError as error:
-        raise error if download else ReadError(f"{error} On the command line, --download allows it.") from error
-    if not real:
-        click.echo("Seven plates were wiped, five to learn from, two to be tested on.")
-    deliver(result, washing.headlines(result), out)
+    commands.demo(out, print_table, **settings)
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain doctor")

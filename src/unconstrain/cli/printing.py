@@ -1,24 +1,19 @@
-"""Output on the terminal: tables, progress bars, notes, and errors in one sentence."""
+"""Output on the terminal: tables, notes, and errors in one sentence."""
 
 from __future__ import annotations
 
 import errno
 import sys
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from math import isfinite
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 import unconstrain as uc
 
 from ..base.errors import UnconstrainError
-
-if TYPE_CHECKING:  # everything heavy is imported by the function that needs it
-    from ..paper.experiments.trials import Progress, Result
 
 
 class Group(click.Group):
@@ -42,48 +37,6 @@ class Group(click.Group):
             click.echo(f"Error: {said}", err=True)
             ctx.exit(2)
         return result
-
-
-def deliver(result: Result, headlines: Sequence[str], out: str) -> bool:
-    """Print and write a result; False where it could not be written."""
-    from ..base.errors import MissingExtraError
-    from ..paper import pages as report
-
-    _print_result(result)
-    for line in headlines:
-        click.echo(line)
-    try:
-        data, page = report.write(result, Path(out))
-    except MissingExtraError as error:
-        click.echo(f"No report: {error}", err=True)
-        return False
-    click.echo(f"numbers: {data}\nreport:  {page}")
-    return True
-
-
-def _print_result(result: Result) -> None:
-    """The paper's values stay in the files: mean and s.d. fill the 80 columns of a terminal."""
-    from ..paper.experiments.trials import LABELS
-
-    titles = {"constraint": "constr.", "theta_max": "θmax", "ninc": "norm. incon."} | {
-        name: LABELS[name] for name in ("nupe", "ncpe")
-    }
-    first = result.rows[0]
-    kept = [name for name in first if not name.startswith("paper_") and not name.endswith("_sd")]
-    names = [short if f"{short}_sd" in first else name for name in kept for short in [name.removesuffix("_mean")]]
-    rows = [
-        [_cell(row[name]) if name in row else f"{row[f'{name}_mean']:.2g} ± {row[f'{name}_sd']:.2g}" for name in names]
-        for row in result.rows
-    ]
-    print_table([titles.get(name, name) for name in names], rows)
-
-
-def _cell(value: Any) -> str:
-    if value is None:
-        return "-"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 def say_fit(policy: uc.Policy, stream: uc.Stream | None, learner: str) -> None:
@@ -167,17 +120,6 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     # Piped output is for programs and files: no wrapping there.
     console = Console(width=None if sys.stdout.isatty() else 10_000)
     console.print(table)
-
-
-@contextmanager
-def progress_bar(title: str) -> Iterator[Progress]:
-    """Show a bar on stderr while the block runs; yields what to call with (done, of)."""
-    from rich.console import Console
-    from rich.progress import Progress as Bar
-
-    with Bar(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as bar:
-        job = bar.add_task(title, total=None)
-        yield lambda done, of: bar.update(job, completed=done, total=of)
 
 
 def show_warning(message: Warning | str, *_: Any) -> None:

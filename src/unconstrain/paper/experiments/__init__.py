@@ -7,7 +7,7 @@ from types import ModuleType
 
 from ...base.errors import SettingError
 
-__all__ = ["JOURNALED", "NAMES", "find"]
+__all__ = ["NAMES", "find"]
 
 NAMES = ("table1", "figure4", "figure5", "table2", "washing", "regimes")
 """What can be reproduced."""
