@@ -24,7 +24,7 @@ from unconstrain.recordings.preparation import (
     trim,
 )
 from unconstrain.recordings.preparation.movements import Gap, find_gaps
-from unconstrain.recordings.preparation.recipes import guess_recipe
+from unconstrain.recordings.preparation.recipes import complete_recipe
 from unconstrain.recordings.readers import read
 
 TURN = 3.0  # rad/s
@@ -360,14 +360,14 @@ def columns(*names: str) -> Recording:
     ],
 )
 def test_usual_names_tell_states_and_actions(names: str, states: str, actions: str) -> None:
-    recipe = guess_recipe(columns(*names.split()))
+    recipe = complete_recipe(Recipe(), columns(*names.split()))
     assert recipe == Recipe(states=tuple(states.split()), actions=tuple(actions.split()))
 
 
 @pytest.mark.parametrize("names", ["x y z qx qy qz qw fx fy fz", "x y", "w z y x"])
 def test_positions_alone_are_differentiated(names: str) -> None:
     expected = ("x", "y", "z") if "z" in names else ("x", "y")
-    assert guess_recipe(columns(*names.split())) == Recipe(states=expected, differentiate="savgol")
+    assert complete_recipe(Recipe(), columns(*names.split())) == Recipe(states=expected, differentiate="savgol")
 
 
 def test_what_is_said_is_not_guessed() -> None:

@@ -20,16 +20,7 @@ from ..paper import experiments
 from .diagnosing import diagnose
 from .fitting import MODELS, Alpha, check_speed_power, check_writable, default_learner, learn, learner_of, policy_of
 from .printing import Group, number, print_table, say_fit
-from .reading import (
-    Numbers,
-    complete,
-    options_for_reading,
-    recipe_of,
-    recordings_in,
-    recordings_one_by_one,
-    said_recipe,
-    stream_of,
-)
+from .reading import Numbers, complete, options_for_reading, recipe_of, roles_of, said_recipe, stream_of
 
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
 
@@ -54,9 +45,10 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     """Describe each FILE: columns, rate, gaps, zero actions."""
     recipe = recipe_of(**reading)
     surveys, first = [], None
-    for recording in recordings_one_by_one(files, **reading):
-        surveys.append(uc.preparation.survey(recording, recipe))
-        first = replace(recording, values=recording.values[:1], times=None) if first is None else first
+    for path in uc.readers.expand(files):
+        for recording in uc.readers.read_blocks(path, whole=True, **roles_of(**reading)):
+            surveys.append(uc.preparation.survey(recording, recipe))
+            first = replace(recording, values=recording.values[:1], times=None) if first is None else first
     names = uc.readers.unique_names(found.name for found in surveys)
     surveys = [replace(found, name=name) for found, name in zip(surveys, names, strict=True)]
     if as_json:
@@ -144,7 +136,7 @@ def fit(
     fitted = policy_of(model, variance, centres, **chosen)
     stream = stream_of(paths, speed_power, **reading)
     learn(fitted, stream, scheduler)
-    notes = {"recipe": stream.recipe.to_dict(), "group": reading["group"], "time": reading["time"]}
+    notes = {"recipe": stream.recipe.to_dict(), **roles_of(**reading)}
     uc.save(fitted, output, notes)
     click.echo(f"Learnt from {said_recipe(stream.recipe)}.")
     say_fit(fitted, stream if scheduler is None else None, learner)
@@ -168,7 +160,7 @@ def score(policy: str, files: Sequence[str], plane: tuple[float, ...] | None, as
     """
     learnt, notes = _fitted(policy), uc.storage.load_notes(policy)
     recipe = uc.Recipe.from_dict(notes.get("recipe", {}))
-    recordings = recordings_in(files, group=notes.get("group"), time=notes.get("time"))
+    recordings = uc.read(files, **roles_of(**notes))
     demonstrations = uc.prepare(recordings, recipe)
     constraint = _plane(plane, learnt.n_outputs_, "one for each action")
 

@@ -14,7 +14,7 @@ import unconstrain as uc
 from ..base.files import write
 from .fitting import MODELS, check_writable, policy_of
 from .printing import print_table
-from .reading import complete, options_for_reading, recipe_of, recordings_in, said_recipe
+from .reading import complete, options_for_reading, recipe_of, roles_of, said_recipe
 
 MOST_ROWS = 8
 
@@ -41,7 +41,7 @@ def diagnose(
     """
     paths = uc.readers.expand(files)
     check_writable((report,), paths)
-    recordings = recordings_in(paths, **reading)
+    recordings = uc.read(paths, **roles_of(**reading))
     recipe = complete(recipe_of(**reading), recordings[0])
     demonstrations = uc.prepare(recordings, recipe)
     policy = policy_of(model, variance, centres, learner=uc.Robust()).fit_demonstrations(demonstrations)

@@ -7,25 +7,15 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import NamedTuple
 
 EXTRAS = {
-    "viz": ("plotly", "jinja2", "matplotlib"),
-    "data": ("pyarrow", "h5py", "pooch"),
-    "arm": ("yourdfpy",),
-    "sim": ("mujoco", "mink", "pillow"),
-    "onnx": ("onnx", "onnxruntime"),
-    "cluster": ("dask", "distributed"),
-    "arrays": ("array-api-compat",),
+    "viz": ("figures and reports", ("plotly", "jinja2", "matplotlib")),
+    "data": ("Parquet, HDF5, public recordings", ("pyarrow", "h5py", "pooch")),
+    "arm": ("arms from URDF files", ("yourdfpy",)),
+    "sim": ("wiping with contact", ("mujoco", "mink", "pillow")),
+    "onnx": ("export to ONNX", ("onnx", "onnxruntime")),
+    "cluster": ("learning on many machines", ("dask", "distributed")),
+    "arrays": ("learning from tensors", ("array-api-compat",)),
 }
-"""What each extra brings."""
-
-SERVES = {
-    "viz": "figures and reports",
-    "data": "Parquet, HDF5, public recordings",
-    "arm": "arms from URDF files",
-    "sim": "wiping with contact",
-    "onnx": "export to ONNX",
-    "cluster": "learning on many machines",
-    "arrays": "learning from tensors",
-}
+"""What each extra serves, and what it brings."""
 
 
 class Finding(NamedTuple):
@@ -44,12 +34,12 @@ class Finding(NamedTuple):
 def examine() -> list[Finding]:
     """Find the versions of Python and the extras, and the back-end that renders the scene."""
     found = [Finding("Python", "everything", platform.python_version(), "")]
-    for extra, packages in EXTRAS.items():
+    for extra, (serves, packages) in EXTRAS.items():
         versions = {package: _version(package) for package in packages}
         missing = [package for package, number in versions.items() if number is None]
         said = ", ".join(f"{package} {number or 'missing'}" for package, number in versions.items())
         fix = f"pip install 'unconstrain[{extra}]'" if missing else ""
-        found.append(Finding(extra, SERVES[extra], said, fix))
+        found.append(Finding(extra, serves, said, fix))
     return [*found, _graphics()]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -100,23 +100,12 @@ def said_recipe(recipe: uc.Recipe) -> str:
     return f"{states} as states and {actions}" + ("" if recipe.actions else " as actions")
 
 
-def recordings_in(
-    paths: Sequence[str | Path], group: str | None = None, time: str | None = None, **_: Any
-) -> list[uc.Recording]:
-    """Read files as the options say."""
-    return uc.read(paths, group=group, time=time)
-
-
-def recordings_one_by_one(
-    paths: Sequence[str | Path], group: str | None = None, time: str | None = None, **_: Any
-) -> Iterator[uc.Recording]:
-    """Read files as the options say, holding one at a time."""
-    for path in uc.readers.expand(paths):
-        yield from uc.readers.read_blocks(path, group=group, time=time, whole=True)
+def roles_of(group: str | None = None, time: str | None = None, **_: Any) -> dict[str, Any]:
+    """The columns that name the demonstration and hold the time, as the options say."""
+    return {"group": group, "time": time}
 
 
 def stream_of(paths: Sequence[str | Path], speed_power: float, **reading: Any) -> uc.Stream:
     """Files as batches to learn from, as the options say."""
-    roles = {"group": reading["group"], "time": reading["time"]}
-    asked = recipe_of(**reading)
+    roles, asked = roles_of(**reading), recipe_of(**reading)
     return uc.Stream(paths, complete(asked, uc.Stream(paths, asked, **roles).first), speed_power=speed_power, **roles)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from importlib import resources
 from types import ModuleType
 from typing import Any
 
@@ -39,7 +41,6 @@ DASHES = {"direct": "dash", "inconsistency": "dot", "hybrid": "solid", "truth": 
 
 INK = "#33373d"
 RULE = "#e3e6ea"
-FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 
 
 def plotly(module: str = "graph_objects") -> ModuleType:
@@ -69,38 +70,10 @@ def figure(title: str = "", x: str = "", y: str = "", height: int = 400, **layou
 
 def dress(made: Any, title: str, height: int) -> None:
     """Put the house style on a plotly figure."""
-    axis = {
-        "gridcolor": RULE,
-        "zeroline": False,
-        "linecolor": "#9aa0a6",
-        "ticks": "outside",
-        "tickcolor": "#9aa0a6",
-        "title_standoff": 8,
-        "automargin": True,
-        "exponentformat": "power",
-        "tickfont_size": 12,
-    }
-    made.update_layout(
-        template="none",
-        title={
-            "text": title,
-            "font_size": 15,
-            "x": 0.0,
-            "xref": "paper",
-            "xanchor": "left",
-            "y": 0.985,
-            "yanchor": "top",
-        },
-        height=height,
-        font={"family": FONT, "size": 13, "color": INK},
-        margin={"l": 58, "r": 14, "t": 38 if title else 14, "b": 48},
-        paper_bgcolor="white",
-        plot_bgcolor="white",
-        hovermode="closest",
-        legend={"orientation": "h", "y": -0.2, "x": 0.5, "xanchor": "center"},
-    )
-    made.update_xaxes(**axis)
-    made.update_yaxes(**axis)
+    look = json.loads((resources.files(__package__) / "look.json").read_text())
+    made.update_layout(look["layout"], title_text=title, height=height, font_color=INK, margin_t=38 if title else 14)
+    for each in (made.update_xaxes, made.update_yaxes):
+        each(look["axis"], gridcolor=RULE)
 
 
 def legend(key: str, first: bool = True) -> dict[str, Any]:

@@ -115,22 +115,11 @@ class Recipe:
         return cls(**values)
 
 
-def guess_recipe(recording: Recording) -> Recipe:
-    """The obvious meaning of the columns, if there is one.
+def complete_recipe(recipe: Recipe, recording: Recording) -> Recipe:
+    """Fill in what a recipe leaves open about states and actions by the names of the columns.
 
     In this order: columns with a velocity beside them (``vx``, ``dx``, ``x_dot``, ``dot_x`` or
     ``xdot``); ``x1..xn`` with ``u1..ud``; positions ``x, y, z`` or ``x, y``, to be differentiated.
-
-    Raises
-    ------
-    SettingError
-        If there is none; the message lists the columns and says what to give.
-    """
-    return complete_recipe(Recipe(), recording)
-
-
-def complete_recipe(recipe: Recipe, recording: Recording) -> Recipe:
-    """Fill in what a recipe leaves open about states and actions.
 
     Raises
     ------
