@@ -49,9 +49,7 @@ def diagnosis_page(
     demos = list(demonstrations)
     return html.document(
         title,
-        "The recordings are the demonstrator's policy, projected by unknown constraints. This page reports how well "
-        "they determine the unconstrained policy: the noise, where constraints vary too little, and which further "
-        "demonstration would help most.",
+        html.words("diagnosis_lead"),
         _tiles(found, demos),
         html.bullets(diagnosis.sentences(found, states, actions)),
         html.section("Where the policy is not determined", _map(found, demos, states, actions)),
@@ -111,14 +109,7 @@ def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], ac
         directions=ways,
         top=diagnosis.SMALL,
     )
-    caption = (
-        "Each dot is a recorded state. Its colour is the undetermined standard deviation, without that from noise, as "
-        f"a share of the typical action, {html.number(found.typical)} in units of the actions: dark is determined. The "
-        "numbers are those of the table below"
-    )
-    caption += ", the lines through them the direction of motion that is determined least." if same else "."
-    if len(states) > 2:
-        caption += " Of all state columns, the two that vary most are drawn."
+    caption = html.words("diagnosis_map", typical=html.number(found.typical), directions=same, states=len(states))
     return html.picture("known", [picture], caption)
 
 
@@ -140,10 +131,7 @@ def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> ht
     around, along = (", ".join(names) for names in (states, actions))
     header = ["", f"demonstrate around\n({around})", f"with motion left free along\n({along})", "recorded in"]
     header += ["spread\nalong it", "spread in\nthe region", "states\ndetermined", "samples"]
-    note = (
-        f"The {len(shown)} of {len(found.regions)} regions with the largest undetermined spread: a standard deviation "
-        "as a share of the typical action. A state is determined where it is below a tenth, or below that from noise."
-    )
+    note = html.words("diagnosis_next", shown=len(shown), every=len(found.regions))
     return html.table(header, rows, left=4, note=note)
 
 
@@ -162,11 +150,12 @@ def _freedom(found: Diagnosis) -> html.Markup:
     )
     picture.update_yaxes(range=[0.0, 1.0])
     picture.update_xaxes(showticklabels=len(shown) <= 40, tickangle=-90 if len(shown) > 12 else 0)
-    more = f" The first {len(shown)} of {len(found.movements)} are drawn." if len(found.movements) > len(shown) else ""
-    caption = (
-        "One bar for each demonstration, the mean over its samples: above "
-        f"{diagnosis.FREE:g} it looks free, below {diagnosis.CONSTRAINED:g} constrained. A constraint that changes an "
-        f"action by less than the noise looks free.{more}"
+    caption = html.words(
+        "diagnosis_freedom",
+        free=diagnosis.FREE,
+        constrained=diagnosis.CONSTRAINED,
+        shown=len(shown),
+        every=len(found.movements),
     )
     return html.picture("free", [picture], caption)
 
@@ -177,8 +166,5 @@ def _chosen(found: Diagnosis) -> html.Markup:
     rows = [
         [name, html.number(times), "yes" if name == found.method else "no"] for name, times in found.compared.items()
     ]
-    note = (
-        "Ratio of the held-out inconsistency to that of noise-corrected moments. The most probable policy is refuted "
-    )
-    note += "above a cut-off, which is 1 if all samples are in its uniform component and larger if fewer are."
+    note = html.words("diagnosis_chosen")
     return html.table(["candidate", "held-out inconsistency, ratio", "taken"], rows, note=note)

@@ -66,14 +66,9 @@ def policy_page(policy: Policy, demonstrations: Sequence[Demonstration], title: 
 
 
 def _lead(policy: Policy, demos: list[Demonstration], learner: str) -> html.Markup:
-    states, actions, _ = stack(demos)
+    n, d = demos[0].states.shape[1], demos[0].actions.shape[1]
     kind = "Locally linear" if hasattr(policy, "fields_") else "Parametric"
-    return html.markup(
-        "{} policy with the {} learner, for {} state and {} action "
-        "columns. The recordings are the demonstrator's policy, projected by unknown constraints; what was learnt is "
-        "an estimate of the unconstrained policy. It should agree with the recordings <i>along the observed motion</i> "
-        "and may differ from them across it."
-    ).format(kind, learner, states.shape[1], actions.shape[1])
+    return html.words("fit_lead", kind=kind, learner=learner, states=n, actions=d)
 
 
 def _summary(policy: Policy, demos: list[Demonstration]) -> html.Markup:
@@ -151,13 +146,10 @@ def _actions(policy: Policy, demos: list[Demonstration]) -> html.Markup:
                 _times(demo), series, names, title=escape(demo.name), time_label=_time_label(demo), row_height=130
             )
         )
-    more = f" The first {len(shown)} of {len(demos)} demonstrations." if len(demos) > len(shown) else ""
     return html.picture(
         "actions",
         panels,
-        "Black is what was observed. Green is the learnt, unconstrained policy; where it differs from black, a "
-        "constraint was active according to it. Dashed blue is green projected onto the observed motion, which should "
-        f"agree with black.{more}",
+        html.words("fit_actions", shown=len(shown), every=len(demos)),
         keys=("observed", "hybrid", "direct"),
         labels={"observed": "observed", "hybrid": "learnt policy", "direct": "along the observed motion"},
     )
@@ -181,14 +173,7 @@ def _errors(policy: Policy, demos: list[Demonstration]) -> html.Markup:
         for index, demo in enumerate(shown)
     ]
     rows.append(cells("all", demos, None if support is None else np.concatenate(support)))
-    note = "Errors are squared, as a share of the motion’s variance: 0 is perfect, 1 no better than a constant. "
-    note += (
-        "Support is 1 at the centres of the data and 0 far from it, where the policy extrapolates. "
-        if support is not None
-        else "These features offer no support of states by the data. "
-    )
-    note += "" if known else "Without the true policy, errors across the observed motion cannot be computed. "
-    note += f"The first {len(shown)} demonstrations are listed." if len(demos) > len(shown) else ""
+    note = html.words("fit_errors", shown=len(shown), every=len(demos), support=support is not None, truth=known)
     return html.table(header, rows, note=note, rules=(len(shown),))
 
 
@@ -201,19 +186,13 @@ def _determined(policy: Policy) -> html.Markup:
     if solution.scores is not None:
         chosen = solution.directions - solution.determined
         panels.append(figures.step_scores(solution.scores, chosen, title="held-out score along the threshold"))
-    share = f"The data determined {solution.determined_share:.1%} of all weight directions."
-    if not panels:
-        return html.paragraph(f"{share} This learner has no threshold to choose.")
-    words = f"{share} "
-    if solution.eigenvalues is not None:
-        words += "Eigenvalues of the first objective, one for each direction of the weights, sorted; the black line is "
-        words += "the median over the models. "
-    if solution.scores is not None:
-        words += (
-            "Every number of undetermined directions was tried on held-out demonstrations, for each model; green dots "
-        )
-        words += "are the chosen ones, and 1 is the best. Undetermined directions minimise the standard risk."
-    return html.picture("determined", panels, words)
+    words = html.words(
+        "fit_determined",
+        share=f"{solution.determined_share:.1%}",
+        eigenvalues=solution.eigenvalues is not None,
+        scores=solution.scores is not None,
+    )
+    return html.picture("determined", panels, words) if panels else html.paragraph(words)
 
 
 def _support(policy: Policy, demos: list[Demonstration]) -> list[Array] | None:

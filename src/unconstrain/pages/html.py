@@ -52,6 +52,12 @@ def markup(source: str) -> Markup:
     return Markup(source)  # noqa: S704 - callers are held to literals by the same rule
 
 
+def words(passage: str, **values: Any) -> Markup:
+    """A passage of ``words.html`` with its values put in."""
+    said: Markup = getattr(_templates().get_template("words.html").module, passage)(**values)
+    return markup(" ").join(said.split())
+
+
 def section(heading: str, *parts: Markup) -> Markup:
     """A heading and what is below it."""
     return _part("section", heading, parts)
