@@ -18,9 +18,9 @@ from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainEr
 from ..base.files import write
 from ..paper import experiments
 from .diagnosing import diagnose
-from .fitting import MODELS, Alpha, check_speed_power, check_writable, default_learner, learn, learner_of, policy_of
+from .fitting import MODELS, alpha_of, check_writable, default_learner, learn, learner_of, policy_of
 from .printing import Group, number, print_table, say_fit
-from .reading import Numbers, complete, options_for_reading, recipe_of, roles_of, said_recipe, stream_of
+from .reading import complete, numbers, options_for_reading, recipe_of, roles_of, said_recipe, stream_of
 
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
 
@@ -69,8 +69,7 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
         ]
         for found in surveys
     ]
-    head = ["demonstration", "samples", "length", "rate", "jitter", "gaps", "missing", "zero actions"]
-    print_table(head, rows)
+    print_table(["demonstration", "samples", "length", "rate", "jitter", "gaps", "missing", "zero actions"], rows)
     for columns in dict.fromkeys(found.columns for found in surveys):
         click.echo(f"columns: {', '.join(columns)}")
     for found in surveys:
@@ -91,7 +90,12 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
 @click.option("--learner", type=click.Choice(LEARNERS), help="Learner; by default robust, or hybrid on much data.")
 @click.option("--variance", type=float, help="Local: σ² of the receptive fields. By default from the data.")
 @click.option("--centres", type=click.IntRange(1), help="RBF: number of kernels, 25 by default.")
-@click.option("--alpha", type=Alpha(), help="Hybrid: weight of the standard risk in choosing the threshold, or auto.")
+@click.option(
+    "--alpha",
+    type=alpha_of,
+    metavar="FLOAT|AUTO",
+    help="Hybrid: weight of the standard risk in choosing the threshold, or auto.",
+)
 @click.option("--softness", type=float, help="Hybrid: soften the split, such as 0.1; for noisy recordings.")
 @click.option(
     "--speed-power",
@@ -131,8 +135,7 @@ def fit(
     paths = uc.readers.expand(files)
     check_writable((output, report), paths)
     learner = learner or default_learner(paths, scheduler, alpha, softness, speed_power)
-    check_speed_power(learner, speed_power)
-    chosen = {"learner": learner_of(learner, alpha, softness), "validation": uc.Folds(folds, hold_out)}
+    chosen = {"learner": learner_of(learner, alpha, softness, speed_power), "validation": uc.Folds(folds, hold_out)}
     fitted = policy_of(model, variance, centres, **chosen)
     stream = stream_of(paths, speed_power, **reading)
     learn(fitted, stream, scheduler)
@@ -151,7 +154,7 @@ def fit(
 @main.command(epilog="\b\nExample:\n  unconstrain score wipe.npz other.csv --plane 0,0.3,1 --json")
 @click.argument("policy", type=click.Path())
 @click.argument("files", nargs=-1, required=True, metavar="FILE...")
-@click.option("--plane", type=Numbers(), help="Normal of the plane that was held, for the constrained error.")
+@click.option("--plane", type=numbers, help="Normal of the plane that was held, for the constrained error.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def score(policy: str, files: Sequence[str], plane: tuple[float, ...] | None, as_json: bool) -> None:
     """Score how well POLICY explains the demonstrations in each FILE.
@@ -180,10 +183,10 @@ def score(policy: str, files: Sequence[str], plane: tuple[float, ...] | None, as
 
 @main.command(epilog="\b\nExample:\n  unconstrain rollout wipe.npz --start 0.1,0,0 --plane 0,0.3,1 -o path.csv")
 @click.argument("policy", type=click.Path())
-@click.option("--start", type=Numbers(), required=True, help="Initial state, one number for each state column.")
+@click.option("--start", type=numbers, required=True, help="Initial state, one number for each state column.")
 @click.option("--steps", type=click.IntRange(1), default=200, show_default=True, help="Number of samples.")
 @click.option("--dt", type=float, default=0.02, show_default=True, help="Seconds between samples.")
-@click.option("--plane", type=Numbers(), help="Normal of a plane to stay on.")
+@click.option("--plane", type=numbers, help="Normal of a plane to stay on.")
 @click.option(
     "-o",
     "--output",
@@ -265,7 +268,7 @@ def reproduce(experiment: str, out: str, **settings: Any) -> None:
 @main.command(epilog="\b\nExample:\n  unconstrain demo --real --download --out wiping")
 @click.option("--real", is_flag=True, help="Learn from recorded wiping of a car rim, leaving one tilt out at a time.")
 @click.option("--download", is_flag=True, help="Fetch those recordings (3 MB) if they are not there.")
-@click.option("--plate", type=Numbers(), help="TILT_X,TILT_Y of a further plate to wipe, degrees.")
+@click.option("--plate", type=numbers, help="TILT_X,TILT_Y of a further plate to wipe, degrees.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the simulation.")
 @click.option(
     "--out", type=click.Path(file_okay=False), default="demo", show_default=True, help="Folder for the report."

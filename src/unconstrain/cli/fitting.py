@@ -18,17 +18,12 @@ MUCH = 200_000_000
 """Bytes of data above which samples are not kept in memory, and the default learner is the hybrid."""
 
 
-class Alpha(click.ParamType):  # type: ignore[type-arg]
+def alpha_of(text: str) -> float | Literal["auto"]:
     """A number, or auto."""
-
-    name = "float|auto"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Turn the text of the option into either."""
-        try:
-            return value if value == "auto" else float(value)
-        except ValueError:
-            self.fail(f"got {value!r}, expected a number or auto.", param, ctx)
+    try:
+        return "auto" if text == "auto" else float(text)
+    except ValueError:
+        raise click.BadParameter(f"got {text!r}, expected a number or auto.") from None
 
 
 def default_learner(
@@ -52,8 +47,10 @@ def default_learner(
     return "hybrid"
 
 
-def learner_of(name: str, alpha: float | Literal["auto"] | None, softness: float | None) -> Any:
+def learner_of(name: str, alpha: float | Literal["auto"] | None, softness: float | None, speed_power: float) -> Any:
     """Make the learner of the options."""
+    if name == "robust" and speed_power:
+        raise SettingError("--speed-power: the robust learner weights by speed itself; give another --learner with it.")
     given = {key: value for key, value in (("alpha", alpha), ("softness", softness)) if value is not None}
     if name != "hybrid":
         if given:
@@ -85,12 +82,6 @@ def policy_of(model: str, variance: float | None, centres: int | None, **chosen:
         return uc.LocallyLinearPolicy(variance, **chosen)
     shape = uc.KMeansRBF(centres or 25) if model == "rbf" else uc.Affine()
     return uc.ParametricPolicy(shape, **chosen)
-
-
-def check_speed_power(learner: str, speed_power: float) -> None:
-    """Refuse to weight samples by their speed twice."""
-    if learner == "robust" and speed_power:
-        raise SettingError("--speed-power: the robust learner weights by speed itself; give another --learner with it.")
 
 
 def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None) -> None:

@@ -15,30 +15,20 @@ import unconstrain as uc
 from ..base.errors import SettingError
 
 
-class Names(click.ParamType):  # type: ignore[type-arg]  # generic in the newest click only
+def names(text: str) -> tuple[str, ...]:
     """Names separated by commas."""
-
-    name = "names"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:
-        """Split at the commas."""
-        return tuple(part.strip() for part in str(value).split(",") if part.strip())
+    return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
-class Numbers(click.ParamType):  # type: ignore[type-arg]
+def numbers(text: str) -> tuple[float, ...]:
     """Finite numbers separated by commas."""
-
-    name = "numbers"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
-        """Split at the commas."""
-        try:
-            numbers = tuple(float(part) for part in str(value).split(","))
-        except ValueError:
-            numbers = ()
-        if not numbers or not all(map(math.isfinite, numbers)):
-            self.fail(f"got {value!r}, expected finite numbers separated by commas, such as 0.1,0,-2.", param, ctx)
-        return numbers
+    try:
+        values = tuple(map(float, text.split(",")))
+    except ValueError:
+        values = ()
+    if not values or not all(map(math.isfinite, values)):
+        raise click.BadParameter(f"got {text!r}, expected finite numbers separated by commas, such as 0.1,0,-2.")
+    return values
 
 
 def options_for_reading(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -46,8 +36,8 @@ def options_for_reading(command: Callable[..., Any]) -> Callable[..., Any]:
     for option in reversed(
         [
             click.argument("files", nargs=-1, required=True, metavar="FILE..."),
-            click.option("--state", type=Names(), help="Columns that make the state, such as x,y,z."),
-            click.option("--action", type=Names(), help="Columns that make the action, such as vx,vy,vz."),
+            click.option("--state", type=names, help="Columns that make the state, such as x,y,z."),
+            click.option("--action", type=names, help="Columns that make the action, such as vx,vy,vz."),
             click.option("--differentiate", is_flag=True, help="Take the velocity of the state as the action."),
             click.option(
                 "--by",

@@ -39,9 +39,7 @@ def stepper(model: Model, weights: Array, n: int) -> Step:
     form = model.fields.formula(model.features, weights)
     if form is None:
         return _without_formula(model, weights[0], n)
-    if form.exponents is None:
-        return _affine(form)
-    return _blended_maps(form, form.exponents) if form.is_affine else _blended_constants(form, form.exponents)
+    return _affine(form) if form.exponents is None else _blended(form, form.exponents)
 
 
 def _without_formula(model: Model, weights: Array, n: int) -> Step:
@@ -69,29 +67,11 @@ def _affine(form: ClosedForm) -> Step:
     return step
 
 
-def _blended_constants(form: ClosedForm, exponents: Array) -> Step:
+def _blended(form: ClosedForm, exponents: Array) -> Step:
     n, d, models = form.sizes
-    relative, exp, dot, divide = _relative_to(form.origin), np.exp, np.dot, np.divide
-    slopes, constants = np.ascontiguousarray(exponents), _with_total(form.maps[:, :, 0])
-    buffers = _PerThread(n, models, d + 1)
-
-    def step(state: ArrayLike, out: Array | None = None) -> Array:
-        z, head, e, sums = buffers.own
-        relative(state, head)
-        dot(slopes, z, e)
-        e -= e[e.argmax()]
-        exp(e, e)
-        dot(e, constants, sums)
-        return divide(sums[:d], sums[d:], out)
-
-    return step
-
-
-def _blended_maps(form: ClosedForm, exponents: Array) -> Step:
-    n, d, models = form.sizes
-    relative, exp, dot, divide = _relative_to(form.origin), np.exp, np.dot, np.divide
+    relative, exp, dot, divide, affine = _relative_to(form.origin), np.exp, np.dot, np.divide, form.is_affine
     slopes, maps = np.ascontiguousarray(exponents), _with_total(form.maps.reshape(models, -1))
-    buffers = _PerThread(n, models, d * (n + 1) + 1)
+    buffers = _PerThread(n, models, maps.shape[1])
 
     def step(state: ArrayLike, out: Array | None = None) -> Array:
         z, head, e, sums = buffers.own
@@ -100,7 +80,8 @@ def _blended_maps(form: ClosedForm, exponents: Array) -> Step:
         e -= e[e.argmax()]
         exp(e, e)
         dot(e, maps, sums)
-        return divide(dot(sums[:-1].reshape(d, n + 1), z), sums[-1:], out)
+        blend = dot(sums[:-1].reshape(d, n + 1), z) if affine else sums[:-1]
+        return divide(blend, sums[-1:], out)
 
     return step
 

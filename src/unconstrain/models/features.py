@@ -86,7 +86,39 @@ class Affine(Shown):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class NormalisedRBF(Shown):
+class Kernels(Shown):
+    """Isotropic Gaussian kernels ``K(x − c_m) = exp(−‖x − c_m‖² / 2σ²)``.
+
+    Parameters
+    ----------
+    centres : array_like, shape (M, n)
+    variance : float
+        The kernels' σ², in squared units of the state.
+
+    Raises
+    ------
+    InvalidDataError, SettingError
+        If the centres are no finite table or the variance is not positive.
+    """
+
+    centres: Array
+    variance: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centres", as_matrix(self.centres, "centres"))
+        check_at_least("variance", self.variance, SMALLEST_VARIANCE, strict=True)
+
+    def support(self, states: Array) -> Array:
+        """Kernel of the nearest centre, from 1 at it to 0 far from all, shape (N,)."""
+        distances = squared_distances(states, self.centres)
+        return gaussian(namespace(distances).min(distances, axis=1), self.variance)
+
+    def _summary(self) -> tuple[str, ...]:
+        centres, n = self.centres.shape
+        return f"{counted(centres, 'centre')} in {counted(n, 'dimension')}", f"variance={self.variance:.4g}"
+
+
+class NormalisedRBF(Kernels):
     """Gaussian kernels normalised to sum to one at each state (section III-C).
 
     ``b_i(x) = K(x − c_i) / Σ_j K(x − c_j)`` with
@@ -104,13 +136,6 @@ class NormalisedRBF(Shown):
     InvalidDataError, SettingError
         If the centres are no finite table or the variance is not positive.
     """
-
-    centres: Array
-    variance: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "centres", as_matrix(self.centres, "centres"))
-        check_at_least("variance", self.variance, SMALLEST_VARIANCE, strict=True)
 
     def __call__(self, states: Array) -> Array:
         """Compute features (N, p) of states (N, n); each row sums to one."""
@@ -134,11 +159,6 @@ class NormalisedRBF(Shown):
         if np.prod([len(each) for each in ticks], dtype=float) != len(self.centres):
             return []
         return ticks if np.array_equal(_grid(ticks), self.centres) else []
-
-    def support(self, states: Array) -> Array:
-        """Kernel of the nearest centre, from 1 at it to 0 far from all, shape (N,)."""
-        distances = squared_distances(states, self.centres)
-        return gaussian(namespace(distances).min(distances, axis=1), self.variance)
 
     def closed_form(self, weights: Array) -> ClosedForm:
         """Closed form of the policy ``W φ(x)`` with weights (d, p)."""
@@ -252,10 +272,6 @@ class NormalisedRBF(Shown):
         spacing = np.mean(np.sqrt(distances.min(axis=1))) if count > 1 else 1.0
         centres = np.clip(middle + unit * found, table.min(axis=0), table.max(axis=0))  # rounding may put them outside
         return cls(centres, float((width * spacing * unit) ** 2))
-
-    def _summary(self) -> tuple[str, ...]:
-        centres, n = self.centres.shape
-        return f"{counted(centres, 'centre')} in {counted(n, 'dimension')}", f"variance={self.variance:.4g}"
 
 
 @dataclass(frozen=True)

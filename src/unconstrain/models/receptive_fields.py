@@ -7,17 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import SMALLEST_VARIANCE, Array, as_matrix, beside, check_at_least, is_foreign, namespace
-from ..base.display import Shown, counted
 from ..base.errors import SettingError
-from .features import Affine, FeatureMap, gaussian, shares, squared_distances
+from .features import Affine, FeatureMap, Kernels, gaussian, shares, squared_distances
 from .formula import ClosedForm, exponents
 
 MOST_FIELDS = 100
 """Most fields that :func:`choose_variance` accepts before it widens them."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class ReceptiveFields(Shown):
+class ReceptiveFields(Kernels):
     """Isotropic Gaussian fields, ``w_m(x) = exp(−‖x − c_m‖² / 2σ²)``.
 
     Parameters
@@ -27,13 +25,6 @@ class ReceptiveFields(Shown):
         The fields' σ², in squared units of the state.
     """
 
-    centres: Array
-    variance: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "centres", as_matrix(self.centres, "centres"))
-        check_at_least("variance", self.variance, SMALLEST_VARIANCE, strict=True)
-
     def weights(self, states: Array) -> Array:
         """Membership of each state in each field, the w of eq. 14, shape (N, M)."""
         return gaussian(squared_distances(states, self.centres), self.variance)
@@ -41,11 +32,6 @@ class ReceptiveFields(Shown):
     def shares(self, states: Array) -> Array:
         """Memberships normalised over the fields, shape (N, M)."""
         return shares(states, self.centres, self.variance)
-
-    def support(self, states: Array) -> Array:
-        """Membership in the nearest field, from 1 at a centre to 0 far from all, shape (N,)."""
-        distances = squared_distances(states, self.centres)
-        return gaussian(namespace(distances).min(distances, axis=1), self.variance)
 
     def blend(self, features: Array, weights: Array, states: Array) -> Array:
         """Predictions of models with weights (M, d, p), averaged by their shares, shape (N, d)."""
@@ -73,10 +59,6 @@ class ReceptiveFields(Shown):
         maps = np.concatenate([weights[..., :-1] / scale, weights[..., -1:]], axis=2)
         reach = np.abs(self.centres - origin).max(axis=0) + np.sqrt(self.variance)
         return ClosedForm(origin, maps, exponents(self.centres, self.variance, origin), reach)
-
-    def _summary(self) -> tuple[str, ...]:
-        fields, n = self.centres.shape
-        return f"{counted(fields, 'centre')} in {counted(n, 'dimension')}", f"variance={self.variance:.4g}"
 
 
 @dataclass(frozen=True)

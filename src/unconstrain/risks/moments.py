@@ -152,18 +152,9 @@ def gather(features: Array, actions: Array, weights: Array | None = None, at_res
     Moments
     """
     counts = namespace(features).ones_like(features[:, :1]) if weights is None else weights
-    block = features, actions, counts
-    return gather_blocks([block], counts.shape[1], actions.shape[1], features.shape[1], at_rest)
-
-
-def gather_blocks(
-    blocks: Iterable[tuple[Array, Array, Array]], models: int, actions: int, features: int, at_rest: float = 0.0
-) -> Moments:
-    """Sum over blocks of samples, each (features, actions, weights) as in :func:`gather`."""
-    sums = Sums(models, actions, features, at_rest)
-    for block in blocks:
-        for rows in sums.pieces(block[0]):
-            sums.add(*(part[rows, :] for part in block))
+    sums = Sums(counts.shape[1], actions.shape[1], features.shape[1], at_rest)
+    for rows in sums.pieces(features):
+        sums.add(*(part[rows, :] for part in (features, actions, counts)))
     return sums.moments
 
 

@@ -52,9 +52,7 @@ def movements(
     axis = {"gridcolor": RULE, "backgroundcolor": "white", "color": INK, "title_font_size": 13, "tickfont_size": 11}
     made.update_layout(
         scene={
-            "xaxis": axis | {"title_text": labels[0]},
-            "yaxis": axis | {"title_text": labels[1]},
-            "zaxis": axis | {"title_text": labels[2]},
+            **{f"{name}axis": axis | {"title_text": label} for name, label in zip("xyz", labels, strict=True)},
             "aspectmode": "data",
             "camera": {"eye": {"x": 1.35, "y": -1.5, "z": 0.9}, "center": {"x": 0, "y": 0, "z": -0.12}},
         },

@@ -13,6 +13,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...base.arrays import Array, as_matrix, as_vector, check_at_least
 from ...base.errors import InvalidDataError, SettingError
@@ -46,6 +47,9 @@ class _Piece(NamedTuple):
     times: Array
     states: Array
     actions: Array | None
+
+    def at(self, rows: slice | NDArray[np.bool_]) -> _Piece:
+        return _Piece(self.times[rows], self.states[rows], None if self.actions is None else self.actions[rows])
 
 
 def prepare(recordings: Recording | Sequence[Recording], recipe: Recipe | None = None) -> list[Demonstration]:
@@ -277,6 +281,7 @@ def _finite(recording: Recording, names: Sequence[str]) -> Array:
 
 def _without_repeats(piece: _Piece, name: str) -> tuple[_Piece, list[str]]:
     times = as_vector(piece.times, f"times of '{name}'", len(piece.states))
+    piece = piece._replace(times=times)
     intervals = np.diff(times)
     if (intervals < 0).any():
         row = int(np.argmax(intervals < 0)) + 1
@@ -286,10 +291,8 @@ def _without_repeats(piece: _Piece, name: str) -> tuple[_Piece, list[str]]:
         )
     fresh = np.append(True, intervals > 0)
     if fresh.all():
-        return piece._replace(times=times), []
-    return _Piece(times[fresh], piece.states[fresh], None if piece.actions is None else piece.actions[fresh]), [
-        f"{(~fresh).sum()} rows repeat the time stamp of the row before and were left out."
-    ]
+        return piece, []
+    return piece.at(fresh), [f"{(~fresh).sum()} rows repeat the time stamp of the row before and were left out."]
 
 
 def _mend(whole: _Piece, recipe: Recipe, name: str) -> tuple[_Piece, list[str]]:
@@ -337,11 +340,7 @@ def _about_gaps(gaps: Sequence[Gap]) -> str:
 def _split(piece: _Piece, recipe: Recipe) -> list[_Piece]:
     cuts = np.flatnonzero(np.diff(piece.times) > _longest(piece.times, recipe.max_gap_s)) + 1
     bounds = [0, *cuts.tolist(), len(piece.times)]
-    return [_rows(piece, slice(start, stop)) for start, stop in pairwise(bounds)]
-
-
-def _rows(piece: _Piece, rows: slice) -> _Piece:
-    return _Piece(piece.times[rows], piece.states[rows], None if piece.actions is None else piece.actions[rows])
+    return [piece.at(slice(start, stop)) for start, stop in pairwise(bounds)]
 
 
 def _resampled(piece: _Piece, rate: float) -> _Piece:
