@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from abc import abstractmethod
-from typing import Any, NamedTuple
+from typing import Any
 
 from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted
@@ -52,18 +52,18 @@ class Deployable:
             If the state is not of shape (n,).
         """
         known = self.__dict__
-        prepared = known.get("_prepared")
-        if prepared is None or prepared.solution is not known.get("solution_"):
-            prepared = self._prepare_step(known)
-        return prepared.step(x, out)
+        solution, step = known.get("_prepared") or (None, None)
+        if step is None or solution is not known.get("solution_"):
+            step = self._prepare_step(known)
+        return step(x, out)
 
-    def _prepare_step(self, known: dict[str, Any]) -> _Prepared:
+    def _prepare_step(self, known: dict[str, Any]) -> Step:
         check_is_fitted(self, "solution_")
         # What another thread has learnt meanwhile is prepared at the next step: the solution is then another.
         solution = known["solution_"]
         step = stepper(known["training_"].model, solution.weights, known["n_features_in_"])
-        prepared = known["_prepared"] = _Prepared(solution, step)
-        return prepared
+        known["_prepared"] = solution, step
+        return step
 
     def closed_form(self) -> ClosedForm:
         """The policy as one formula: what is exported, and what other targets can be made from.
@@ -97,10 +97,3 @@ class Deployable:
         """Leave out buffers, which are made again where they are needed."""
         state: Any = super().__getstate__()
         return {name: value for name, value in state.items() if name != "_prepared"}
-
-
-class _Prepared(NamedTuple):
-    """The step of a solution."""
-
-    solution: Any
-    step: Step

@@ -70,7 +70,8 @@ def _affine(form: ClosedForm) -> Step:
 def _blended(form: ClosedForm, exponents: Array) -> Step:
     n, d, models = form.sizes
     relative, exp, dot, divide, affine = _relative_to(form.origin), np.exp, np.dot, np.divide, form.is_affine
-    slopes, maps = np.ascontiguousarray(exponents), _with_total(form.maps.reshape(models, -1))
+    # A column of ones, so that one product gives the blend and the sum of the shares.
+    slopes, maps = np.ascontiguousarray(exponents), np.column_stack([form.maps.reshape(models, -1), np.ones(models)])
     buffers = _PerThread(n, models, maps.shape[1])
 
     def step(state: ArrayLike, out: Array | None = None) -> Array:
@@ -99,11 +100,6 @@ def _relative_to(origin: Array) -> Callable[[ArrayLike, Array], None]:
         raise InvalidDataError(f"step: got a state of shape {np.shape(state)}, expected {n} numbers.")
 
     return relative
-
-
-def _with_total(values: Array) -> Array:
-    """A column of ones beside them, so that one product gives the blend and the sum of the shares."""
-    return np.column_stack([values, np.ones(len(values))])
 
 
 class _PerThread(local):

@@ -18,12 +18,11 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InvalidDataError, SettingError
-from ..constraints import constraint_matrices
+from ..constraints import Constraint, constraint_matrices
 from ..recordings import Demonstration, stack
 from ..risks import action_projection, null_space_projection, project
 
 PolicyLike = Callable[[Array], Array]
-ConstraintLike = Callable[[Array, Array], Array]
 Demonstrations = Demonstration | Sequence[Demonstration]
 
 
@@ -49,7 +48,7 @@ def upe(policy: PolicyLike, demonstrations: Demonstrations) -> float:
     return _squares(_true_policy(demos) - predicted)
 
 
-def cpe(policy: PolicyLike, demonstrations: Demonstrations, constraint: ConstraintLike | None = None) -> float:
+def cpe(policy: PolicyLike, demonstrations: Demonstrations, constraint: Constraint | None = None) -> float:
     """Constrained policy error, ``Σ ‖N (π − π̃)‖² = Σ ‖u − N π̃‖²``.
 
     Parameters
@@ -83,7 +82,7 @@ def nupe(policy: PolicyLike, demonstrations: Demonstrations) -> float:
     return upe(policy, demonstrations) / _norm(demonstrations)
 
 
-def ncpe(policy: PolicyLike, demonstrations: Demonstrations, constraint: ConstraintLike | None = None) -> float:
+def ncpe(policy: PolicyLike, demonstrations: Demonstrations, constraint: Constraint | None = None) -> float:
     """Normalised constrained policy error; see :func:`cpe`."""
     return cpe(policy, demonstrations, constraint) / _norm(demonstrations)
 
@@ -131,7 +130,7 @@ def _true_policy(demos: list[Demonstration]) -> Array:
     return np.concatenate([demo.truth.policy for demo in demos if demo.truth is not None])
 
 
-def _projections(demo: Demonstration, constraint: ConstraintLike | None) -> Array:
+def _projections(demo: Demonstration, constraint: Constraint | None) -> Array:
     if constraint is not None:
         return null_space_projection(
             constraint_matrices(constraint, demo.states, demo.times, demo.actions.shape[1], demo.name)
@@ -143,7 +142,7 @@ def _projections(demo: Demonstration, constraint: ConstraintLike | None) -> Arra
     return demo.truth.projections
 
 
-def _constrained(demos: list[Demonstration], constraint: ConstraintLike | None) -> Array:
+def _constrained(demos: list[Demonstration], constraint: Constraint | None) -> Array:
     if constraint is None and all(demo.truth is not None for demo in demos):
         # N π rather than the observed u: noise on the actions is no error of the policy.
         return np.concatenate([project(d.truth.projections, d.truth.policy) for d in demos if d.truth is not None])

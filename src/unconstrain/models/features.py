@@ -87,19 +87,7 @@ class Affine(Shown):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Kernels(Shown):
-    """Isotropic Gaussian kernels ``K(x − c_m) = exp(−‖x − c_m‖² / 2σ²)``.
-
-    Parameters
-    ----------
-    centres : array_like, shape (M, n)
-    variance : float
-        The kernels' σ², in squared units of the state.
-
-    Raises
-    ------
-    InvalidDataError, SettingError
-        If the centres are no finite table or the variance is not positive.
-    """
+    """Isotropic Gaussian kernels ``exp(−‖x − c‖² / 2σ²)`` of one variance σ² about some centres."""
 
     centres: Array
     variance: float

@@ -10,11 +10,9 @@ from numpy.typing import ArrayLike
 
 from ..base.arrays import LARGEST, Array, as_table, check_at_least
 from ..base.errors import InvalidDataError, SettingError
-from ..constraints import constraint_matrices
+from ..constraints import Constraint, constraint_matrices
 from ..recordings import Demonstration, Truth
 from ..risks import null_space_projection, project
-
-ConstraintLike = Callable[[Array, Array], Array]
 
 
 @overload
@@ -23,7 +21,7 @@ def rollout(
     start: Sequence[float] | np.ndarray[tuple[int], np.dtype[np.float64]],
     steps: int = ...,
     dt: float = ...,
-    constraint: ConstraintLike | None = ...,
+    constraint: Constraint | None = ...,
     *,
     name: str = ...,
 ) -> Demonstration: ...
@@ -35,7 +33,7 @@ def rollout(
     start: Sequence[Sequence[float]] | np.ndarray[tuple[int, int], np.dtype[np.float64]],
     steps: int = ...,
     dt: float = ...,
-    constraint: ConstraintLike | Sequence[ConstraintLike] | None = ...,
+    constraint: Constraint | Sequence[Constraint] | None = ...,
     *,
     name: str = ...,
 ) -> list[Demonstration]: ...
@@ -46,7 +44,7 @@ def rollout(
     start: ArrayLike,
     steps: int = 200,
     dt: float = 0.02,
-    constraint: ConstraintLike | Sequence[ConstraintLike] | None = None,
+    constraint: Constraint | Sequence[Constraint] | None = None,
     *,
     name: str = "rollout",
 ) -> Demonstration | list[Demonstration]:
@@ -109,7 +107,7 @@ def rollout(
     return demos[0] if single else demos
 
 
-def _projections(constraint: ConstraintLike | Sequence[ConstraintLike] | None, states: Array, time: float) -> Array:
+def _projections(constraint: Constraint | Sequence[Constraint] | None, states: Array, time: float) -> Array:
     """What the constraint, or that of each run, leaves free, shape (K, n, n)."""
     runs, n = states.shape
     if constraint is None:

@@ -185,7 +185,8 @@ class Robust(_Maximising):
             for name, one in learnt.items()
         }
         informed = 1.0 - float(mixture[-1])
-        refuted = _refuted(*gaps[likely.name], INCONSISTENCY_RATIO ** min(1.0, 2.0 * informed))
+        gap, error = gaps[likely.name]
+        refuted = bool(gap > max(np.log(INCONSISTENCY_RATIO ** min(1.0, 2.0 * informed)), error))
         hidden = _more_than(SPHERE_HIDDEN_BY_NOISE, likely.variance, samples)
         usable = informed > LEAST_INFORMATIVE and not refuted and not hidden
         return likely if usable else consistent, {
@@ -204,11 +205,6 @@ def _consistent(samples: Samples, training: Training) -> tuple[Candidate, Candid
     exact = 1.0 - _explained(samples, corrected.held_out) < NEARLY_EXACT
     noisy = _more_than(NOISE_TO_CORRECT, corrected.variance, samples)
     return corrected, corrected if noisy or exact else softened(samples, training.filled)
-
-
-def _refuted(gap: float, error: float, factor: float) -> bool:
-    """Whether a log-ratio of inconsistencies exceeds that of a cut-off and its own standard error."""
-    return bool(gap > max(np.log(factor), error))
 
 
 def compared(samples: Samples, one: Array, other: Array, variance: float) -> tuple[float, float]:

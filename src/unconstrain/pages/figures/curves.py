@@ -64,19 +64,16 @@ def over_time(
     return made
 
 
-def spectra(eigenvalues: Array, *, title: str = "", label: str = "λ / largest λ", height: int = 380) -> Any:
+def spectra(eigenvalues: Array, *, title: str = "") -> Any:
     """Eigenvalues of each field, largest first, as shares of its largest, on a logarithmic axis.
 
     Parameters
     ----------
     eigenvalues : ndarray, shape (M, P)
         Ascending.
-    title, label : str
-        Of the figure and its vertical axis.
-    height : int
-        Pixels.
+    title : str
     """
-    made = figure(title, "weight direction, best determined first", label, height=height)
+    made = figure(title, "weight direction, best determined first", "λ / largest λ", height=380)
     largest = np.maximum(eigenvalues[:, -1:], 1e-300)
     shares = np.maximum(eigenvalues / largest, 1e-16)[:, ::-1]
     order = np.arange(1, shares.shape[1] + 1)
@@ -98,7 +95,7 @@ def spectra(eigenvalues: Array, *, title: str = "", label: str = "λ / largest �
     return made
 
 
-def step_scores(scores: Array, chosen: NDArray[np.intp], *, title: str = "", height: int = 380) -> Any:
+def step_scores(scores: Array, chosen: NDArray[np.intp], *, title: str = "") -> Any:
     """Held-out score against how many directions are left undetermined.
 
     Parameters
@@ -108,10 +105,8 @@ def step_scores(scores: Array, chosen: NDArray[np.intp], *, title: str = "", hei
     chosen : ndarray of int, shape (M,)
         What was chosen in each model.
     title : str
-    height : int
-        Pixels.
     """
-    made = figure(title, "undetermined weight directions", "held-out score / best", height=height)
+    made = figure(title, "undetermined weight directions", "held-out score / best", height=380)
     scores = np.where(np.isfinite(scores) & (scores > 0), scores, np.nan)
     for index, score in enumerate(scores):
         if np.isnan(score).all():

@@ -74,7 +74,6 @@ def known_map(
     texts: Sequence[str] = (),
     directions: Array | None = None,
     top: float = 0.0,
-    height: int = 520,
 ) -> Any:
     """Points coloured by how little is known there, with some of them marked and numbered.
 
@@ -95,10 +94,8 @@ def known_map(
         Drawn through the marked points as lines, the longest as long as an eighth of the picture.
     top : float
         Colours end there, or at the largest value if that is larger.
-    height : int
-        Pixels.
     """
-    made = figure("", *labels, height=height)
+    made = figure("", *labels, height=520)
     order = np.argsort(values, kind="stable")  # what is known least lies on top
     bar = {"title": {"text": scale, "side": "right"}, "thickness": 14, "outlinewidth": 0, "tickformat": ".2~g"}
     bar |= {"len": 0.92, "y": 0.0, "yanchor": "bottom"}

@@ -17,7 +17,6 @@ def movements(
     plates: Mapping[str, Array] | None = None,
     *,
     labels: tuple[str, str, str] = ("x (m)", "y (m)", "z (m)"),
-    height: int = 520,
 ) -> Any:
     """Movements in space, and the plates they were made on.
 
@@ -29,14 +28,12 @@ def movements(
         Name of a track to the corners (4, 3) of its plate, going round; drawn translucent in the same colour.
     labels : tuple of str
         Of the axes, with their unit.
-    height : int
-        Pixels.
 
     Returns
     -------
     plotly.graph_objects.Figure
     """
-    made = figure(height=height)
+    made = figure(height=520)
     keys = list(dict.fromkeys(key for key, _, _ in tracks))
     others = [key for key in keys if key not in COLOURS]
     colours = {key: COLOURS.get(key) or PALETTE[others.index(key) % len(PALETTE)] for key in keys}

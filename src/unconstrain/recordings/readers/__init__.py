@@ -69,8 +69,8 @@ def read_blocks(
         raise SettingError(f"got {group!r} for both group and time, expected two different columns.")
     file = Path(path)
     known = _format(file)
-    by_rows = None if whole else known.blocks
-    yield from (by_rows or known.read)(file, group=group, time=time)
+    read = known.read if whole or known.blocks is None else known.blocks
+    yield from read(file, group, time)
 
 
 def expand(paths: PathLike | Iterable[PathLike]) -> list[Path]:

@@ -24,17 +24,8 @@ _SHORT = {"states": "x", "actions": "u"}
 _ROLES = {"groups": "group", "times": "time"}
 
 
-def read_hdf5(path: Path, *, group: str | None = None, time: str | None = None) -> Iterator[Recording]:
-    """Read one file whole; see :class:`~.table.ReadFile`."""
-    return _recordings(path, group, time, None)
-
-
-def read_hdf5_blocks(path: Path, *, group: str | None = None, time: str | None = None) -> Iterator[Recording]:
-    """Go through one file by some rows at a time."""
-    return _recordings(path, group, time, BLOCK_ROWS)
-
-
-def _recordings(path: Path, group: str | None, time: str | None, rows: int | None) -> Iterator[Recording]:
+def read_hdf5(path: Path, group: str | None, time: str | None, rows: int | None = None) -> Iterator[Recording]:
+    """Read one file, whole or by so many rows at a time; see :class:`~.table.ReadFile`."""
     h5py = require_extra("h5py", "data")
     try:
         file = h5py.File(path, "r")
@@ -99,6 +90,11 @@ def _columns(title: str, values: Array) -> dict[str, Array]:
 
 def _text(value: Any) -> str:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+
+def read_hdf5_blocks(path: Path, group: str | None, time: str | None) -> Iterator[Recording]:
+    """Go through one file by some rows at a time."""
+    return read_hdf5(path, group, time, BLOCK_ROWS)
 
 
 FORMAT = Format((".h5", ".hdf5"), lambda head: head.startswith(b"\x89HDF\r\n\x1a\n"), read_hdf5, read_hdf5_blocks)

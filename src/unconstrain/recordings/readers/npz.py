@@ -20,26 +20,8 @@ Contents = dict[str, NDArray[np.generic]]
 _EXPECTED = "Expected a NumPy archive, as from numpy.savez(path, states=..., actions=..., times=..., groups=...)"
 
 
-def read_npz(path: Path, *, group: str | None = None, time: str | None = None) -> list[Recording]:
-    """Read one archive.
-
-    Parameters
-    ----------
-    path : Path
-    group, time : str, optional
-        What the arrays are called that tell the demonstrations apart and hold
-        the time stamps, by default ``groups`` and ``times``; these may be absent.
-
-    Returns
-    -------
-    list of Recording
-        One for each group, called as the group; without groups one, called as the file.
-
-    Raises
-    ------
-    ReadError
-        If it is no such archive; the message says what is in there.
-    """
+def read_npz(path: Path, group: str | None, time: str | None) -> list[Recording]:
+    """Read one archive; see :class:`~.table.ReadFile`. Errors say what is in there."""
     contents = _load(path)
     _check_keys(path, contents, {"states", "actions", *filter(None, (group, time))}, {"times", "groups"})
     states, actions = (_numbers(path, contents, key, 2) for key in ("states", "actions"))

@@ -17,13 +17,13 @@ from ..demonstration import Recording
 from .table import UNITS, Format, find_roles, listed, seconds, split_by_group, unique_names
 
 
-def read_parquet(path: Path, *, group: str | None = None, time: str | None = None) -> list[Recording]:
+def read_parquet(path: Path, group: str | None, time: str | None) -> list[Recording]:
     """Read one file whole; see :class:`~.table.ReadFile`."""
     with _opened(path) as file:
         return _recordings(_checked(path, file.read), path, group, time)
 
 
-def read_parquet_blocks(path: Path, *, group: str | None = None, time: str | None = None) -> Iterator[Recording]:
+def read_parquet_blocks(path: Path, group: str | None, time: str | None) -> Iterator[Recording]:
     """Go through one file by some rows at a time."""
     with _opened(path) as file:
         batches = file.iter_batches(batch_size=BLOCK_ROWS, use_threads=False)

@@ -29,14 +29,15 @@ _UNIT_IN_NAME = re.compile(r"[_ \[(](s|ms|us|ns)[\])]?$", re.IGNORECASE)
 class ReadFile(Protocol):
     """What a format must be able to do."""
 
-    def __call__(self, path: Path, *, group: str | None = None, time: str | None = None) -> Iterable[Recording]:
+    def __call__(self, path: Path, group: str | None, time: str | None, /) -> Iterable[Recording]:
         """Read one file into its recordings; of blocks, those that are called the same are one recording.
 
         Parameters
         ----------
         path : Path
         group, time : str, optional
-            Columns that tell the demonstrations apart and hold the time stamps, where their names do not say so.
+            Columns (or arrays) that tell the demonstrations apart and hold the time stamps, where their names do not
+            say so. Without groups the file is one demonstration, called as the file.
 
         Raises
         ------

@@ -43,29 +43,8 @@ class _Block(NamedTuple):
     words: dict[int, tuple[int, str]]
 
 
-def read_text(path: Path, *, group: str | None = None, time: str | None = None) -> list[Recording]:
-    """Read one table.
-
-    Parameters
-    ----------
-    path : Path
-    group : str, optional
-        Column that names the demonstration of each row; its cells may be words or
-        numbers. By default the first column called as in :data:`~unconstrain.recordings.readers.table.GROUP_NAMES`;
-        without one the file is one demonstration, called as the file.
-    time : str, optional
-        Column of time stamps. By default the first one called as in
-        :data:`~.table.TIME_NAME`; see :func:`~.table.seconds` for units.
-
-    Returns
-    -------
-    list of Recording
-
-    Raises
-    ------
-    ReadError
-        If it is no such table; the message names the file, the line and the column.
-    """
+def read_text(path: Path, group: str | None, time: str | None) -> list[Recording]:
+    """Read one table; see :class:`~.table.ReadFile`. Errors name the line and the column too."""
     try:
         with path.open(encoding="utf-8-sig") as file:
             return _read_table(file, path, group, time)
