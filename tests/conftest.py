@@ -37,6 +37,14 @@ LEARNERS = {
     "hybrid_soft": uc.Hybrid(softness=0.1, threshold=0.0),
 }
 
+ROBUST = {
+    "robust": uc.Robust(),
+    "likelihood": uc.Likelihood(),
+    "noise_corrected": uc.NoiseCorrected(),
+    "segments": uc.Segments(),
+}
+"""Learners that look at the samples, the default first."""
+
 POLICIES = {
     "affine": lambda learner: uc.ParametricPolicy(uc.Affine(), learner),
     "grid": lambda learner: uc.ParametricPolicy(uc.NormalisedRBF.grid(-1, 1, 3), learner),

@@ -8,6 +8,7 @@ from sklearn.base import clone
 import unconstrain as uc
 from samples import draw
 from unconstrain.base.errors import InvalidDataError, SettingError
+from unconstrain.training import Batch, FirstLook, are_typical
 
 DATA = draw(samples=120, groups=6)
 POLICIES = {
@@ -168,3 +169,30 @@ def test_what_has_no_learn_is_refused_before_any_work():
         uc.ParametricPolicy(learner="hybird").fit(DATA.states, DATA.actions)
     with pytest.raises(InvalidDataError, match="no part"):
         uc.ParametricPolicy().fit_parts([], sum_of)
+
+
+class TestWhenAStreamIsTypical:
+    """Batches along a straight movement, or all over the place."""
+
+    @staticmethod
+    def looks(states, size):
+        return [
+            FirstLook.at(Batch(states[at : at + size], states[at : at + size])) for at in range(0, len(states), size)
+        ]
+
+    def test_one_good_batch_is_enough_after_any_number_of_small_ones(self):
+        states = np.random.default_rng(0).normal(size=(100, 2))
+        assert are_typical(self.looks(states, 100))
+        assert not are_typical(self.looks(states[:29], 29))
+        assert are_typical([*self.looks(states[:3], 1), *self.looks(states[3:], 97)])
+
+    def test_samples_one_by_one_are_once_their_spread_has_settled(self):
+        scattered = np.random.default_rng(0).normal(size=(60, 2))
+        moving = np.column_stack([np.arange(999.0), np.zeros(999)])
+        assert are_typical(self.looks(scattered, 1))
+        assert not are_typical(self.looks(scattered[:20], 1))
+        assert not are_typical(self.looks(moving, 9))
+
+    def test_nothing_waits_for_ever(self):
+        assert are_typical(self.looks(np.column_stack([np.arange(1000.0), np.zeros(1000)]), 10))
+        assert not are_typical([None, None])

@@ -1,5 +1,8 @@
 """What must hold whatever the learner and whatever the policy."""
 
+from functools import cache
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,10 +12,59 @@ from sklearn.base import clone
 
 import naive
 import unconstrain as uc
+from conftest import LEARNERS, POLICIES, ROBUST
 from samples import draw, rotation, seen
 from unconstrain.risks import FoldedMoments, Moments, gather
 from unconstrain.risks.objectives import inconsistency, standard_risk
 from unconstrain.risks.quadratic import lexicographic_path
+
+EVERY = ROBUST | LEARNERS
+
+
+@pytest.fixture(params=EVERY.values(), ids=EVERY)
+def learner(request):
+    """Each learner in turn, the default first; those of the robust ones look at samples."""
+    return request.param
+
+
+@pytest.fixture(params=product(EVERY, POLICIES), ids="-".join)
+def combination(request):
+    """Names of each learner and policy in turn."""
+    return request.param
+
+
+@pytest.fixture
+def policy(combination):
+    """Each policy with each learner, not fitted."""
+    name, kind = combination
+    return POLICIES[kind](EVERY[name])
+
+
+@cache
+def learnt(name, kind, grouped=False):
+    """A policy fitted to the samples that are the same everywhere here; not to be changed."""
+    data = draw()
+    return POLICIES[kind](EVERY[name]).fit(data.states, data.actions, groups=data.groups if grouped else None)
+
+
+@pytest.fixture
+def plain(combination):
+    """The same, fitted without groups."""
+    return learnt(*combination)
+
+
+@pytest.fixture
+def grouped(combination):
+    """The same, fitted with groups."""
+    return learnt(*combination, grouped=True)
+
+
+FROM_SUMS = pytest.mark.parametrize("combination", list(product(LEARNERS, POLICIES)), ids="-".join)
+"""Runs over learners that look at moments alone."""
+
+FROM_SAMPLES = pytest.mark.parametrize("combination", list(product(ROBUST, POLICIES)), ids="-".join)
+"""Runs over learners that look at samples."""
+
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -70,6 +122,7 @@ def test_moments_of_batches_add_up_to_moments_of_all(policy_of, data):
     assert_same_moments(halves[1] + halves[0], clone(policy).fit(data.states, data.actions).moments_)
 
 
+@FROM_SUMS
 def test_taking_a_fold_away_is_fitting_without_it(policy, data):
     policy = placed(policy, data)
     out = data.groups == 2
@@ -237,16 +290,14 @@ def test_rotating_the_actions_rotates_the_policy(policy):
 
 
 @pytest.mark.parametrize("factor", [-1.0, 0.1, 1e-8, 1e8])
-def test_scaling_the_actions_scales_the_policy(policy, data, factor):
-    plain = clone(policy).fit(data.states, data.actions).predict(data.states)
+def test_scaling_the_actions_scales_the_policy(policy, plain, data, factor):
     scaled = clone(policy).fit(data.states, factor * data.actions).predict(data.states)
-    assert_same(scaled, factor * plain)
+    assert_same(scaled, factor * plain.predict(data.states))
 
 
-def test_scaling_all_weights_changes_nothing(policy, data):
-    plain = clone(policy).fit(data.states, data.actions).predict(data.states)
+def test_scaling_all_weights_changes_nothing(policy, plain, data):
     heavy = clone(policy).fit(data.states, data.actions, np.full(len(data.states), 1e-6)).predict(data.states)
-    assert_same(heavy, plain)
+    assert_same(heavy, plain.predict(data.states))
 
 
 def test_units_and_origin_of_the_states_change_nothing(data):
@@ -257,20 +308,53 @@ def test_units_and_origin_of_the_states_change_nothing(data):
             assert_same(clone(policy).fit(moved, data.actions).predict(moved), plain)
 
 
-def test_the_order_of_samples_does_not_matter(policy, data):
+@FROM_SUMS
+def test_the_order_of_samples_does_not_matter(policy, plain, data):
     order = np.random.default_rng(1).permutation(len(data.states))
-    plain = clone(policy).fit(data.states, data.actions).predict(data.states)
-    shuffled = clone(policy).fit(data.states[order], data.actions[order]).predict(data.states)
-    assert_same(shuffled, plain)
-
-
-def test_the_order_of_samples_does_not_matter_where_groups_are_held_out(policy, data):
-    order = np.random.default_rng(1).permutation(len(data.states))
-    plain = clone(policy).fit(data.states, data.actions, groups=data.groups)
-    shuffled = clone(policy).fit(data.states[order], data.actions[order], groups=data.groups[order])
+    shuffled = clone(policy).fit(data.states[order], data.actions[order])
     assert_same(shuffled.predict(data.states), plain.predict(data.states))
 
 
+@FROM_SUMS
+def test_the_order_of_samples_does_not_matter_where_groups_are_held_out(policy, grouped, data):
+    order = np.random.default_rng(1).permutation(len(data.states))
+    shuffled = clone(policy).fit(data.states[order], data.actions[order], groups=data.groups[order])
+    assert_same(shuffled.predict(data.states), grouped.predict(data.states))
+
+
+# Learners that look at samples take rows in the order of time within each demonstration, since differences from one
+# sample to the next tell noise; and a sample repeated beside itself differs by nothing, as if there were none. For them
+# these laws hold of demonstrations and of weights of zero.
+
+
+def test_the_order_of_demonstrations_does_not_matter(policy, grouped, data):
+    order = np.argsort((data.groups + 2) % 6 * 7 % 6, kind="stable")
+    shuffled = clone(policy).fit(data.states[order], data.actions[order], groups=data.groups[order])
+    assert_same(shuffled.predict(data.states), grouped.predict(data.states))
+    assert_same_beliefs(shuffled, grouped, order)
+
+
+def test_a_weight_of_zero_is_absence(policy, data):
+    policy, counting = placed(policy, data), np.random.default_rng(4).integers(0, 3, len(data.states)) > 0
+    with_zeros = clone(policy).fit(data.states, data.actions, counting.astype(float), groups=data.groups)
+    without = clone(policy).fit(data.states[counting], data.actions[counting], groups=data.groups[counting])
+    assert_same(with_zeros.predict(data.states), without.predict(data.states))
+    assert_array_equal(with_zeros.solution_.determined, without.solution_.determined)
+    assert_same_beliefs(without, with_zeros, counting)
+    assert_same(with_zeros.held_out_score(), without.held_out_score())
+
+
+def assert_same_beliefs(actual, expected, rows):
+    """Of the samples at some rows, where the learner has any."""
+    mine, theirs = actual.solution_.belief, expected.solution_.belief
+    assert (mine is None) == (theirs is None)
+    if mine is not None:
+        for name in ("noise", "misfit", "free_share", "from_noise", "undetermined", "held_out_score"):
+            assert_same(getattr(mine, name), getattr(theirs, name))
+        assert_same(mine.free, theirs.free[rows])
+
+
+@FROM_SUMS
 def test_a_weight_is_the_same_as_a_repetition(policy, data):
     times = np.random.default_rng(4).integers(0, 4, len(data.states))
     weighted = clone(policy).fit(data.states, data.actions, times.astype(float), groups=data.groups)
@@ -279,12 +363,28 @@ def test_a_weight_is_the_same_as_a_repetition(policy, data):
     assert_same(weighted.predict(data.states), repeated.predict(data.states))
 
 
+@FROM_SUMS
 def test_a_weight_is_the_same_as_a_repetition_where_samples_are_held_out(policy, data):
     times = np.random.default_rng(4).integers(0, 4, len(data.states))
     weighted = clone(policy).fit(data.states, data.actions, times.astype(float))
     rows = np.repeat(np.arange(len(times)), times)
     repeated = clone(policy).fit(data.states[rows], data.actions[rows])
     assert_same(weighted.predict(data.states), repeated.predict(data.states))
+
+
+def test_the_unit_of_time_changes_nothing_but_the_unit(policy, data):
+    """Actions are per second and times in seconds, or both by the millisecond."""
+    seconds, milliseconds = (
+        clone(policy).fit_demonstrations(
+            [
+                uc.Demonstration(data.states[rows], data.actions[rows] / unit, unit * 0.02 * np.arange(rows.sum()))
+                for group in range(6)
+                for rows in [data.groups == group]
+            ]
+        )
+        for unit in (1.0, 1000.0)
+    )
+    assert_same(1000.0 * milliseconds.predict(data.states), seconds.predict(data.states))
 
 
 # Truth
@@ -315,8 +415,7 @@ def test_direct_regression_is_least_squares(data):
     assert_allclose(policy.predict(data.states), expected, atol=1e-10)
 
 
-def test_inconsistency_is_at_most_cpe_and_that_at_most_upe(policy, data):
-    policy.fit(data.states, data.actions)
+def test_inconsistency_is_at_most_cpe_and_that_at_most_upe(plain, data):
     for n in range(len(data.states)):
         clean = data.projections[n] @ data.policy[n]
         one = uc.Demonstration(
@@ -324,7 +423,7 @@ def test_inconsistency_is_at_most_cpe_and_that_at_most_upe(policy, data):
             clean[None],
             truth=uc.Truth(data.policy[n : n + 1], data.projections[n : n + 1]),
         )
-        inconsistent, constrained, free = (f(policy, one) for f in (uc.inconsistency, uc.cpe, uc.upe))
+        inconsistent, constrained, free = (f(plain, one) for f in (uc.inconsistency, uc.cpe, uc.upe))
         slack = 1e-12 * (1 + free)
         assert inconsistent <= constrained + slack
         assert constrained <= free + slack
@@ -334,8 +433,18 @@ def test_inconsistency_is_at_most_cpe_and_that_at_most_upe(policy, data):
 
 
 @pytest.mark.parametrize("sizes", [(90,), (30, 60), (30, 1, 1, 58), (45, 45)])
+@FROM_SUMS
 def test_batches_are_the_same_as_all_at_once(policy, data, sizes):
-    policy = placed(policy, data).set_params(validation=uc.Folds(3, by="demonstration"))
+    assert_same_in_batches(placed(policy, data), data, sizes)
+
+
+@FROM_SAMPLES
+def test_batches_of_samples_are_the_same_as_all_at_once(policy, data):
+    assert_same_in_batches(placed(policy, data), data, (40, 50))
+
+
+def assert_same_in_batches(policy, data, sizes):
+    policy = policy.set_params(validation=uc.Folds(3, by="demonstration"))
     whole = clone(policy).fit(data.states, data.actions, groups=data.groups)
     stream, stops = clone(policy), np.cumsum(sizes)
     for start, stop in zip(stops - sizes, stops, strict=True):
@@ -347,20 +456,38 @@ def test_batches_are_the_same_as_all_at_once(policy, data, sizes):
 def test_what_comes_after_the_first_batch_may_come_in_any_pieces(policy, data):
     once = clone(policy).fit(data.states[:50], data.actions[:50]).partial_fit(data.states[50:], data.actions[50:])
     pieces = clone(policy).fit(data.states[:50], data.actions[:50])
+    for rows in (slice(50, 51), slice(51, 90)):
+        pieces.partial_fit(data.states[rows], data.actions[rows])
+    assert_same(pieces.predict(data.states), once.predict(data.states))
+
+
+@FROM_SUMS
+def test_what_comes_after_the_first_batch_may_come_in_any_order(policy, data):
+    once = clone(policy).fit(data.states[:50], data.actions[:50]).partial_fit(data.states[50:], data.actions[50:])
+    pieces = clone(policy).fit(data.states[:50], data.actions[:50])
     for rows in (slice(50, 51), slice(80, 90), slice(51, 80)):
         pieces.partial_fit(data.states[rows], data.actions[rows])
     assert_same(pieces.predict(data.states), once.predict(data.states))
 
 
-def test_another_learner_on_the_same_moments_is_a_fresh_fit(policy_of, learner, data):
-    first = policy_of(uc.Direct()).fit(data.states, data.actions)
+@FROM_SUMS
+def test_another_learner_on_the_same_moments_is_a_fresh_fit(combination, plain, data):
+    assert_same_as_fresh(learnt("direct", combination[1]), plain)
+    assert isinstance(plain.moments_, Moments)
+
+
+@FROM_SAMPLES
+def test_another_learner_on_the_same_samples_is_a_fresh_fit(combination, plain, data):
+    assert_same_as_fresh(learnt("segments", combination[1]), plain)
+    assert_same_as_fresh(plain, learnt("hybrid", combination[1]))
+
+
+def assert_same_as_fresh(first, fresh):
     before = first.solution_.weights.copy()
-    other = first.with_learner(learner)
-    fresh = policy_of(learner).fit(data.states, data.actions)
-    assert_array_equal(other.predict(data.states), fresh.predict(data.states))
+    other = first.with_learner(fresh.learner)
+    assert_array_equal(other.solution_.weights, fresh.solution_.weights)
     assert_array_equal(first.solution_.weights, before)
-    assert other.learner == learner
-    assert isinstance(other.moments_, Moments)
+    assert other.learner == fresh.learner
 
 
 def test_policies_that_share_moments_go_their_own_way_from_there(policy_of, data):

@@ -2,6 +2,7 @@
 
 import ast
 import os
+import pickle
 import subprocess
 import sys
 from importlib import import_module, metadata
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import unconstrain as uc
+from unconstrain.base.former import _NOW
 
 
 @pytest.mark.parametrize("name", uc.__all__)
@@ -42,16 +44,86 @@ def test_a_name_that_does_not_exist_is_answered_with_those_that_do():
     assert "LocallyLinearPolicy" in str(caught.value)
 
 
-def test_importing_the_package_imports_nothing_heavy():
-    code = "import sys; before = set(sys.modules); import unconstrain; print(*(set(sys.modules) - before))"
+ROOMS = {
+    name: f"unconstrain.{home}"
+    for name, home in {
+        "cluster": "training.cluster",
+        "constraints": "constraints",
+        "datasets": "paper.datasets",
+        "errors": "base.errors",
+        "experiments": "paper.experiments",
+        "learners": "learners",
+        "metrics": "evaluation.metrics",
+        "models": "models",
+        "motion": "motion",
+        "policies": "policies",
+        "preparation": "recordings.preparation",
+        "readers": "recordings.readers",
+        "robust": "learners.robust",
+        "storage": "storage",
+        "systems": "paper.systems",
+    }.items()
+}
+
+
+def printed(code):
+    """What a fresh interpreter prints."""
     environment = os.environ | {"PYTHONPATH": str(Path(uc.__file__).parents[1])}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
-    assert {name for name in done.stdout.split() if name.startswith("unconstrain")} == {
+    return done.stdout
+
+
+def test_modules_are_there_without_further_import():
+    code = "import unconstrain as uc\nfor name in {names}: print(name, getattr(uc, name).__name__)"
+    assert dict(map(str.split, printed(code.format(names=list(ROOMS))).splitlines())) == ROOMS
+
+
+@pytest.mark.parametrize("former", _NOW)
+def test_a_module_is_the_same_under_its_former_name(former):
+    assert import_module(f"unconstrain.{former}") is import_module(f"unconstrain.{_NOW[former]}")
+
+
+def test_a_module_inside_a_package_that_moved_is_the_same_too():
+    from unconstrain.robust.noise import noise_by_differences
+
+    assert noise_by_differences is uc.robust.noise_by_differences
+    assert import_module("unconstrain.report.table1") is import_module("unconstrain.paper.pages.table1")
+
+
+def test_a_former_name_that_never_was_is_not_found():
+    with pytest.raises(ModuleNotFoundError, match=r"unconstrain\.learners\.robust\.nothing"):
+        import_module("unconstrain.robust.nothing")
+
+
+def test_former_names_work_in_a_fresh_interpreter():
+    code = "from unconstrain.robust.noise import noise_by_differences as it; from unconstrain import robust; "
+    assert printed(code + "print(it is robust.noise_by_differences)") == "True\n"
+
+
+def test_what_was_imported_under_a_former_name_is_pickled_under_its_own():
+    from unconstrain.features import NormalisedRBF
+    from unconstrain.robust.learner import Robust
+
+    stored = pickle.dumps((NormalisedRBF, Robust(steps=3)))
+    assert b"unconstrain.features" not in stored
+    assert pickle.loads(stored) == (uc.NormalisedRBF, uc.Robust(steps=3))
+
+
+def test_what_was_pickled_under_a_former_name_is_found():
+    stored = pickle.dumps(uc.KMeansRBF(3), protocol=0).replace(b"unconstrain.models.features", b"unconstrain.features")
+    assert b"unconstrain.features" in stored
+    assert pickle.loads(stored) == uc.KMeansRBF(3)
+
+
+def test_importing_the_package_imports_nothing_heavy():
+    code = "import sys; before = set(sys.modules); import unconstrain; print(*(set(sys.modules) - before))"
+    imported = printed(code).split()
+    assert {name for name in imported if name.startswith("unconstrain")} == {
         "unconstrain",
         "unconstrain.base",
         "unconstrain.base.former",
     }
-    assert not {"numpy", "scipy", "sklearn", "click", "rich"} & set(done.stdout.split())
+    assert not {"numpy", "scipy", "sklearn", "click", "rich"} & set(imported)
 
 
 def test_the_version_is_that_of_the_installed_package():

@@ -1,6 +1,10 @@
 """The public names and where they live: what a type checker sees, and what is imported on first use."""
 
 from . import constraints as constraints
+from . import learners as learners
+from . import models as models
+from . import motion as motion
+from . import policies as policies
 from . import storage as storage
 from .base import errors as errors
 from .base.errors import UnconstrainError as UnconstrainError
@@ -14,6 +18,7 @@ from .evaluation import upe as upe
 from .learners import Direct as Direct
 from .learners import Hybrid as Hybrid
 from .learners import Inconsistency as Inconsistency
+from .learners import Learner as Learner
 from .learners import Likelihood as Likelihood
 from .learners import NoiseCorrected as NoiseCorrected
 from .learners import Robust as Robust
@@ -51,6 +56,7 @@ from .storage import load as load
 from .storage import save as save
 from .training import Folds as Folds
 from .training import HeldOut as HeldOut
+from .training import Training as Training
 from .training import cluster as cluster
 
 __version__: str

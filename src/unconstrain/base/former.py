@@ -11,7 +11,7 @@ from types import ModuleType
 
 _NOW = {
     "arrays": "base.arrays",
-    "batches": "recordings.batches",
+    "batches": "training.batches",
     "closed_form": "models.formula",
     "cluster": "training.cluster",
     "containment": "motion.containment",
@@ -31,7 +31,12 @@ _NOW = {
     "readers": "recordings.readers",
     "receptive_fields": "models.receptive_fields",
     "report": "paper.pages",
+    "report.diagnosis": "pages.diagnosis",
+    "report.fit": "pages.fit",
+    "report.html": "pages.html",
     "robust": "learners.robust",
+    "robust.samples": "training.samples",
+    "robust.uncertainty": "learners.solution",
     "rollouts": "motion.rollouts",
     "simulation": "paper.simulation",
     "streams": "recordings.streams",
@@ -50,12 +55,9 @@ class _Former(MetaPathFinder, Loader):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        package, _, rest = fullname.partition(".")
-        room, _, inside = rest.partition(".")
-        if package != self._package or room not in _NOW:
-            return None
-        now = f"{package}.{_NOW[room]}" + (f".{inside}" if inside else "")
-        return ModuleSpec(fullname, self, loader_state=now)
+        package, _, former = fullname.partition(".")
+        now = _now(former) if package == self._package else None
+        return ModuleSpec(fullname, self, loader_state=f"{package}.{now}") if now else None
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         module = import_module(spec.loader_state)
@@ -64,6 +66,15 @@ class _Former(MetaPathFinder, Loader):
 
     def exec_module(self, module: ModuleType) -> None:
         module.__spec__ = self._own  # the import system has just put the former name there
+
+
+def _now(former: str) -> str | None:
+    """Where a module is now; what nothing is said of is in its package still."""
+    if former in _NOW:
+        return _NOW[former]
+    package, _, name = former.rpartition(".")
+    moved = _now(package) if package else None
+    return moved and f"{moved}.{name}"
 
 
 def install(package: str) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
+from ..base.display import Shown, counted
 from ..base.errors import MissingBeliefError
 
 if TYPE_CHECKING:
@@ -29,8 +30,8 @@ class Uncertainty(NamedTuple):
     total: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Belief:
+@dataclass(frozen=True, eq=False, repr=False)
+class Belief(Shown):
     """Estimates beside the weights, of a learner that uses the samples.
 
     Parameters
@@ -87,9 +88,14 @@ class Belief:
         """
         return _Spread(model, states).covariances(self.undetermined)
 
+    def _summary(self) -> tuple[str, ...]:
+        noise = f"noise={self.noise:.3g}", f"misfit={self.misfit:.3g}"
+        free = f"{self.free_share:.0%} of {counted(len(self.free), 'sample')} free"
+        return *noise, free, *(("likelihood refuted",) if self.refuted else ())
 
-@dataclass(frozen=True, eq=False)
-class Solution:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(Shown):
     """Result of a learner, for each of M models.
 
     Parameters
@@ -174,6 +180,12 @@ class Solution:
             self.belief, candidates={name: one @ centring for name, one in self.belief.candidates.items()}
         )
         return replace(self, weights=self.weights @ centring, belief=belief)
+
+    def _summary(self) -> tuple[str, ...]:
+        directions = counted(self.directions * len(self.determined), "direction")
+        every = f"{self.determined_share:.0%} of {directions} determined"
+        noise = () if self.belief is None else (f"noise={self.noise:.3g}",)
+        return self.method or "no method named", counted(len(self.weights), "model"), every, *noise
 
 
 class _Spread:

@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.arrays import SMALLEST_VARIANCE, Array, as_matrix, beside, check_at_least, namespace
+from ..base.display import Shown, counted
 from ..base.errors import InvalidDataError, SettingError
+from ..base.parameters import Parameters
 from .formula import ClosedForm, exponents
 
 _LEAST_SPREAD = 1e10 * np.sqrt(SMALLEST_VARIANCE)
@@ -40,8 +42,8 @@ class Placeable(Protocol):
         ...
 
 
-@dataclass(frozen=True, eq=False)
-class Affine:
+@dataclass(frozen=True, eq=False, repr=False)
+class Affine(Shown):
     """Globally linear features ``x̄ = (x, 1)`` (section III-C).
 
     Parameters
@@ -78,9 +80,13 @@ class Affine:
         still = spread <= np.maximum(1e-12 * np.abs(states).max(axis=0, initial=0.0), _LEAST_SPREAD)
         return replace(self, centre=centre, scale=np.where(still, 1.0, spread))
 
+    def _summary(self) -> tuple[str, ...]:
+        n = max(np.size(self.centre), np.size(self.scale))
+        return () if n == 1 else (f"centred and scaled in {counted(n, 'dimension')}",)
 
-@dataclass(frozen=True, eq=False)
-class NormalisedRBF:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NormalisedRBF(Shown):
     """Gaussian kernels normalised to sum to one at each state (section III-C).
 
     ``b_i(x) = K(x − c_i) / Σ_j K(x − c_j)`` with
@@ -247,9 +253,13 @@ class NormalisedRBF:
         centres = np.clip(middle + unit * found, table.min(axis=0), table.max(axis=0))  # rounding may put them outside
         return cls(centres, float((width * spacing * unit) ** 2))
 
+    def _summary(self) -> tuple[str, ...]:
+        centres, n = self.centres.shape
+        return f"{counted(centres, 'centre')} in {counted(n, 'dimension')}", f"variance={self.variance:.4g}"
+
 
 @dataclass(frozen=True)
-class KMeansRBF:
+class KMeansRBF(Parameters):
     """Normalised RBFs with centres by k-means on the first batch.
 
     Parameters

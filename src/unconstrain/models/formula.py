@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Array
+from ..base.display import Shown, counted
 
 
-@dataclass(frozen=True, eq=False)
-class ClosedForm:
+@dataclass(frozen=True, eq=False, repr=False)
+class ClosedForm(Shown):
     """Affine maps blended by normalised Gaussian kernels.
 
     With ``z = x − origin``,
@@ -47,6 +48,9 @@ class ClosedForm:
     def is_affine(self) -> bool:
         """Whether the models are affine maps rather than constants."""
         return self.maps.shape[2] > 1
+
+    def _summary(self) -> tuple[str, ...]:
+        return tuple(map(counted, self.sizes, ("state", "action", "model")))
 
 
 def exponents(centres: Array, variance: float, origin: Array) -> Array:

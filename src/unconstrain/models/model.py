@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..base.arrays import BLOCK_ROWS, Array, as_matrix, is_foreign, namespace, slices
+from ..base.display import Shown
 from ..base.errors import SettingError
 from .features import FeatureMap
 from .formula import ClosedForm
@@ -16,8 +17,8 @@ _ROWS = 4096
 """Rows that are predicted together, so that temporaries stay in cache."""
 
 
-@dataclass(frozen=True, eq=False)
-class Model:
+@dataclass(frozen=True, eq=False, repr=False)
+class Model(Shown):
     """M linear models on common features, blended by their fields: ``π̃(x) = Σ_m s_m(x) W_m φ(x)``.
 
     A parametric policy (section III-C) has M = 1 and a field that is 1
@@ -99,3 +100,7 @@ class Model:
                 "that offer closed_form(weights) -> unconstrain.ClosedForm."
             )
         return form
+
+    def _summary(self) -> tuple[str, ...]:
+        features = getattr(self.features, "__name__", type(self.features).__name__)
+        return f"{features} features", str(self.fields)

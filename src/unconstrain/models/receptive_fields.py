@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import SMALLEST_VARIANCE, Array, as_matrix, beside, check_at_least, is_foreign, namespace
+from ..base.display import Shown, counted
 from ..base.errors import SettingError
 from .features import Affine, FeatureMap, gaussian, shares, squared_distances
 from .formula import ClosedForm, exponents
@@ -15,8 +16,8 @@ MOST_FIELDS = 100
 """Most fields that :func:`choose_variance` accepts before it widens them."""
 
 
-@dataclass(frozen=True, eq=False)
-class ReceptiveFields:
+@dataclass(frozen=True, eq=False, repr=False)
+class ReceptiveFields(Shown):
     """Isotropic Gaussian fields, ``w_m(x) = exp(−‖x − c_m‖² / 2σ²)``.
 
     Parameters
@@ -72,6 +73,10 @@ class ReceptiveFields:
         maps = np.concatenate([weights[..., :-1] / scale, weights[..., -1:]], axis=2)
         reach = np.abs(self.centres - origin).max(axis=0) + np.sqrt(self.variance)
         return ClosedForm(origin, maps, exponents(self.centres, self.variance, origin), reach)
+
+    def _summary(self) -> tuple[str, ...]:
+        fields, n = self.centres.shape
+        return f"{counted(fields, 'centre')} in {counted(n, 'dimension')}", f"variance={self.variance:.4g}"
 
 
 @dataclass(frozen=True)

@@ -15,19 +15,21 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
 from ..base.arrays import Array, Groups, beside, check_at_least, namespace, on_host
+from ..base.display import ShownWithSolution
 from ..base.errors import InvalidDataError, SettingError
 from ..base.estimators import checked_states
+from ..base.parameters import Parameters
 from ..deployment import Deployable
-from ..learners import Belief, Learner, Uncertainty, named
+from ..learners import Belief, Learner, Solution, Uncertainty, named
 from ..models import FeatureMap, Model
 from ..recordings import Demonstration, stack, times_of
 from ..risks import Moments, unit_actions
-from ..training import Batch, FirstLook, Folds, Seen, Split, Training, Validation
+from ..training import Batch, FirstLook, Folds, Seen, Split, Training, Validation, are_typical
 
 _FITTED = ("training_", "solution_", "n_features_in_", "feature_names_in_", "n_outputs_", "_flat", "_waiting")
 
 
-class Policy(Deployable, RegressorMixin, BaseEstimator, ABC):
+class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEstimator, ABC):
     """A policy that learns: a :class:`~unconstrain.models.Model`, what was seen, and the solution found.
 
     Attributes
@@ -40,6 +42,8 @@ class Policy(Deployable, RegressorMixin, BaseEstimator, ABC):
 
     learner: Learner | str | None
     validation: Validation | None
+    training_: Training
+    solution_: Solution
     n_outputs_: int
     _flat: bool
 
@@ -98,9 +102,9 @@ class Policy(Deployable, RegressorMixin, BaseEstimator, ABC):
         if not first and not waiting:
             return self._become(draft._learnt([batch], learner))
         seen = (*waiting, batch)
-        look = FirstLook.total(map(FirstLook.at, seen))
-        draft._began(look, learner, more=True)._learnt(seen, learner)
-        draft._waiting = () if look is None or look.is_typical else (*waiting, deepcopy(batch))
+        looks = [FirstLook.at(one) for one in seen]
+        draft._began(FirstLook.total(looks), learner, more=True)._learnt(seen, learner)
+        draft._waiting = () if are_typical(looks) else (*waiting, deepcopy(batch))
         return self._become(draft)
 
     def fit_batches(self, batches: Iterable[Sequence[Any]]) -> Self:
@@ -122,13 +126,14 @@ class Policy(Deployable, RegressorMixin, BaseEstimator, ABC):
         learner = self._check_speed_power(getattr(batches, "speed_power", 0.0))
         if iter(batches) is not batches:
             return self._fit_parts([batches], lambda function, parts: function(*parts), learner)
-        draft, first, look = self._draft(*_FITTED), [], None
+        draft, first, looks = self._draft(*_FITTED), [], []
         checked = draft._each_checked(batches)
         for batch in checked:
             first.append(deepcopy(batch))  # the caller may use a buffer again
-            look = FirstLook.total([look, FirstLook.at(batch)])
-            if look is not None and look.is_typical:
+            looks.append(FirstLook.at(batch))
+            if are_typical(looks):
                 break
+        look = FirstLook.total(looks)
         return self._become(draft._began(look, learner, more=True)._learnt(chain(first, checked), learner))
 
     def fit_parts(self, parts: Sequence[Any], summed: Callable[..., Any]) -> Self:

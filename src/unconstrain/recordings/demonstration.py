@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array, as_matrix, as_vector
+from ..base.display import Shown, counted, shortened
 from ..base.errors import InvalidDataError
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(Shown):
     """Columns of numbers as a file holds them, before anyone says what they mean.
 
     Parameters
@@ -52,9 +53,13 @@ class Recording:
             )
         return self.values[:, [self.columns.index(name) for name in names]]
 
+    def _summary(self) -> tuple[str, ...]:
+        sizes = counted(len(self), "row"), counted(len(self.columns), "column")
+        return shortened(self.name), *sizes, *_time(self.times)
 
-@dataclass(frozen=True, eq=False)
-class Truth:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Truth(Shown):
     """What a simulated demonstrator knows and a learner must not see.
 
     Parameters
@@ -68,9 +73,12 @@ class Truth:
     policy: Array
     projections: Array
 
+    def _summary(self) -> tuple[str, ...]:
+        return counted(len(self.policy), "sample"), counted(self.policy.shape[1], "action")
 
-@dataclass(frozen=True, eq=False)
-class Demonstration:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Demonstration(Shown):
     """One recorded movement.
 
     Parameters
@@ -132,6 +140,10 @@ class Demonstration:
             if np.shape(array) != shape:
                 raise InvalidDataError(f"truth{of}: got {what} of shape {np.shape(array)}, expected {shape}.")
 
+    def _summary(self) -> tuple[str, ...]:
+        sizes = counted(self.states.shape[1], "state"), counted(self.actions.shape[1], "action")
+        return shortened(self.name), counted(len(self), "sample"), *sizes, *_time(self.times)
+
 
 class Stack(NamedTuple):
     """Demonstrations laid end to end: what estimators take.
@@ -174,3 +186,8 @@ def times_of(demonstrations: Sequence[Demonstration]) -> Array | None:
     """Times of demonstrations laid end to end, shape (N,), seconds; None where one has none."""
     times = [demo.times for demo in demonstrations if demo.times is not None]
     return np.concatenate(times) if len(times) == len(demonstrations) else None
+
+
+def _time(times: Array | None) -> tuple[str, ...]:
+    """How long a movement takes."""
+    return () if times is None or not len(times) else (f"{float(times[-1] - times[0]):.4g} s",)

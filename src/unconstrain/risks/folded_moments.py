@@ -7,11 +7,12 @@ from itertools import accumulate
 from operator import add
 
 from ..base.arrays import Array
+from ..base.display import Shown, counted
 from .moments import Moments, total
 
 
-@dataclass(frozen=True, eq=False)
-class FoldedMoments:
+@dataclass(frozen=True, eq=False, repr=False)
+class FoldedMoments(Shown):
     """Moments of each fold, from a single pass over the data.
 
     Parameters
@@ -55,3 +56,7 @@ class FoldedMoments:
         if not self.parts:
             return other
         return replace(self, parts=tuple(mine + theirs for mine, theirs in zip(self.parts, other.parts, strict=True)))
+
+    def _summary(self) -> tuple[str, ...]:
+        sizes = self.parts[0]._summary()[:-1] if self.parts else ()
+        return counted(len(self.parts), "fold"), f"{len(self.held_out)} held out", *sizes

@@ -29,11 +29,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array, beside, is_foreign, namespace, on_host
+from ..base.display import Shown, counted
 from .projection import unit_actions
 
 
-@dataclass(frozen=True, eq=False)
-class Moments:
+@dataclass(frozen=True, eq=False, repr=False)
+class Moments(Shown):
     """Weighted sums over samples, for M models at once.
 
     They add (batches, machines), subtract (leaving a fold out) and scale
@@ -119,6 +120,11 @@ class Moments:
     def on_host(self) -> Moments:
         """Moments as NumPy arrays."""
         return Moments(*map(on_host, self.sums))
+
+    def _summary(self) -> tuple[str, ...]:
+        models, d, p = self.cross.shape
+        sizes = counted(models, "model"), counted(d, "action"), counted(p, "feature")
+        return *sizes, f"weight={float(self.weight.sum()):.4g}"
 
 
 def total(parts: Iterable[Moments]) -> Moments:

@@ -37,6 +37,7 @@ from numpy.typing import NDArray
 from scipy.linalg.blas import dtrsm
 
 from ..base.arrays import Array, is_foreign, namespace
+from ..base.display import Shown, counted
 
 NOISE = 1e-10
 """Eigenvalues of the first objective below this share of the largest are rounding."""
@@ -48,8 +49,8 @@ UNDERFLOW = 1e-290
 """A Hessian whose largest eigenvalue is below this is zero: its smaller ones have lost their digits."""
 
 
-@dataclass(frozen=True, eq=False)
-class Quadratic:
+@dataclass(frozen=True, eq=False, repr=False)
+class Quadratic(Shown):
     """M functions ``f(w) = constant − 2 linearᵀw + wᵀ hessian w``.
 
     Parameters
@@ -109,6 +110,10 @@ class Quadratic:
         models, size = self.gram.shape[:2]
         product: Array = xp.reshape(self.gram @ xp.reshape(vectors, (models, size, -1)), vectors.shape)
         return product
+
+    def _summary(self) -> tuple[str, ...]:
+        models, weights = self.linear.shape
+        return counted(models, "problem"), counted(weights, "weight")
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from . import cluster
 from .batches import Batch
-from .first_look import PLACING_SAMPLES, FirstLook, Seen
+from .first_look import PLACING_SAMPLES, FirstLook, Seen, are_typical
 from .folds import Folds, HeldOut, Split, Validation
 from .samples import Samples
 from .training import Training
@@ -18,5 +18,6 @@ __all__ = [
     "Split",
     "Training",
     "Validation",
+    "are_typical",
     "cluster",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,15 @@ PLACING_SAMPLES = 20_000
 """Features and fields are placed on at most this many different states."""
 
 _ALL = np.uint64(2**64 - 1)
+
+_STATES_PER_WEIGHT = 10
+"""Different states for each weight of an affine model, n + 1 of them: fewer do not tell how states spread."""
+
+_WIDENED = 1.2
+"""A spread that the later half of small batches has not widened by more than this has settled."""
+
+_MOST_WAITING = 1000
+"""Different states at which nothing waits any longer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,11 +62,6 @@ class FirstLook:
     keys: NDArray[np.uint64]
     states: Array
     groups: dict[Hashable, None] | None
-
-    @property
-    def is_typical(self) -> bool:
-        """Whether enough different states were seen to place features and fields on: ten for each affine weight."""
-        return len(self.keys) >= 10 * (len(self.mean) + 1)
 
     @property
     def different(self) -> Array:
@@ -134,6 +138,24 @@ class FirstLook:
         for look in looks:
             whole = look if whole is None else whole if look is None else whole + look
         return whole
+
+
+def are_typical(looks: Sequence[FirstLook | None]) -> bool:
+    """Whether what was seen of a stream so far is enough to place features and fields on, and to deal folds by.
+
+    It is if the last batch alone has ten different states for each weight of an affine model. Of smaller batches, such
+    as single samples, so many have to have come together, and the later half must not have widened the spread much:
+    a movement that has just begun says little of where it will go.
+    """
+    seen, half = FirstLook.total(looks), FirstLook.total(looks[: len(looks) // 2])
+    if seen is None:
+        return False
+    enough, most = _STATES_PER_WEIGHT * (len(seen.mean) + 1), _MOST_WAITING
+    if (looks[-1] is not None and len(looks[-1].keys) >= enough) or len(seen.keys) >= most:
+        return True
+    if half is None or len(seen.keys) < enough:
+        return False
+    return bool((seen.scatter / seen.weight <= _WIDENED**2 * half.scatter / half.weight).all())
 
 
 @dataclass(frozen=True)

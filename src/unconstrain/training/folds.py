@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array, Groups, check_at_least
 from ..base.errors import SettingError
+from ..base.parameters import Parameters
 from .first_look import FirstLook, in_order, mixed
 
 Unit = Literal["auto", "demonstration", "sample"]
 
 
 @dataclass(frozen=True)
-class Folds:
+class Folds(Parameters):
     """K-fold validation: each fold is held out once.
 
     Parameters
@@ -55,7 +56,7 @@ class Folds:
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOut(Parameters):
     """Hold one share out, once, to choose the threshold; the final policy learns from everything.
 
     Parameters

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
+from ..base.display import Shown, counted
 from ..risks import Moments, Quadratic, gather
 
 _OF_MODELS = ("centring", "roughness")
 
 
-@dataclass(frozen=True, eq=False)
-class Samples:
+@dataclass(frozen=True, eq=False, repr=False)
+class Samples(Shown):
     """Samples as a policy sees them, demonstration by demonstration, each in the order in which it was recorded.
 
     Parameters
@@ -109,3 +110,8 @@ class Samples:
     def by_fold(self) -> list[Samples]:
         """What is held out together."""
         return [self[self.folds == fold] for fold in range(int(self.folds.max()) + 1)]
+
+    def _summary(self) -> tuple[str, ...]:
+        sizes = self.states.shape[1], self.actions.shape[1], self.features.shape[1], self.memberships.shape[1]
+        nouns = ("state", "action", "feature", "model")
+        return counted(len(self), "sample"), *map(counted, sizes, nouns)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array, beside, is_foreign, on_host
+from ..base.display import Shown, counted
 from ..base.errors import SettingError
 from ..base.threads import Workers, workers
 from ..models import Model
@@ -28,8 +29,8 @@ _SPREAD = 200
 """Weights from which on folds are summed in threads: with fewer, steps are short and threads mostly wait."""
 
 
-@dataclass(frozen=True, eq=False)
-class Training:
+@dataclass(frozen=True, eq=False, repr=False)
+class Training(Shown):
     """All that was seen so far. It never changes: what has seen more is another one, and parts add.
 
     Parameters
@@ -181,6 +182,11 @@ class Training:
         """Numbers of models M and of features p."""
         typical = self.split.origin[None]
         return self.model.fields.weights(typical).shape[1], self.model.design(typical).shape[1]
+
+    def _summary(self) -> tuple[str, ...]:
+        folds = f"{counted(len(self.gathered.parts), 'fold')} by {self.split.by}"
+        kept = "sums alone" if self.batches is None else "samples kept"
+        return counted(len(self.split.origin), "state"), counted(self.actions, "action"), folds, kept
 
 
 def _proportion(counts: Array) -> float:

@@ -1,0 +1,40 @@
+"""How objects that hold arrays show themselves: one line in a terminal, a small table in a notebook."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+
+class Shown:
+    """Mixed into a class that says what it is made of in a few words; dataclasses then need ``repr=False``."""
+
+    def _summary(self) -> tuple[str, ...]:
+        """Parts such as ``"200 samples"`` or ``"variance=0.04"``, none of them an array."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(self._summary())})"
+
+    def _repr_html_(self) -> str:
+        rows = "".join(f"<tr><td>{escape(part)}</td></tr>" for part in self._summary())
+        return f"<table><thead><tr><th>{type(self).__name__}</th></tr></thead><tbody>{rows}</tbody></table>"
+
+
+class ShownWithSolution:
+    """Mixed into an estimator of scikit-learn: its table in a notebook, and below it what was learnt."""
+
+    def _html_repr(self) -> str:
+        settings: str = super()._html_repr()  # type: ignore[misc]
+        solution: Any = vars(self).get("solution_")
+        return settings if solution is None else settings + solution._repr_html_()
+
+
+def counted(number: int, noun: str) -> str:
+    """A number of things: ``"1 sample"``, ``"2 samples"``."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def shortened(name: str, most: int = 40) -> str:
+    """A name in quotes, its middle left out where it is long."""
+    return repr(name if len(name) <= most else f"{name[: most // 2]}…{name[-most // 2 + 1 :]}")
