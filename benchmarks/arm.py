@@ -7,14 +7,10 @@ from collections.abc import Callable
 import numpy as np
 from table import Row, row, script, side_by_side
 from threadpoolctl import threadpool_limits
-from unconstrain.learners.plain import Hybrid
-from unconstrain.training.validation import Folds
 
+from unconstrain import Folds, Hybrid, LocallyLinearPolicy, gather, stack
 from unconstrain.paper.experiments import table2
 from unconstrain.paper.systems.arm import LWR3
-from unconstrain.policies import LocallyLinearPolicy
-from unconstrain.recordings.demonstration import stack
-from unconstrain.risks.moments import gather
 
 
 def main() -> list[Row]:

@@ -267,7 +267,7 @@ def test_where_constraints_are_a_function_of_the_state_intervals_hold_the_truth(
     found = held_where_known(policy)
     assert found[0.5] == pytest.approx(0.5, abs=0.1)
     assert found[0.95] == pytest.approx(0.95, abs=0.03)
-    monkeypatch.setattr(consistent, "_repeats", lambda time, samples: time)
+    monkeypatch.setattr(consistent, "_inefficiency", lambda time, samples: time)
     naively = held_where_known(policy.with_learner(uc.NoiseCorrected()))  # what the model misses would average out
     assert naively[0.95] < found[0.95] - 0.1
 

@@ -89,5 +89,6 @@ def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None) -> None:
     if scheduler is None:
         policy.fit_batches(stream)
         return
+    uc.cluster.check_learner(policy.learner)  # before anybody is waited for
     with uc.cluster.connected(scheduler) as client:
         uc.cluster.fit_batches(policy, stream.parts(), client=client)

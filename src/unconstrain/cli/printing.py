@@ -81,7 +81,7 @@ def say_fit(policy: uc.Policy, stream: uc.Stream | None, learner: str) -> None:
 def _said_of_samples(solution: uc.Solution) -> str:
     """The candidate that a robust learner took, and its estimates of noise and free samples."""
     ways = {
-        "likelihood": "by maximum likelihood: samples look free, or constrained at random",
+        "likelihood": "by likelihood: samples look free, or constrained at random",
         "noise-corrected": "by noise-corrected consistency: constraints look like a function of the state",
         "hybrid": "by softened consistency: the residuals are not noise",
     }

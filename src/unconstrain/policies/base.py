@@ -24,7 +24,7 @@ from ..learners import Belief, Learner, Solution, Uncertainty, named
 from ..models import FeatureMap, Model
 from ..recordings import Demonstration, stack, times_of
 from ..risks import Moments, unit_actions
-from ..training import Batch, FirstLook, Folds, Seen, Split, Training, Validation, are_typical
+from ..training import Batch, FirstLook, Folds, Seen, Split, Training, Validation, are_typical, cluster
 
 _FITTED = ("training_", "solution_", "n_features_in_", "feature_names_in_", "n_outputs_", "_flat", "_waiting")
 
@@ -144,11 +144,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         returns can be pickled. Errors are those of :meth:`fit`, and a learner that needs the samples is refused.
         """
         learner = named(self.learner)
-        if learner.needs_samples:
-            name = type(learner).__name__
-            raise SettingError(
-                f"learner: {name} needs the samples, and a cluster sends their sums alone. Take Hybrid()."
-            )
+        cluster.check_learner(learner)
         if not parts:
             raise InvalidDataError("got no part to learn from, expected at least one.")
         return self._fit_parts(parts, summed, learner)

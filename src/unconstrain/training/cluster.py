@@ -102,6 +102,19 @@ def fit_batches(policy: P, parts: Sequence[Any], *, client: Any | None = None) -
     return policy.fit_parts([delayed(part, traverse=False) for part in parts], partial(_summed, client))
 
 
+def check_learner(learner: Any) -> None:
+    """Refuse a learner that needs the samples.
+
+    Raises
+    ------
+    SettingError
+        If it does.
+    """
+    if getattr(learner, "needs_samples", False):
+        name = type(learner).__name__
+        raise SettingError(f"learner: {name} needs the samples, and a cluster sends their sums alone. Take Hybrid().")
+
+
 def connected(address: str, timeout_s: float = 10.0) -> Any:
     """Return a client of the scheduler at an address, such as ``tcp://10.0.0.1:8786``; a context manager.
 

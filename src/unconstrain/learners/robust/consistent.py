@@ -28,7 +28,14 @@ from ...training import Samples
 from ..hybrid import SOFTNESSES, chosen_softness
 from ..thresholds import judged, within_errors
 from .candidate import Candidate
-from .constants import BALANCE_STEPS, EIGENVALUE_STANDARD_ERRORS, NOISE_ROUNDS, SOFTNESS_STANDARD_ERRORS
+from .constants import (
+    BALANCE_STEPS,
+    EIGENVALUE_STANDARD_ERRORS,
+    FIRST_SOFTNESS,
+    NOISE_ROUNDS,
+    SOFTNESS_RANGE,
+    SOFTNESS_STANDARD_ERRORS,
+)
 from .noise import corrected, correlation_time, noise_by_differences
 from .posterior import Posterior, unit_information
 from .segments import constrained_error
@@ -135,12 +142,12 @@ def by_segments(samples: Samples, labels: NDArray[np.intp], noise: float) -> Can
         error, risk = (reduce(add, (one[i] for i in of)) for one in (errors, risks))
         return Posterior(error, softness * risk)
 
-    everything, softness = list(range(len(parts))), np.full(len(sizes), 1e-2)
+    everything, softness = list(range(len(parts))), np.full(len(sizes), FIRST_SOFTNESS)
     for _ in range(BALANCE_STEPS):
         whole = posterior(everything, softness)
         weights = vec(whole.weights(d))
         loss, taken = judged(whole.evidence, weights), judged(reduce(add, risks), weights)
-        softness = np.clip(factor * loss / np.maximum(taken - loss, 1e-3 * taken + 1e-300), 1e-8, 1.0)
+        softness = np.clip(factor * loss / np.maximum(taken - loss, 1e-3 * taken + 1e-300), *SOFTNESS_RANGE)
     found = posterior(everything, softness)
     held_out = np.empty_like(samples.actions)
     for fold, rows in enumerate(parts):
@@ -209,14 +216,14 @@ class _Corrected:
         The softness is the residual variance along the action over that across it, times the unit-information factor.
         """
         factor = unit_information(self.risk.linear.shape[1], self.sizes)
-        softness, unit = np.full(len(factor), 1e-2), np.zeros(len(factor))
+        softness, unit = np.full(len(factor), FIRST_SOFTNESS), np.zeros(len(factor))
         for _ in range(BALANCE_STEPS):
             posterior = self.posterior(softness, smoothness.prior(unit))
             weights = posterior.weights(self.d)
             along = judged(self.consistent, vec(weights)) + self.expected
             both = judged(self.risk, vec(weights)) + self.expected
             across = np.maximum((both - along) / max(self.d - 1, 1), 1e-3 * both)
-            softness = np.clip(factor * along / np.where(across > 0, across, 1.0), 1e-8, 1.0)
+            softness = np.clip(factor * along / np.where(across > 0, across, 1.0), *SOFTNESS_RANGE)
             noise, residual = self.noise(weights), self.residual(weights)
             unit = time * residual
             smoothness = smoothness.updated(weights, posterior, noise / residual, unit)

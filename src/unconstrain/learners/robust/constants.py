@@ -30,6 +30,13 @@ NOISE_ROUNDS = 3
 BALANCE_STEPS = 6
 """Steps of softness and weights, each from the other."""
 
+FIRST_SOFTNESS = 1e-2
+SOFTNESS_RANGE = (1e-8, 1.0)
+"""Where that iteration starts and stays. With a softness of 1 the standard risk weighs as much as the inconsistency."""
+
+LEAST_PRIOR_PRECISION = 1e-2
+"""Floor of the prior precision for the uncertainty, as a share of its mean over all directions of the weights."""
+
 SOFTNESS_STANDARD_ERRORS = 3.0
 """The prior's softness is kept while its held-out loss is within so many standard errors of the least.
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ...base.arrays import Array
 from ...risks import SECONDARY_NOISE, Quadratic, eigensystem, minimum, unvec
+from .constants import LEAST_PRIOR_PRECISION
 
 
 def unit_information(weights: int, sizes: Array) -> Array:
@@ -44,11 +45,11 @@ class Posterior:
         """Posterior covariance of the weights in two parts, from noise and undetermined by the data, each (M, P, P).
 
         For the Hessians A of the evidence and B of the prior, ``C = (A + B)⁻¹`` is the sum of C A C and C B C.
-        Eigenvalues of B are at least a hundredth of their mean: features that no sample excites have no prior
+        Eigenvalues of B have a floor: features that no sample excites have no prior
         precision, and their weights must not count as known.
         """
         values, axes = eigensystem(self.prior.hessian)
-        floored = np.maximum(values, 1e-2 * values.mean(axis=1, keepdims=True))
+        floored = np.maximum(values, LEAST_PRIOR_PRECISION * values.mean(axis=1, keepdims=True))
         prior = (axes * floored[:, None, :]) @ axes.swapaxes(1, 2)
         eigenvalues, vectors = eigensystem(self.evidence.hessian + prior)
         lowest = np.maximum(1e-15 * eigenvalues[:, -1:], 1e-300)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 
 from ...pages import html
-from ...pages.figures import COLOURS, LABELS
+from ...pages.figures import COLOURS, LABELS, PALETTE
 
 
 def mean_sd(mean: float | None, sd: float | None, scale: float = 100.0) -> str:
@@ -16,8 +16,10 @@ def mean_sd(mean: float | None, sd: float | None, scale: float = 100.0) -> str:
 
 
 def label(key: str) -> html.Markup:
-    """A method with its colour."""
-    return html.markup('<span class="dot" style="background:{}"></span>{}').format(COLOURS[key], LABELS[key])
+    """A method, or another key, with its colour."""
+    return html.markup('<span class="dot" style="background:{}"></span>{}').format(
+        COLOURS.get(key, PALETTE[0]), LABELS.get(key, key)
+    )
 
 
 def image(name: str, data: bytes, kind: str, alternative: str, caption: str) -> html.Markup:
