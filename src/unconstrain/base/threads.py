@@ -26,19 +26,6 @@ WORTH_A_THREAD = 1e7
 """Multiplications below which threads take longer than they save."""
 
 
-class Workers:
-    """Threads for some work, as long as BLAS is limited to one; see :func:`workers`."""
-
-    def run(self, calls: Sequence[Callable[[], Any]], multiplications: float) -> list[Any]:
-        """Results of some calls that take so many multiplications in all."""
-        pool = _limit.pool() if len(calls) > 1 and multiplications >= WORTH_A_THREAD else None
-        if pool is None:
-            return [call() for call in calls]
-        # Each in the caller's context: what was said by np.errstate holds there too.
-        running = [pool.submit(copy_context().run, call) for call in calls]
-        return [each.result() for each in running]
-
-
 @contextmanager
 def workers() -> Iterator[Workers]:
     """As many threads as BLAS may use; meanwhile it uses one.
@@ -47,13 +34,13 @@ def workers() -> Iterator[Workers]:
     """
     _limit.hold()
     try:
-        yield Workers()
+        yield _limit
     finally:
         _limit.release()
 
 
-class _Limit:
-    """One thread for BLAS and the others for a pool, for as long as anybody holds it."""
+class Workers:
+    """One thread for BLAS and the others for some work, for as long as anybody holds it; see :func:`workers`."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -62,7 +49,17 @@ class _Limit:
         self._pool: ThreadPoolExecutor | None = None
         self._own = threading.local()
 
+    def run(self, calls: Sequence[Callable[[], Any]], multiplications: float) -> list[Any]:
+        """Results of some calls that take so many multiplications in all."""
+        pool = self._shared() if len(calls) > 1 and multiplications >= WORTH_A_THREAD else None
+        if pool is None:
+            return [call() for call in calls]
+        # Each in the caller's context: what was said by np.errstate holds there too.
+        running = [pool.submit(copy_context().run, call) for call in calls]
+        return [each.result() for each in running]
+
     def hold(self) -> None:
+        """Limit BLAS, if nobody has."""
         with self._lock:
             self._holders += 1
             if self._holders > 1:
@@ -71,6 +68,7 @@ class _Limit:
             _set([1] * len(self._before))
 
     def release(self) -> None:
+        """Take the limit back, if nobody else holds it."""
         with self._lock:
             self._holders -= 1
             if self._holders:
@@ -80,7 +78,7 @@ class _Limit:
         if pool is not None:
             pool.shutdown()
 
-    def pool(self) -> ThreadPoolExecutor | None:
+    def _shared(self) -> ThreadPoolExecutor | None:
         """Threads that all holders share; None where there is but one, or this is one of them and must not wait."""
         with self._lock:
             threads = max(self._before, default=1)
@@ -94,7 +92,7 @@ class _Limit:
         self._own.of_the_pool = True
 
 
-_limit = _Limit()
+_limit = Workers()
 
 
 def _set(threads: Sequence[int]) -> None:

@@ -215,10 +215,8 @@ def rollout(
     else:
         write(output, table)
     if support is not None and support.min() < 1e-3:
-        click.echo(
-            f"Note: from {dt * int((support < 1e-3).argmax()):.2f} s on the movement is far from all data.",
-            err=True,
-        )
+        since = dt * int((support < 1e-3).argmax())
+        click.echo(f"Note: from {since:.2f} s on the movement is far from all data.", err=True)
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain export wipe.npz -o wipe.c --name wipe")

@@ -104,10 +104,7 @@ def _norm(demonstrations: Demonstrations) -> float:
 
 
 def _listed(demonstrations: Demonstrations) -> list[Demonstration]:
-    demos = [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
-    if not demos:
-        raise InvalidDataError("got no demonstration, expected at least one.")
-    return demos
+    return [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
 
 
 def _predicted(policy: PolicyLike, demos: list[Demonstration]) -> Array:

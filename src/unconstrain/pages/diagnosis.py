@@ -141,13 +141,7 @@ def _freedom(found: Diagnosis) -> html.Markup:
     shown = found.movements[:MOST_MOVEMENTS]
     names = [escape(one.name) for one in shown]
     free = [one.free or 0.0 for one in shown]
-    picture = figures.bars(
-        names,
-        {"hybrid": free},
-        title="",
-        label="probability of being free",
-        height=360,
-    )
+    picture = figures.bars(names, {"hybrid": free}, title="", label="probability of being free", height=360)
     picture.update_yaxes(range=[0.0, 1.0])
     picture.update_xaxes(showticklabels=len(shown) <= 40, tickangle=-90 if len(shown) > 12 else 0)
     caption = html.words(

@@ -186,12 +186,7 @@ def _determined(policy: Policy) -> html.Markup:
     if solution.scores is not None:
         chosen = solution.directions - solution.determined
         panels.append(figures.step_scores(solution.scores, chosen, title="held-out score along the threshold"))
-    words = html.words(
-        "fit_determined",
-        share=f"{solution.determined_share:.1%}",
-        eigenvalues=solution.eigenvalues is not None,
-        scores=solution.scores is not None,
-    )
+    words = html.words("fit_determined", found=solution)
     return html.picture("determined", panels, words) if panels else html.paragraph(words)
 
 

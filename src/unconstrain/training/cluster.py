@@ -103,13 +103,7 @@ def fit_batches(policy: P, parts: Sequence[Any], *, client: Any | None = None) -
 
 
 def check_learner(learner: Any) -> None:
-    """Refuse a learner that needs the samples.
-
-    Raises
-    ------
-    SettingError
-        If it does.
-    """
+    """Refuse a learner that needs the samples, by a SettingError."""
     if getattr(learner, "needs_samples", False):
         name = type(learner).__name__
         raise SettingError(f"learner: {name} needs the samples, and a cluster sends their sums alone. Take Hybrid().")

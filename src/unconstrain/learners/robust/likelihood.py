@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
+from operator import add
 from typing import NamedTuple
 
 import numpy as np
@@ -52,10 +54,10 @@ def maximise(
     model = _GaussNewton(samples, samples.predict(best.weights), best.variance, best.mixture, best.smoothness)
     parts = [model.posterior(samples.folds == fold) for fold in range(int(samples.folds.max()) + 1)]
     d = samples.actions.shape[1]
-    whole = _sum(parts)
+    whole = reduce(add, parts)
     held_out = np.empty_like(samples.actions)
     for fold in range(len(parts)):
-        rest = _sum([part for i, part in enumerate(parts) if i != fold] or parts)
+        rest = reduce(add, [part for i, part in enumerate(parts) if i != fold] or parts)
         held_out[samples.folds == fold] = samples[samples.folds == fold].predict(rest.weights(d))
     found = Candidate("likelihood", whole.weights(d), whole, held_out, best.variance, best.smoothness, held_out)
     return found, best.mixture
@@ -149,12 +151,7 @@ class _GaussNewton:
     """Quadratic approximation of the expected log-posterior about a policy (Gauss–Newton), as evidence and prior."""
 
     def __init__(
-        self,
-        samples: Samples,
-        policy: Array,
-        variance: float,
-        mixture: Array,
-        smoothness: Smoothness,
+        self, samples: Samples, policy: Array, variance: float, mixture: Array, smoothness: Smoothness
     ) -> None:
         self.samples, self.policy, self.variance = samples, policy, variance
         self.smoothness = smoothness
@@ -193,10 +190,3 @@ class _GaussNewton:
         away = np.maximum(((samples.actions - self.policy) ** 2).sum(axis=1) - self.place.radial**2, 0.0)
         spread = float(constrained @ away / ((constrained.sum() + 1e-9) * (d - 1))) + self.variance
         return spread, unit_information(d * samples.features.shape[1], samples.sizes)
-
-
-def _sum(parts: Sequence[Posterior]) -> Posterior:
-    evidence, prior = parts[0].evidence, parts[0].prior
-    for part in parts[1:]:
-        evidence, prior = evidence + part.evidence, prior + part.prior
-    return Posterior(evidence, prior)

@@ -37,6 +37,9 @@ class Posterior:
     evidence: Quadratic
     prior: Quadratic
 
+    def __add__(self, other: Posterior) -> Posterior:
+        return Posterior(self.evidence + other.evidence, self.prior + other.prior)
+
     def weights(self, actions: int) -> Array:
         """The weights of maximum posterior density, shape (M, d, p)."""
         return unvec(minimum(self.evidence + self.prior), actions)

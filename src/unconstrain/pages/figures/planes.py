@@ -125,7 +125,7 @@ def clipped(vectors: Array, longest: float) -> Array:
     return vectors * np.minimum(1.0, longest / np.maximum(lengths, 1e-300))
 
 
-def arrow_lines(points: Array, vectors: Array, head: float = 0.32, angle: float = 0.45) -> Array:
+def arrow_lines(points: Array, vectors: Array, head: float = 0.32) -> Array:
     """Arrows as one broken line, six rows each, the last of them NaN.
 
     Parameters
@@ -134,14 +134,13 @@ def arrow_lines(points: Array, vectors: Array, head: float = 0.32, angle: float 
         Where the arrows begin, and how far they reach.
     head : float
         Length of the barbs, as a share of the arrow's.
-    angle : float
-        Between barb and shaft, radians.
 
     Returns
     -------
     ndarray, shape (6 A, 2)
     """
     tips = points + vectors
+    angle = 0.45  # between barb and shaft, radians
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     left, right = tips - head * vectors @ turn.T, tips - head * vectors @ turn
     gaps = np.full_like(points, np.nan)
@@ -180,6 +179,5 @@ def _show(made: Any, points: Array) -> None:
 
 def equal_axes(made: Any) -> None:
     """Draw both axes to one scale."""
-    made.update_yaxes(scaleanchor="x", scaleratio=1)
     made.update_xaxes(constrain="domain")
-    made.update_yaxes(constrain="domain")
+    made.update_yaxes(constrain="domain", scaleanchor="x", scaleratio=1)

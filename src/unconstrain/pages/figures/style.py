@@ -62,9 +62,7 @@ def figure(title: str = "", x: str = "", y: str = "", height: int = 400, **layou
     """
     made = plotly().Figure()
     dress(made, title, height)
-    made.update_xaxes(title_text=x)
-    made.update_yaxes(title_text=y)
-    made.update_layout(**layout)
+    made.update_layout(xaxis_title_text=x, yaxis_title_text=y, **layout)
     return made
 
 

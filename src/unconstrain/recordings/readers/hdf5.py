@@ -32,14 +32,11 @@ def read_hdf5(path: Path, group: str | None, time: str | None, rows: int | None 
     except OSError as error:
         raise ReadError(f"{path}: cannot be read ({str(error).splitlines()[0]}). Expected an HDF5 file.") from error
     with file:
-        found = False
-        for node in _groups_in(file, h5py):
-            sets = _data_sets(node, h5py)
-            if sets:
-                found = True
-                yield from _of_group(sets, node.name.strip("/") or path.stem, path, group, time, rows)
+        found = [(node, sets) for node in _groups_in(file, h5py) if (sets := _data_sets(node, h5py))]
         if not found:
             raise ReadError(f"{path}: no data sets of numbers in one or two dimensions, expected some of one length.")
+        for node, sets in found:
+            yield from _of_group(sets, node.name.strip("/") or path.stem, path, group, time, rows)
 
 
 def _groups_in(node: Any, h5py: Any) -> Iterator[Any]:
