@@ -70,7 +70,7 @@ def read_blocks(
     file = Path(path)
     known = _format(file)
     read = known.read if whole or known.blocks is None else known.blocks
-    yield from read(file, group, time)
+    yield from read(file, group=group, time=time)
 
 
 def expand(paths: PathLike | Iterable[PathLike]) -> list[Path]:

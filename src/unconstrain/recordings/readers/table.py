@@ -29,7 +29,7 @@ _UNIT_IN_NAME = re.compile(r"[_ \[(](s|ms|us|ns)[\])]?$", re.IGNORECASE)
 class ReadFile(Protocol):
     """What a format must be able to do."""
 
-    def __call__(self, path: Path, group: str | None, time: str | None, /) -> Iterable[Recording]:
+    def __call__(self, path: Path, *, group: str | None, time: str | None) -> Iterable[Recording]:
         """Read one file into its recordings; of blocks, those that are called the same are one recording.
 
         Parameters
