@@ -8,7 +8,7 @@ from sklearn.base import clone
 import unconstrain as uc
 from samples import draw
 from unconstrain.base.errors import InvalidDataError, SettingError
-from unconstrain.training import Batch, FirstLook, are_typical
+from unconstrain.training import Batch, is_typical
 
 DATA = draw(samples=120, groups=6)
 POLICIES = {
@@ -171,28 +171,66 @@ def test_what_has_no_learn_is_refused_before_any_work():
         uc.ParametricPolicy().fit_parts([], sum_of)
 
 
+def typical(states, newest):
+    """Whether states are enough of a stream, the last ``newest`` of which have just come."""
+    return is_typical(Batch(states, states), newest)
+
+
 class TestWhenAStreamIsTypical:
-    """Batches along a straight movement, or all over the place."""
-
-    @staticmethod
-    def looks(states, size):
-        return [
-            FirstLook.at(Batch(states[at : at + size], states[at : at + size])) for at in range(0, len(states), size)
-        ]
-
     def test_one_good_batch_is_enough_after_any_number_of_small_ones(self):
         states = np.random.default_rng(0).normal(size=(100, 2))
-        assert are_typical(self.looks(states, 100))
-        assert not are_typical(self.looks(states[:29], 29))
-        assert are_typical([*self.looks(states[:3], 1), *self.looks(states[3:], 97)])
+        assert typical(states, newest=100)
+        assert not typical(states[:29], newest=29)
+        assert typical(np.cumsum(np.ones((60, 2)), axis=0), newest=57)
 
     def test_samples_one_by_one_are_once_their_spread_has_settled(self):
         scattered = np.random.default_rng(0).normal(size=(60, 2))
         moving = np.column_stack([np.arange(999.0), np.zeros(999)])
-        assert are_typical(self.looks(scattered, 1))
-        assert not are_typical(self.looks(scattered[:20], 1))
-        assert not are_typical(self.looks(moving, 9))
+        assert typical(scattered, newest=1)
+        assert not typical(scattered[:20], newest=1)
+        assert not typical(moving, newest=9)
 
     def test_nothing_waits_for_ever(self):
-        assert are_typical(self.looks(np.column_stack([np.arange(1000.0), np.zeros(1000)]), 10))
-        assert not are_typical([None, None])
+        assert typical(np.column_stack([np.arange(1000.0), np.zeros(1000)]), newest=1)
+        assert typical(np.ones((1000, 2)), newest=1)
+        assert not typical(np.ones((999, 2)), newest=1)
+
+    def test_waiting_samples_are_held_once_and_never_stored(self, tmp_path):
+        policy = uc.ParametricPolicy(uc.Affine()).partial_fit(DATA.states[:5], DATA.actions[:5])
+        uc.save(policy, tmp_path / "waiting.npz")
+        assert not hasattr(uc.load(tmp_path / "waiting.npz"), "_waiting")
+        given = DATA.states[5:9].copy()
+        policy.partial_fit(given, DATA.actions[5:9])
+        given[:] = 1e6  # who gave it may use it again
+        assert policy.partial_fit(DATA.states[9:], DATA.actions[9:]).moments_.weight.sum() == len(DATA.states)
+        whole = uc.ParametricPolicy(policy.features_).fit(DATA.states, DATA.actions)
+        assert_allclose(policy.moments_.gram, whole.moments_.gram, atol=1e-9)
+
+    def test_groups_that_only_some_waiting_batches_name_count_for_none(self):
+        policy = uc.ParametricPolicy(uc.Affine()).partial_fit(DATA.states[:5], DATA.actions[:5])
+        policy.partial_fit(DATA.states[5:], DATA.actions[5:], groups=DATA.groups[5:])
+        assert policy.training_.split.by == "sample"
+
+    def test_weights_of_some_waiting_batches_are_ones_elsewhere(self):
+        policy = uc.ParametricPolicy(uc.Affine()).partial_fit(DATA.states[:5], DATA.actions[:5])
+        policy.partial_fit(DATA.states[5:], DATA.actions[5:], np.full(115, 2.0))
+        assert policy.moments_.weight.sum() == 5.0 + 230.0
+
+    def test_a_long_stream_of_single_samples_takes_no_longer_than_its_length_says(self):
+        states = np.column_stack([np.arange(300.0), 0.3 * np.arange(300.0)])
+        looked = []
+        policy = uc.ParametricPolicy(uc.Affine(), Counts(looked))
+        for row in range(300):
+            policy.partial_fit(states[row : row + 1], states[row : row + 1])
+        assert looked == list(range(1, 301))  # samples are summed in one piece, not one by one
+
+
+class Counts(uc.Direct):
+    """Notes the weight of what it learns from."""
+
+    def __init__(self, seen):
+        object.__setattr__(self, "seen", seen)
+
+    def learn(self, training):
+        self.seen.append(int(training.folds.whole.weight.sum()))
+        return super().learn(training)

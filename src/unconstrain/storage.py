@@ -6,8 +6,6 @@ everything shows damage. Writing goes to a new file that takes the old one's
 place in one step.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -126,6 +124,7 @@ def _without_samples(policy: Policy) -> Policy:
     if not hasattr(policy, "training_"):
         return policy
     slim = copy(policy)
+    slim.__dict__.pop("_waiting", None)
     slim.training_ = policy.training_.without_samples()
     return slim
 

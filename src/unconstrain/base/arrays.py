@@ -9,8 +9,6 @@ library that an array belongs to, and is NumPy for everything that is no array
 of another library. Such an array stays on its device.
 """
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Hashable, Iterator, Sequence
 from numbers import Integral

@@ -1,7 +1,5 @@
 """How objects that hold arrays show themselves: one line in a terminal, a small table in a notebook."""
 
-from __future__ import annotations
-
 from html import escape
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What scikit-learn checks of states, in our words."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

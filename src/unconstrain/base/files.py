@@ -1,7 +1,5 @@
 """Files go out whole or not at all: whoever looks sees the old one or the new one."""
 
-from __future__ import annotations
-
 import os
 import secrets
 import stat

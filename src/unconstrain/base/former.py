@@ -1,7 +1,5 @@
 """Modules under the names that they had up to release 0.1, for code that was written for it."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from importlib import import_module

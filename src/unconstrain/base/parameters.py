@@ -1,7 +1,5 @@
 """Settings, read and changed as scikit-learn does with its estimators': ``learner__alpha`` is the learner's alpha."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Collection
 from copy import copy
@@ -40,7 +38,9 @@ class Parameters:
                 own[name] = value
         for name, values in inner.items():
             own[name] = _changed(name, own[name], values)
-        vars(self).update(vars(type(self)(**own)))
+        changed = type(self)(**own)
+        for name in own:
+            object.__setattr__(self, name, getattr(changed, name))
         return self
 
     def _check_name(self, name: str, known: Collection[str]) -> None:

@@ -12,6 +12,7 @@ ask for it at once: the first sets it, the last takes it back.
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -88,11 +89,20 @@ class Workers:
                 self._pool = ThreadPoolExecutor(threads, initializer=self._mark)
             return self._pool
 
+    def begin_anew(self) -> None:
+        """In a process that was forked, which has none of the threads: nobody holds anything."""
+        held, before = self._holders, self._before
+        self.__init__()  # type: ignore[misc]
+        if held:
+            _set(before)
+
     def _mark(self) -> None:
         self._own.of_the_pool = True
 
 
 _limit = Workers()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_limit.begin_anew)
 
 
 def _set(threads: Sequence[int]) -> None:

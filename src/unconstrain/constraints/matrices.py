@@ -1,7 +1,5 @@
 """From a constraint to its matrices at given states, checked."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NoReturn
 
@@ -16,7 +14,7 @@ class _UnknownTimes(NDArrayOperatorsMixin):
     """Stands where nobody recorded the times: it has a length, and whoever reads a value is refused."""
 
     def __init__(self, length: int, name: str) -> None:
-        self.shape, self._name = (length,), name
+        self.shape, self.size, self.ndim, self._name = (length,), length, 1, name
 
     def __len__(self) -> int:
         return self.shape[0]

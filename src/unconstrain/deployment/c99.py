@@ -1,7 +1,5 @@
 """One C99 file for a policy, with fixed sizes, no allocation and no state."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Callable

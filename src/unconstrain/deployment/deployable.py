@@ -1,7 +1,5 @@
 """What a fitted policy can do without what it learnt from."""
 
-from __future__ import annotations
-
 import os
 from abc import abstractmethod
 from typing import Any

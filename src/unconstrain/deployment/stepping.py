@@ -1,7 +1,5 @@
 """One state at a time, in Python, with nothing but the arithmetic."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from threading import local
 from typing import TypeAlias

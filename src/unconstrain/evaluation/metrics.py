@@ -10,8 +10,6 @@ Where the truth is not known, the observed action takes the place of Nπ, and
 its variance that of the policy's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

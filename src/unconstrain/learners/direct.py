@@ -1,7 +1,5 @@
 """Least-squares regression on the observed actions."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

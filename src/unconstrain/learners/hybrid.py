@@ -1,7 +1,5 @@
 """The inconsistency first, then the standard risk in the directions that it leaves undetermined."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal

@@ -1,7 +1,5 @@
 """Least squares after projection onto each recorded action."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..risks import Moments, Path, inconsistency, lexicographic_path

@@ -1,7 +1,5 @@
 """Base class of the learners."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
@@ -47,12 +45,13 @@ class Learner(Parameters, ABC):
         From the moments alone, each model evaluated in its own receptive field. NaN where nothing can be held out, or
         where the learner needs the samples.
         """
-        filled = training.folds.filled
+        folds = training.folds
+        filled = folds.filled
         if self.needs_samples or len(filled) < 2:
             return float("nan")
         loss = energy = 0.0
         for i in filled:
-            part, rest = training.folds.parts[i], training.of_folds([j for j in filled if j != i])
+            part, rest = folds.parts[i], training.of_folds([j for j in filled if j != i])
             loss += float(np.clip(inconsistency(part)(vec(self.learn(rest).weights)), 0.0, None).sum())
             energy += float(part.energy.sum())
         return 1.0 - loss / energy if energy > 0 else float("nan")

@@ -1,7 +1,5 @@
 """Learners by name."""
 
-from __future__ import annotations
-
 from ..base.errors import SettingError
 from .direct import Direct
 from .hybrid import Hybrid

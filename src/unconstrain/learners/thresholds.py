@@ -1,7 +1,5 @@
 """Split of the eigenvectors into determined and undetermined ones, by cross-validation (section III-C)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """Closed form of a fitted policy, without estimator, moments or feature map."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

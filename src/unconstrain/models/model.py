@@ -1,7 +1,5 @@
 """Model of a policy: features and receptive fields, without weights."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

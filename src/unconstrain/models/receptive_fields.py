@@ -1,7 +1,5 @@
 """Receptive fields: membership of states in local models (section III-D), or in a single one."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

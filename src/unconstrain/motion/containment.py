@@ -1,7 +1,5 @@
 """Keeping a learnt policy near its data."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -52,12 +50,13 @@ class Contained:
             check_at_least("speed", speed, 0.0, strict=True)
         shown = as_matrix(states, "states")
         self._policy, self._reach, self._gain = policy, reach, gain
-        self._speed = float(np.linalg.norm(policy(shown), axis=1).max()) if speed is None else float(speed)
+        fastest = float(np.linalg.norm(policy(shown), axis=1).max()) if speed is None else float(speed)
+        self._speed = fastest or gain * reach  # of a policy that is at rest wherever anybody was
         self._shown = KDTree(shown)
 
     def __call__(self, states: Array) -> Array:
         """Velocities (N, n)."""
-        distance, nearest = self._shown.query(states)
+        distance, nearest = self._shown.query(as_matrix(states, "states"))
         beyond = np.clip(distance / self._reach - 1.0, 0.0, 1.0)
         # Up to the reach, where none of this counts, the direction is allowed to vanish with the distance.
         away = (states - self._shown.data[nearest]) / np.maximum(distance, self._reach)[:, None]

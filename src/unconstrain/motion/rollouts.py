@@ -1,7 +1,5 @@
 """Follow a policy under constraints: makes demonstrations, and reproduces what was learnt."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import overload
 

@@ -1,7 +1,5 @@
 """What both policies share: learning from samples as they come, predicting, leaving for a robot."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy, deepcopy
@@ -24,7 +22,7 @@ from ..learners import Belief, Learner, Solution, Uncertainty, named
 from ..models import FeatureMap, Model
 from ..recordings import Demonstration, stack, times_of
 from ..risks import Moments, unit_actions
-from ..training import Batch, FirstLook, Folds, Seen, Split, Training, Validation, are_typical, cluster
+from ..training import Batch, FirstLook, Folds, Seen, Split, Training, Validation, cluster, is_typical
 
 _FITTED = ("training_", "solution_", "n_features_in_", "feature_names_in_", "n_outputs_", "_flat", "_waiting")
 
@@ -98,13 +96,12 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         """
         first, learner, draft = not hasattr(self, "solution_"), named(self.learner), self._draft()
         batch = draft._checked(X, y, sample_weight, groups, reset=first)
-        waiting = tuple(Batch(*one) for one in getattr(self, "_waiting", ()))
-        if not first and not waiting:
+        waiting: Batch | None = getattr(self, "_waiting", None)
+        if not first and waiting is None:
             return self._become(draft._learnt([batch], learner))
-        seen = (*waiting, batch)
-        looks = [FirstLook.at(one) for one in seen]
-        draft._began(FirstLook.total(looks), learner, more=True)._learnt(seen, learner)
-        draft._waiting = () if are_typical(looks) else (*waiting, deepcopy(batch))
+        seen = deepcopy(batch) if waiting is None else waiting.followed_by(batch)  # who gave it may use it again
+        draft._began(FirstLook.at(seen), learner, more=True)._learnt([seen], learner)
+        draft._waiting = None if is_typical(seen, newest=batch.states.shape[0]) else seen
         return self._become(draft)
 
     def fit_batches(self, batches: Iterable[Sequence[Any]]) -> Self:
@@ -126,14 +123,15 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         learner = self._check_speed_power(getattr(batches, "speed_power", 0.0))
         if iter(batches) is not batches:
             return self._fit_parts([batches], lambda function, parts: function(*parts), learner)
-        draft, first, looks = self._draft(*_FITTED), [], []
+        draft = self._draft(*_FITTED)
         checked = draft._each_checked(batches)
+        seen: Batch | None = None
         for batch in checked:
-            first.append(deepcopy(batch))  # the caller may use a buffer again
-            looks.append(FirstLook.at(batch))
-            if are_typical(looks):
+            seen = batch if seen is None else seen.followed_by(batch)
+            if is_typical(seen, newest=batch.states.shape[0]):
                 break
-        look = FirstLook.total(looks)
+            seen = deepcopy(seen)  # before the next batch, which may come in the same memory
+        look, first = (None, ()) if seen is None else (FirstLook.at(seen), (seen,))
         return self._become(draft._began(look, learner, more=True)._learnt(chain(first, checked), learner))
 
     def fit_parts(self, parts: Sequence[Any], summed: Callable[..., Any]) -> Self:
@@ -206,7 +204,8 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
             Of the library and on the device of the states.
         """
         check_is_fitted(self, "solution_")
-        actions = self.training_.model.predict(self.solution_.weights, checked_states(self, X))
+        known = self.__dict__  # as it is now: another thread may put a new one in its place
+        actions = known["training_"].model.predict(known["solution_"].weights, checked_states(self, X))
         return actions[:, 0] if self._flat else actions
 
     def __call__(self, states: ArrayLike) -> Array:
@@ -227,11 +226,10 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         """
         check_is_fitted(self, "solution_")
         missed = moved = 0.0
-        for states, actions, weights, *_ in self._checked(X, y, sample_weight, reset=False).blocks():
-            directions, lengths = unit_actions(actions)
-            xp = namespace(lengths)
-            counts = xp.ones_like(lengths) if weights is None else beside(weights, lengths)
-            missed += float(counts @ (lengths - xp.sum(directions * self(states), axis=1)) ** 2)
+        for block in self._checked(X, y, sample_weight, reset=False).blocks():
+            directions, lengths = unit_actions(block.actions)
+            counts, along = beside(block.counts, lengths), directions * self(block.states)
+            missed += float(counts @ (lengths - namespace(lengths).sum(along, axis=1)) ** 2)
             moved += float(counts @ lengths**2)
         return 1.0 - missed / moved if moved > 0 else 0.0
 

@@ -1,7 +1,5 @@
 """Locally linear policies (section III-D)."""
 
-from __future__ import annotations
-
 from typing import cast
 
 import numpy as np

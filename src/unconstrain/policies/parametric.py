@@ -1,7 +1,5 @@
 """Policies on fixed features (section III-C)."""
 
-from __future__ import annotations
-
 from ..base.errors import SettingError
 from ..learners import Learner
 from ..models import Everywhere, FeatureMap, KMeansRBF, Model, Placeable

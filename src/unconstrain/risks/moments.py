@@ -255,7 +255,10 @@ class _Workspace:
     def room(self, shape: tuple[int, ...], order: Literal["C", "F"] = "C") -> Iterator[Array]:
         """An array to write to, of any content; not to be kept."""
         numbers = int(np.prod(shape))
-        memory = self._free.pop() if self._free else np.empty(numbers)
+        try:
+            memory = self._free.pop()
+        except IndexError:  # as many threads as there are pieces
+            memory = np.empty(0)
         if memory.size < numbers:
             memory = np.empty(numbers)
         try:

@@ -1,7 +1,5 @@
 """Objectives: functions from moments to quadratics. A new objective is one such function."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..base.arrays import Array, beside, namespace

@@ -3,8 +3,6 @@
 Every projection here is symmetric and idempotent, ``P = Pᵀ = P²``.
 """
 
-from __future__ import annotations
-
 from functools import reduce
 from operator import add
 

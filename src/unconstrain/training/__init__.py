@@ -2,7 +2,7 @@
 
 from . import cluster
 from .batches import Batch
-from .first_look import FirstLook, Seen, are_typical
+from .first_look import FirstLook, Seen, is_typical
 from .folds import Folds, HeldOut, Split, Validation
 from .samples import Samples
 from .training import Training
@@ -17,6 +17,6 @@ __all__ = [
     "Split",
     "Training",
     "Validation",
-    "are_typical",
     "cluster",
+    "is_typical",
 ]

@@ -86,6 +86,20 @@ class Batch(NamedTuple):
                 states, actions = (xp.asarray(table, dtype=xp.float64) for table in part[:2])
                 yield part._replace(states=states, actions=actions)
 
+    def followed_by(self, other: Batch) -> Batch:
+        """Both in one; groups and times only where both have them."""
+        xp, weighted = namespace(self.states), self.weights is not None or other.weights is not None
+        columns: list[Any] = [xp.concat([mine, theirs]) for mine, theirs in zip(self[:2], other[:2], strict=True)]
+        columns.append(np.concatenate([self.counts, other.counts]) if weighted else None)
+        for mine, theirs in zip(self[3:], other[3:], strict=True):
+            columns.append(None if mine is None or theirs is None else np.concatenate([mine, theirs]))
+        return Batch(*columns)
+
+    @property
+    def counts(self) -> Array:
+        """Sample weights, ones where none were given, shape (N,)."""
+        return np.ones(self.states.shape[0]) if self.weights is None else self.weights
+
     def at(self, rows: NDArray[np.intp]) -> Batch:
         """Some of the samples, in any order."""
         parts: list[Any] = [

@@ -7,8 +7,6 @@ another. The result is that of :meth:`~unconstrain.ParametricPolicy.fit`, to
 rounding. Needs the extra ``cluster``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial, reduce
 from operator import add

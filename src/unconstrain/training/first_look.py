@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +25,7 @@ _WIDENED = 1.2
 """A spread that the later half of small batches has not widened by more than this has settled."""
 
 _MOST_WAITING = 1000
-"""Different states at which nothing waits any longer."""
+"""Samples at which nothing waits any longer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +80,7 @@ class FirstLook:
 
     @classmethod
     def _at_block(cls, block: Batch, largest_key: np.uint64) -> FirstLook:
-        states, actions, weights, groups = on_host(block.states), on_host(block.actions), block.weights, block.groups
-        counts = np.ones(len(states)) if weights is None else weights
+        states, actions, counts, groups = on_host(block.states), on_host(block.actions), block.counts, block.groups
         weight = float(counts.sum())
         columns, shares = np.ascontiguousarray(states.T), counts / weight  # sums along memory are fast
         mean = (shares * columns).sum(axis=1)
@@ -140,22 +139,26 @@ class FirstLook:
         return whole
 
 
-def are_typical(looks: Sequence[FirstLook | None]) -> bool:
+def is_typical(seen: Batch, newest: int) -> bool:
     """Whether what was seen of a stream so far is enough to place features and fields on, and to deal folds by.
 
-    It is if the last batch alone has ten different states for each weight of an affine model. Of smaller batches, such
-    as single samples, so many have to have come together, and the later half must not have widened the spread much:
-    a movement that has just begun says little of where it will go.
+    It is if the newest samples alone have ten different states for each weight of an affine model. Where they are
+    fewer, such as one at a time, so many have to have come together, and the later half must not have widened the
+    spread much: a movement that has just begun says little of where it will go.
     """
-    seen, half = FirstLook.total(looks), FirstLook.total(looks[: len(looks) // 2])
-    if seen is None:
-        return False
-    enough, most = _STATES_PER_WEIGHT * (len(seen.mean) + 1), _MOST_WAITING
-    if (looks[-1] is not None and len(looks[-1].keys) >= enough) or len(seen.keys) >= most:
+    count = seen.states.shape[0]
+    enough = _STATES_PER_WEIGHT * (seen.states.shape[1] + 1)
+    if count >= _MOST_WAITING or _different(seen, count - newest, count) >= enough:
         return True
-    if half is None or len(seen.keys) < enough:
+    whole, half = FirstLook.at(seen), FirstLook.at(seen.at(np.arange(count // 2)))
+    if whole is None or half is None or len(whole.keys) < enough:
         return False
-    return bool((seen.scatter / seen.weight <= _WIDENED**2 * half.scatter / half.weight).all())
+    return bool((whole.scatter / whole.weight <= _WIDENED**2 * half.scatter / half.weight).all())
+
+
+def _different(seen: Batch, start: int, stop: int) -> int:
+    look = FirstLook.at(seen.at(np.arange(start, stop)))
+    return 0 if look is None else len(look.keys)
 
 
 @dataclass(frozen=True)

@@ -167,14 +167,15 @@ class Training(Shown):
 
     def _counts(self) -> Array:
         """Sample weights, ones where none were given, shape (N,)."""
-        kept = self._kept()
-        return np.concatenate([np.ones(len(b.states)) if b.weights is None else b.weights for b in kept])
+        return np.concatenate([batch.counts for batch in self._kept()])
 
     def _folds_of(self, blocks: Sequence[Batch], counts: Array) -> NDArray[np.intp]:
-        """Fold of each sample, (N,), numbered among those that hold anything; samples of no weight are in none: 0."""
+        """Fold of each sample, (N,), numbered among those that hold anything; others are with the first."""
         rows, found = np.flatnonzero(counts), np.zeros(len(counts), dtype=np.intp)
         dealt = [self.split.assign(part.states, part.groups) for block in blocks for part in [_of_weight(block)]]
-        found[rows] = np.unique(np.concatenate(dealt), return_inverse=True)[1]
+        filled, number = self.gathered.filled, np.zeros(self.split.validation.count, dtype=np.intp)
+        number[filled] = np.arange(len(filled))  # what no field sees is in none of them either
+        found[rows] = number[np.concatenate(dealt)]
         return found
 
     @property
@@ -208,8 +209,8 @@ def _add(batch: Batch, model: Model, split: Split, sums: Sequence[Sums], threads
     # Each fold in one piece; of small integers NumPy sorts by counting.
     order = np.argsort(folds.astype(np.min_scalar_type(len(sums))), kind="stable")
     starts = np.searchsorted(folds[order], np.arange(len(sums) + 1)).tolist()
-    states, actions, weights, _, _ = batch.at(order)
-    weights = beside(np.ones(len(order)) if weights is None else weights, states)
+    ordered = batch.at(order)
+    states, actions, weights = ordered.states, ordered.actions, beside(ordered.counts, ordered.states)
 
     def add(fold: Sums, start: int, stop: int) -> None:
         for rows in fold.pieces(states, start, stop):

@@ -1,7 +1,5 @@
 """A candidate policy."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ...base.arrays import Array

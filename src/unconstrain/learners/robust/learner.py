@@ -1,7 +1,5 @@
 """Learners that use the samples themselves: they estimate the noise and need no α."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal

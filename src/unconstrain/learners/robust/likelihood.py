@@ -1,7 +1,5 @@
 """Maximum a posteriori policy under the mixture model of :mod:`.sphere`, by expectation maximisation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import reduce
 from operator import add

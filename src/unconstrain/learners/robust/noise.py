@@ -19,8 +19,6 @@ follows from the expectations
 and is a combination of the moments with sample weights ‖u‖² and 1.
 """
 
-from __future__ import annotations
-
 from math import comb
 
 import numpy as np

@@ -7,8 +7,6 @@ minimised as if the constraint were known. It uses more than the
 inconsistency: all directions of the range, from all samples of the segment.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

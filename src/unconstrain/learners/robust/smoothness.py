@@ -11,8 +11,6 @@ Misfit of the model is no reason to smooth, so λ is multiplied by the share of
 noise in the residual variance.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Self
 

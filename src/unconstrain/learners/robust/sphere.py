@@ -15,8 +15,6 @@ component ``s_0 = 0`` is that of free samples. The last D is uniform on the
 sphere. Mixing proportions m_k are estimated by expectation maximisation.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pictures of numbers: errors, time series, spectra."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

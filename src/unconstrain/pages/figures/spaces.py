@@ -1,7 +1,5 @@
 """Pictures in three dimensions."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """One look for all pictures: a colour, a marker and a dash for each method."""
 
-from __future__ import annotations
-
 import json
 from importlib import resources
 from types import ModuleType

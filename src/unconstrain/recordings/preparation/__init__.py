@@ -1,7 +1,5 @@
 """From recordings to demonstrations: which columns are what, derivatives, gaps, trimming."""
 
-from __future__ import annotations
-
 from .movements import PreparationWarning, differentiate, prepare, resample, trim
 from .recipes import Recipe, complete_recipe
 from .surveys import survey

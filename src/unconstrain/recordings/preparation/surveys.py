@@ -1,7 +1,5 @@
 """What is in a recording, before anything is done to it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 A new format is one module with a :class:`~unconstrain.recordings.readers.table.Format`, listed in :data:`FORMATS`.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Iterator
 from dataclasses import replace

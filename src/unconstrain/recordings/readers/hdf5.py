@@ -7,8 +7,6 @@ recording, called as the file, which a data set of names or numbers
 (``groups``, ``demo``, ``trial``, ...) may split.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 The columns are called x1..xn and u1..ud. Nothing in the file is ever unpickled.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

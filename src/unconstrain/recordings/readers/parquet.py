@@ -3,8 +3,6 @@
 Read by some rows at a time where asked for. Columns of words are left out, unless one names the demonstrations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

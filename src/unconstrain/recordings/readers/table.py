@@ -1,7 +1,5 @@
 """What every file format ends as: named columns, split into recordings."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path

@@ -8,8 +8,6 @@ carries the names, as ``numpy.savetxt(header=...)`` writes it, it is the header.
 A column whose cells are all words is left out, unless it names the demonstrations.
 """
 
-from __future__ import annotations
-
 import codecs
 import csv
 import re
