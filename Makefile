@@ -21,9 +21,9 @@ demo: $(USER_STAMP) ## learn a wiping movement end to end and write a report to 
 	@$(BIN)/unconstrain demo --out $(DEMO_DIR)
 	@echo "The report is in $(CURDIR)/$(DEMO_DIR); open its .html file in a browser."
 
-test: $(DEV_STAMP) ## run all tests, in parallel, with coverage
+test: $(DEV_STAMP) ## run all tests, in parallel; COVERAGE=1 says what they leave out
 	@scripts/install-system browser graphics compiler || echo "make test: going on; tests that need them will fail." >&2
-	@$(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --cov --cov-report=term-missing:skip-covered
+	@$(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal $(if $(COVERAGE),--cov --cov-report=term-missing:skip-covered)
 
 check: $(DEV_STAMP) ## lint, formatting, types, import order
 	@failed=0; for tool in "ruff check ." "ruff format --check ." mypy "lint-imports --no-logo"; do \

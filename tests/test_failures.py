@@ -12,7 +12,7 @@ from unconstrain.training import Batch, is_typical
 
 DATA = draw(samples=120, groups=6)
 POLICIES = {
-    "robust": uc.LocallyLinearPolicy(learner=uc.Robust()),
+    "of samples": uc.LocallyLinearPolicy(learner=uc.NoiseCorrected()),
     "hybrid": uc.ParametricPolicy(uc.KMeansRBF(5)),
 }
 
