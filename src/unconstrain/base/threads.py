@@ -44,6 +44,9 @@ class Workers:
     """One thread for BLAS and the others for some work, for as long as anybody holds it; see :func:`workers`."""
 
     def __init__(self) -> None:
+        self._clear()
+
+    def _clear(self) -> None:
         self._lock = threading.Lock()
         self._holders = 0
         self._before: list[int] = []
@@ -92,7 +95,7 @@ class Workers:
     def begin_anew(self) -> None:
         """In a process that was forked, which has none of the threads: nobody holds anything."""
         held, before = self._holders, self._before
-        self.__init__()  # type: ignore[misc]
+        self._clear()
         if held:
             _set(before)
 

@@ -3,12 +3,11 @@
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-import numpy as np
-
 from ..base.parameters import Parameters
 from ..risks import inconsistency, vec
 from ..training import Training
 from .solution import Solution
+from .thresholds import judged
 
 
 class Learner(Parameters, ABC):
@@ -52,6 +51,6 @@ class Learner(Parameters, ABC):
         loss = energy = 0.0
         for i in filled:
             part, rest = folds.parts[i], training.of_folds([j for j in filled if j != i])
-            loss += float(np.clip(inconsistency(part)(vec(self.learn(rest).weights)), 0.0, None).sum())
+            loss += float(judged(inconsistency(part), vec(self.learn(rest).weights)).sum())
             energy += float(part.energy.sum())
         return 1.0 - loss / energy if energy > 0 else float("nan")

@@ -99,9 +99,10 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         waiting: Batch | None = getattr(self, "_waiting", None)
         if not first and waiting is None:
             return self._become(draft._learnt([batch], learner))
-        seen = deepcopy(batch) if waiting is None else waiting.followed_by(batch)  # who gave it may use it again
+        seen = batch if waiting is None else waiting.followed_by(batch)
         draft._began(FirstLook.at(seen), learner, more=True)._learnt([seen], learner)
-        draft._waiting = None if is_typical(seen, newest=batch.states.shape[0]) else seen
+        enough = is_typical(seen, newest=batch.states.shape[0])
+        draft._waiting = None if enough else deepcopy(seen)  # who gave it may use its memory again
         return self._become(draft)
 
     def fit_batches(self, batches: Iterable[Sequence[Any]]) -> Self:
