@@ -241,7 +241,10 @@ def test_nothing_is_smoothed_across_a_gap() -> None:
     with pytest.warns(PreparationWarning) as caught:
         demonstration = only(prepare(wiping(TORN)))
     assert [str(warning.message) for warning in caught] == [
-        "'wipe': 1 gap in the time stamps, the longest 0.72 s after 1.49 s; nothing is smoothed or interpolated across."
+        (
+            "clock-gap: 'wipe', row 150: 1 gap in the time stamps, the longest 0.72 s after 1.49 s; "
+            "nothing is smoothed or interpolated across (--max-gap)."
+        )
     ]
     assert caught[0].filename == __file__
     cut = 150
@@ -290,7 +293,7 @@ def test_a_single_sample_can_be_taken_but_not_differentiated() -> None:
 def test_rows_that_repeat_a_stamp_are_left_out_and_announced() -> None:
     times = np.insert(STEADY, 100, STEADY[99])
     states = np.insert(circle(STEADY), 100, 77, axis=0)
-    recording = Recording(("x", "y", "vx", "vy"), np.hstack([states, states]), times, "wipe")
+    recording = Recording(("x", "y", "vx", "vy"), np.hstack([states, states[:, ::-1]]), times, "wipe")
     sentence = "'wipe': 1 rows repeat the time stamp of the row before and were left out."
     for recipe in (Recipe(), Recipe(states=("x", "y"), differentiate="savgol")):
         with pytest.warns(PreparationWarning) as caught:
@@ -302,8 +305,17 @@ def test_rows_that_repeat_a_stamp_are_left_out_and_announced() -> None:
 def test_stamps_that_run_backwards_are_refused_with_their_row() -> None:
     times = STEADY.copy()
     times[7] = 0.02
-    with pytest.raises(InvalidDataError, match=r"'wipe', row 7: got time 0\.02 s after 0\.06 s, expected later ones"):
+    refused = pytest.raises(InvalidDataError, match=r"'wipe', row 7: got time 0\.02 s after 0\.06 s, expected later")
+    with pytest.warns(PreparationWarning, match=r"row-order: 'wipe', row 7: .* --sort"), refused:
         prepare(wiping(times))
+
+
+def test_rows_are_put_in_the_order_of_time_where_asked() -> None:
+    order = np.random.default_rng(0).permutation(len(STEADY))
+    shuffled = Recording(("x", "y"), circle(STEADY)[order], STEADY[order], "wipe")
+    sorted_, straight = only(prepare(shuffled, Recipe(sort=True))), only(prepare(wiping(STEADY)))
+    np.testing.assert_array_equal(sorted_.states, straight.states)
+    np.testing.assert_array_equal(sorted_.actions, straight.actions)
 
 
 def test_stamps_that_are_missing_are_refused_with_their_row() -> None:

@@ -52,23 +52,23 @@ def test_batches_are_the_same_as_all_at_once(kind, size):
 def test_batches_with_weights_and_groups_are_the_same_too(size, seed):
     weights = np.random.default_rng(seed).integers(0, 3, 400).astype(float)
     weights[::size] = 1.0  # no batch without any
-    whole = uc.ParametricPolicy(uc.KMeansRBF(7)).fit(DATA.states, DATA.actions, weights, DATA.groups)
+    whole = uc.ParametricPolicy(uc.KMeansRBF(7), uc.Hybrid()).fit(DATA.states, DATA.actions, weights, DATA.groups)
     batched = cut(size, DATA.states, DATA.actions, weights, DATA.groups)
-    same(uc.ParametricPolicy(uc.KMeansRBF(7)).fit_batches(batched), whole)
+    same(uc.ParametricPolicy(uc.KMeansRBF(7), uc.Hybrid()).fit_batches(batched), whole)
 
 
 def test_blocks_within_one_array_are_the_same_too(monkeypatch):
-    whole = uc.ParametricPolicy(uc.KMeansRBF(7)).fit(DATA.states, DATA.actions, groups=DATA.groups)
+    whole = uc.ParametricPolicy(uc.KMeansRBF(7), uc.Hybrid()).fit(DATA.states, DATA.actions, groups=DATA.groups)
     monkeypatch.setattr(batches, "BLOCK_ROWS", 33)
-    blocked = uc.ParametricPolicy(uc.KMeansRBF(7)).fit(DATA.states, DATA.actions, groups=DATA.groups)
+    blocked = uc.ParametricPolicy(uc.KMeansRBF(7), uc.Hybrid()).fit(DATA.states, DATA.actions, groups=DATA.groups)
     same(blocked, whole)
     assert blocked.score(DATA.states, DATA.actions) == pytest.approx(whole.score(DATA.states, DATA.actions), abs=1e-12)
 
 
 def test_a_generator_is_walked_once_and_its_first_batch_decides():
     batched = cut(150, DATA.states, DATA.actions)
-    one = uc.ParametricPolicy(uc.KMeansRBF(7)).fit_batches(batch for batch in batched)
-    other = uc.ParametricPolicy(uc.KMeansRBF(7))
+    one = uc.ParametricPolicy(uc.KMeansRBF(7), uc.Hybrid()).fit_batches(batch for batch in batched)
+    other = uc.ParametricPolicy(uc.KMeansRBF(7), uc.Hybrid())
     for states, actions in batched:
         other.partial_fit(states, actions)
     same(one, other)
@@ -76,7 +76,7 @@ def test_a_generator_is_walked_once_and_its_first_batch_decides():
 
 def test_it_learns_on_after_batches():
     batched = cut(150, DATA.states, DATA.actions)
-    one = uc.ParametricPolicy(uc.Affine()).fit_batches(batched[:2]).partial_fit(*batched[2])
+    one = uc.ParametricPolicy(uc.Affine(), uc.Hybrid()).fit_batches(batched[:2]).partial_fit(*batched[2])
     assert one.moments_.weight[0] == 400
 
 
@@ -121,7 +121,7 @@ def test_first_looks_add_and_order_moves_no_sample(at_most, cuts, seed):
     assert_array_equal(total.size, np.abs(DATA.states).max(axis=0))
     assert total.fastest == np.abs(DATA.actions).max()
     assert_allclose(total.mean, DATA.states.mean(axis=0), atol=1e-14)
-    assert_allclose(total.scatter / total.weight, DATA.states.var(axis=0), rtol=1e-12)
+    assert_allclose(total.scatter, DATA.states.var(axis=0), rtol=1e-12)
 
 
 def test_what_is_chosen_is_spread_over_all_samples(monkeypatch):
@@ -143,8 +143,10 @@ def test_a_block_without_weight_is_passed_over(monkeypatch):
     monkeypatch.setattr(batches, "BLOCK_ROWS", 100)
     weights = np.repeat([1.0, 0.0, 2.0, 0.0], 100)
     counting = weights > 0
-    blocked = uc.ParametricPolicy(uc.Affine()).fit(DATA.states, DATA.actions, weights)
-    left_out = uc.ParametricPolicy(uc.Affine()).fit(DATA.states[counting], DATA.actions[counting], weights[counting])
+    blocked = uc.ParametricPolicy(uc.Affine(), uc.Hybrid()).fit(DATA.states, DATA.actions, weights)
+    left_out = uc.ParametricPolicy(uc.Affine(), uc.Hybrid()).fit(
+        DATA.states[counting], DATA.actions[counting], weights[counting]
+    )
     same(blocked, left_out)
 
 
@@ -246,13 +248,15 @@ def test_a_stream_of_files_is_the_same_as_reading_them_all(tmp_path, table, suff
         WRITERS[suffix](tmp_path / f"wipes_{number}.{suffix}", in_rows(table, rows))
     files = sorted(tmp_path.iterdir())
     recipe = Recipe(states=("x", "y"), actions=("vx", "vy"))
-    whole = uc.LocallyLinearPolicy(0.5).fit_demonstrations(uc.prepare(uc.read(files), recipe), speed_power=1.0)
+    whole = uc.LocallyLinearPolicy(0.5, learner=uc.Hybrid()).fit_demonstrations(
+        uc.prepare(uc.read(files), recipe), speed_power=1.0
+    )
     for module in (streams, parquet, hdf5):
         monkeypatch.setattr(module, "BLOCK_ROWS", 50)
     for held in (0, 2**20):
         monkeypatch.setattr(streams, "HELD_BYTES", held)
         stream = uc.Stream(files, recipe, speed_power=1.0)
-        streamed = uc.LocallyLinearPolicy(0.5).fit_batches(stream)
+        streamed = uc.LocallyLinearPolicy(0.5, learner=uc.Hybrid()).fit_batches(stream)
         assert_allclose(streamed(DATA.states), whole(DATA.states), atol=1e-8)
         assert_array_equal(streamed.solution_.determined, whole.solution_.determined)
         assert len(list(stream)) > 2
@@ -282,6 +286,7 @@ def test_parts_of_a_stream_say_what_the_stream_says(tmp_path, table):
         assert_array_equal(mine, theirs)
 
 
+@pytest.mark.filterwarnings("ignore:at-rest")
 def test_a_recipe_that_needs_neighbours_keeps_recordings_whole(tmp_path, table, monkeypatch):
     path = write_parquet(tmp_path / "wipes.parquet", table)
     monkeypatch.setattr(parquet, "BLOCK_ROWS", 50)
@@ -298,7 +303,7 @@ def test_a_folder_stands_for_the_parquet_files_in_it(tmp_path, table):
     write_parquet(tmp_path / "set" / "day=1" / "a.parquet", in_rows(table, slice(0, 120)))
     assert [recording.name for recording in uc.read(tmp_path / "set")] == ["a", "b"]
     (tmp_path / "empty").mkdir()
-    with pytest.raises(ReadError, match="a folder, expected the path of a file"):
+    with pytest.raises(ReadError, match="a folder without a file to read"):
         uc.read(tmp_path / "empty")
 
 
@@ -327,7 +332,6 @@ def test_kinds_of_numbers_in_parquet(tmp_path):
     [
         ({"said": ["a", "b"]}, "no column of numbers; it has said"),
         ({"x": [[1.0], [1.0, 2.0]]}, "column 'x': its lists are of different lengths"),
-        ({"x": [1.0, 2.0], "time": ["a", "b"]}, "column 'time': is of type string, expected time stamps as numbers"),
         ({"x": np.empty(0)}, "no rows, expected at least one"),
     ],
 )
@@ -356,7 +360,7 @@ def test_groups_of_hdf5_are_recordings(tmp_path):
 def test_roles_in_hdf5_may_be_told(tmp_path, table):
     path = write_hdf5(tmp_path / "a.h5", {"clock": table["t"], "who": table["demo"], "x": table["x"]})
     assert [recording.name for recording in uc.read(path, group="who", time="clock")] == ["b", "a", "c"]
-    with pytest.raises(ReadError, match="no column 'whom' for group; it has clock, who, x"):
+    with pytest.raises(ReadError, match="no column 'whom' for group; it has clock, x, who"):
         uc.read(path, group="whom")
 
 
@@ -365,9 +369,9 @@ def test_roles_in_hdf5_may_be_told(tmp_path, table):
     [
         (
             {"x": np.zeros(3), "y": np.zeros(4)},
-            r"of different lengths, x \(3\), y \(4\); expected one length",
+            r"no arrays of numbers with one length in common; it holds x \(3,\), y \(4,\)\.",
         ),
-        ({"x": np.zeros((2, 2, 2))}, "no data sets of numbers in one or two dimensions"),
+        ({"x": np.zeros((2, 2, 2, 2))}, "no arrays of numbers"),
         ({"t": np.zeros(3)}, "no column of numbers; it has t"),
     ],
 )
@@ -379,7 +383,7 @@ def test_what_hdf5_cannot_say_is_refused(tmp_path, sets, sentence):
 @pytest.mark.parametrize(("suffix", "module"), [("parquet", "pyarrow"), ("h5", "h5py")])
 def test_damaged_files_and_missing_extras_are_said(tmp_path, monkeypatch, suffix, module):
     path = tmp_path / f"a.{suffix}"
-    path.write_bytes(b"PAR1 or not" * 20)
+    path.write_bytes({"parquet": b"PAR1 or not", "h5": b"\x89HDF or not"}[suffix] * 20)
     with pytest.raises(ReadError, match=rf"a\.{suffix}: cannot be read"):
         uc.read(path)
     for name in [name for name in sys.modules if name.partition(".")[0] == module]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,11 @@ def names(text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
+def groups_of_names(texts: Sequence[str]) -> tuple[tuple[str, ...], ...]:
+    """Names separated by commas, several times."""
+    return tuple(map(names, texts))
+
+
 def numbers(text: str) -> tuple[float, ...]:
     """Finite numbers separated by commas."""
     try:
@@ -29,6 +34,35 @@ def numbers(text: str) -> tuple[float, ...]:
     if not values or not all(map(math.isfinite, values)):
         raise click.BadParameter(f"got {text!r}, expected finite numbers separated by commas, such as 0.1,0,-2.")
     return values
+
+
+CURES = (
+    click.option("--angle", type=names, help="State columns that are wrapped angles, such as roll,yaw."),
+    click.option(
+        "--quaternion", "quaternions", multiple=True, help="Four state columns of a quaternion; several times."
+    ),
+    click.option(
+        "--rotation-vector", "rotation_vectors", multiple=True, help="Three state columns of a rotation vector."
+    ),
+    click.option(
+        "--action-is",
+        type=click.Choice(["velocity", "target", "delta"]),
+        help="What action columns hold: velocities, states to come, or changes to the next sample.",
+    ),
+    click.option("--pauses", type=click.Choice(["drop", "keep"]), default="drop", help="Standing still in the middle."),
+    click.option(
+        "--glitches",
+        type=click.Choice(["keep", "repair", "drop"]),
+        default="keep",
+        help="Samples far off their neighbours.",
+    ),
+    click.option("--seams", type=click.Choice(["keep", "cut"]), default="keep", help="Jumps between demonstrations."),
+    click.option("--max-gap", type=float, help="Longest interval between samples that is no gap, seconds."),
+    click.option("--sort", is_flag=True, help="Put the rows in the order of time."),
+    click.option("--leave-out", type=names, default="", help="Names of demonstrations to leave out."),
+    click.option("--strict", is_flag=True, help="End with exit code 2 where something is not as it seems."),
+)
+"""Options for what is not what it seems."""
 
 
 def options_for_reading(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -48,8 +82,14 @@ def options_for_reading(command: Callable[..., Any]) -> Callable[..., Any]:
             click.option("--still", type=float, help="Trim what is slower than this at start and end."),
             click.option("--rate", type=float, help="Resample to this many samples a second."),
             click.option("--centre", is_flag=True, help="States relative to the mean of each demonstration."),
+            *CURES,
             click.option("--group", help="Column that names the demonstration."),
-            click.option("--time", help="Column with the time in seconds."),
+            click.option("--time", help="Column with the time stamps."),
+            click.option("--time-unit", type=click.Choice(["s", "ms", "us", "ns"]), help="What the time stamps count."),
+            click.option("--columns", type=names, help="Names of the columns, in order, for files without a header."),
+            click.option("--topic", help="ROS: topic to read. Excel: sheet."),
+            click.option("--episodes", type=names, help="Demonstrations to read, such as 0-9,12 or train."),
+            click.option("--task", help="Read only demonstrations of this task."),
         ]
     ):
         command = option(command)
@@ -65,37 +105,56 @@ def recipe_of(
     rate: float | None = None,
     centre: bool = False,
     still: float | None = None,
-    **_: Any,
+    angle: tuple[str, ...] | None = None,
+    quaternions: Sequence[str] = (),
+    rotation_vectors: Sequence[str] = (),
+    max_gap: float | None = None,
+    **others: Any,
 ) -> uc.Recipe:
     """The recipe of the options."""
     if differentiate or by:
         if action is not None:
             raise SettingError("--action: got columns, and --differentiate or --by too; give one or the other.")
         by = by or "savgol"
-    recipe = uc.Recipe(state, action, by, rate=rate, centre=centre, still=still)
+    recipe = uc.Recipe(
+        state,
+        action,
+        by,
+        rate=rate,
+        centre=centre,
+        still=still,
+        angles=angle or (),
+        quaternions=groups_of_names(quaternions),
+        rotation_vectors=groups_of_names(rotation_vectors),
+        max_gap_s=max_gap,
+        **{name: others[name] for name in ("sort", "glitches", "seams", "pauses", "action_is") if name in others},
+    )
     return recipe if window is None else replace(recipe, window_s=window)
 
 
 def complete(recipe: uc.Recipe, recording: uc.Recording) -> uc.Recipe:
     """Guess what was not said; what was said has to be there."""
-    recording.select([*(recipe.states or ()), *(recipe.actions or ())])
     return uc.preparation.complete_recipe(recipe, recording)
 
 
-def said_recipe(recipe: uc.Recipe) -> str:
-    """A recipe in words."""
+def said_recipe(recipe: uc.Recipe, recording: uc.Recording) -> str:
+    """A recipe in words, with the smoothing window that it makes of a recording."""
     states = ", ".join(recipe.states or ())
-    smoothed = f"savgol, {recipe.window_s:g} s" if recipe.differentiate == "savgol" else "central differences"
+    window = uc.preparation.window_used(recipe, recording)
+    smoothed = f"savgol, {window:.3g} s" if recipe.differentiate == "savgol" else "central differences"
     actions = f"their velocity ({smoothed})" if recipe.actions is None else f"{', '.join(recipe.actions)} as actions"
     return f"{states} as states and {actions}" + ("" if recipe.actions else " as actions")
 
 
-def roles_of(group: str | None = None, time: str | None = None, **_: Any) -> dict[str, Any]:
-    """The columns that name the demonstration and hold the time, as the options say."""
-    return {"group": group, "time": time}
+def reading_of(**options: Any) -> uc.readers.Reading:
+    """How to read the files, as the options say."""
+    known = [field.name for field in fields(uc.readers.Reading)]
+    return uc.readers.Reading(**{name: value for name, value in options.items() if name in known})
 
 
-def stream_of(paths: Sequence[str | Path], speed_power: float, **reading: Any) -> uc.Stream:
+def stream_of(paths: Sequence[str | Path], speed_power: float, **options: Any) -> uc.Stream:
     """Files as batches to learn from, as the options say."""
-    roles, asked = roles_of(**reading), recipe_of(**reading)
-    return uc.Stream(paths, complete(asked, uc.Stream(paths, asked, **roles).first), speed_power=speed_power, **roles)
+    reading, asked = reading_of(**options), recipe_of(**options)
+    left_out = options.get("leave_out") or ()
+    first = uc.Stream(paths, asked, leave_out=left_out, reading=reading).first
+    return uc.Stream(paths, complete(asked, first), speed_power=speed_power, leave_out=left_out, reading=reading)

@@ -1,5 +1,6 @@
 """From files to demonstrations: readers, preparation, batches."""
 
+from . import writers
 from .demonstration import Demonstration, Recording, Truth, stack, times_of
 from .preparation import Recipe, prepare
 from .readers import read
@@ -17,4 +18,5 @@ __all__ = [
     "readers",
     "stack",
     "times_of",
+    "writers",
 ]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from ..base.arrays import Array, as_matrix, as_vector
 from ..base.display import Shown, counted, shortened
 from ..base.errors import InvalidDataError
+from .columns import resolve
+from .remarks import Remark
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -28,12 +30,21 @@ class Recording(Shown):
         Seconds.
     name : str
         Which demonstration this is, for messages and groups.
+    remarks : tuple of Remark
+        What the reader noticed: columns left out, demonstrations taken apart.
+    units : mapping of str to str
+        Unit of a column, as the file says it (``"mm"``, ``"deg"``), for the columns of which it says one.
+    attributes : mapping of str to object
+        What the file says of the whole recording: its task, the version of its environment, its rate.
     """
 
     columns: tuple[str, ...]
     values: Array
     times: Array | None = None
     name: str = ""
+    remarks: tuple[Remark, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
+    attributes: Mapping[str, Any] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.values)
@@ -52,6 +63,10 @@ class Recording(Shown):
                 f"'{self.name}' has no column {', '.join(map(repr, missing))}; it has {', '.join(self.columns)}."
             )
         return self.values[:, [self.columns.index(name) for name in names]]
+
+    def resolve(self, names: Sequence[str]) -> tuple[str, ...]:
+        """Columns that names, patterns (``joint_?``), ranges (``q1..q7``) and stems (``position``) mean, in order."""
+        return resolve(names, self.columns)
 
     def _summary(self) -> tuple[str, ...]:
         sizes = counted(len(self), "row"), counted(len(self.columns), "column")

@@ -6,18 +6,28 @@ import os
 import warnings
 from collections.abc import Iterable, Iterator
 from functools import cached_property
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import BLOCK_ROWS, Array, check_at_least
+from ..base.errors import InvalidDataError
 from .demonstration import Demonstration, Recording, times_of
 from .preparation import Recipe, complete_recipe, prepare
-from .readers import expand, read_blocks
+from .preparation.movements import prepare_one, warn
+from .preparation.plausibility.outlines import Outline
+from .preparation.plausibility.sets import compare, outline
+from .preparation.surveys import subject_of
+from .readers import Reading, expand, read_blocks
 
 HELD_BYTES = 2**25
 """Demonstrations that take no more than this in all are kept after the first walk, so that files are read once."""
+
+
+MOST_OUTLINES = 1000
+"""So many demonstrations, or blocks of rows of them, are compared with each other."""
 
 
 class Block(NamedTuple):
@@ -46,11 +56,13 @@ class Stream:
         As :func:`~unconstrain.read` takes them.
     recipe : Recipe, optional
         What it leaves open about the columns is guessed from the first recording.
-    group, time : str, optional
-        As :func:`~unconstrain.read` takes them.
+    reading : Reading, optional
+        How to read them; ``group`` and ``time`` alone may be given by name instead.
     speed_power : float
         Samples count by this power of their speed; see
         :meth:`~unconstrain.ParametricPolicy.fit_demonstrations`.
+    leave_out : iterable of str
+        Names of recordings to pass over.
     """
 
     def __init__(
@@ -60,30 +72,37 @@ class Stream:
         *,
         group: str | None = None,
         time: str | None = None,
+        reading: Reading | None = None,
         speed_power: float = 0.0,
+        leave_out: Iterable[str] = (),
     ) -> None:
         check_at_least("speed_power", speed_power, 0.0)
         self.paths = expand(paths)
-        self.group = group
-        self.time = time
+        self.reading = reading or Reading(group, time)
         self.speed_power = speed_power
+        self.leave_out = frozenset(leave_out)
         self._asked = recipe or Recipe()
         self._first_file = 0
         self._held: list[tuple[str, Demonstration]] | None = None
         self._walked = False
+        self._outlines: list[tuple[str, Outline | None]] = []
 
     @cached_property
     def first(self) -> Recording:
         """The first recording, or the first block of it."""
-        return next(read_blocks(self.paths[0], group=self.group, time=self.time))
+        blocks = (block for path in self.paths for block in self._blocks(path))
+        try:
+            return next(blocks)
+        except StopIteration:
+            raise InvalidDataError("got no recording that is not left out, expected at least one.") from None
 
     @cached_property
     def recipe(self) -> Recipe:
         """The recipe, completed by a look at the first recording."""
         asked = self._asked
-        if asked.states and (asked.actions or asked.differentiate):
+        if asked.states and (asked.actions or asked.differentiate) and asked.action_is != "target":
             return asked
-        return complete_recipe(self._asked, self.first)
+        return complete_recipe(asked, self.first)
 
     @cached_property
     def unit(self) -> float:
@@ -118,6 +137,8 @@ class Stream:
             else:
                 held.clear()
             yield named
+        if not self._walked:
+            self._say_what_differs()
         self._walked = True
         if size <= HELD_BYTES:
             self._held = held
@@ -137,7 +158,9 @@ class Stream:
         """One stream for each file, which together say the same; they can be sent to other processes."""
         streams = []
         for number, path in enumerate(self.paths):
-            part = Stream(path, self.recipe, group=self.group, time=self.time, speed_power=self.speed_power)
+            part = Stream(
+                path, self.recipe, reading=self.reading, speed_power=self.speed_power, leave_out=self.leave_out
+            )
             part.__dict__["unit"] = self.unit
             part._first_file = self._first_file + number
             streams.append(part)
@@ -146,12 +169,29 @@ class Stream:
     def _read(self) -> Iterator[tuple[str, Demonstration]]:
         by_rows = self.recipe.is_row_by_row
         for number, path in enumerate(self.paths, start=self._first_file):
-            for recording in read_blocks(path, group=self.group, time=self.time, whole=not by_rows):
+            for recording in self._blocks(path, whole=not by_rows):
                 with warnings.catch_warnings():
                     if self._walked:  # it was said on the first walk
                         warnings.simplefilter("ignore", UserWarning)
-                    [demonstration] = prepare(recording, self.recipe)
+                    demonstration = self._prepared(recording)
                 yield f"{number}/{recording.name}", demonstration
+
+    def _blocks(self, path: Path, whole: bool = False) -> Iterator[Recording]:
+        for recording in read_blocks(path, self.reading, whole=whole):
+            if recording.name not in self.leave_out:
+                yield recording
+
+    def _prepared(self, recording: Recording) -> Demonstration:
+        subject = subject_of(recording, self.recipe)
+        if not self._walked and len(self._outlines) < MOST_OUTLINES:
+            self._outlines.append((recording.name, outline(subject)))
+        return prepare_one(subject)
+
+    def _say_what_differs(self) -> None:
+        said = compare([one for _, one in self._outlines])
+        for (name, _), remarks in zip(self._outlines, said, strict=True):
+            warn(name, remarks)
+        self._outlines.clear()
 
     def _batch(self, named: list[tuple[str, Demonstration]]) -> Block:
         actions = np.concatenate([demo.actions for _, demo in named])

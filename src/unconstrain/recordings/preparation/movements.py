@@ -18,7 +18,14 @@ from numpy.typing import NDArray
 from ...base.arrays import Array, as_matrix, as_vector, check_at_least
 from ...base.errors import InvalidDataError, SettingError
 from ..demonstration import Demonstration, Recording
-from .recipes import Recipe, complete_recipe
+from ..remarks import Remark
+from ..signals.jumps import glitches, repaired, seams
+from ..signals.stillness import pauses
+from .continuity import continuous
+from .plausibility.checks import examine
+from .plausibility.sets import compare, outline
+from .plausibility.subject import Subject
+from .recipes import Recipe, complete_recipe, stamps
 
 GAP_INTERVALS = 5.0
 """An interval of this many median ones is a gap, where nothing else is said."""
@@ -31,7 +38,14 @@ MOST_SAMPLES = 1e8
 
 
 class PreparationWarning(UserWarning):
-    """Something about a recording that was mended on the way, and that its owner should know."""
+    """Something about a recording that its owner should know: not what it seems, or mended on the way.
+
+    ``code`` names the kind of what is not as it seems, and is empty for what was mended.
+    """
+
+    def __init__(self, message: str, code: str = "") -> None:
+        super().__init__(message)
+        self.code = code
 
 
 class Gap(NamedTuple):
@@ -69,9 +83,9 @@ def prepare(recordings: Recording | Sequence[Recording], recipe: Recipe | None =
     Warns
     -----
     PreparationWarning
-        For gaps, for irregular stamps that had to be resampled before they could
-        be differentiated, for stamps that occur twice (the first row is kept),
-        and for pieces between gaps that are too short for the smoothing window.
+        For what is not what it seems, with its code; for irregular stamps that had to be resampled before they could
+        be differentiated, for a smoothing window that holds too few samples, for stamps that occur twice (the first
+        row is kept), and for pieces between gaps that are too short for the smoothing window.
 
     Raises
     ------
@@ -84,13 +98,28 @@ def prepare(recordings: Recording | Sequence[Recording], recipe: Recipe | None =
     if not every:
         raise InvalidDataError("got no recording, expected at least one.")
     whole = complete_recipe(recipe or Recipe(), every[0])
-    demonstrations = []
-    for recording in every:
-        demonstration, notes = _prepare(recording, whole)
-        for note in notes:
-            warnings.warn(f"'{recording.name}': {note}", PreparationWarning, stacklevel=2)
-        demonstrations.append(demonstration)
+    subjects = [Subject(recording, whole) for recording in every]
+    demonstrations = [prepare_one(subject, stacklevel=4) for subject in subjects]
+    for subject, remarks in zip(subjects, compare([outline(subject) for subject in subjects]), strict=True):
+        warn(subject.recording.name, remarks, stacklevel=3)
     return demonstrations
+
+
+def prepare_one(subject: Subject, stacklevel: int = 2) -> Demonstration:
+    """Turn one recording into a demonstration, by a recipe that names its columns; as :func:`prepare`."""
+    name = subject.recording.name
+    warn(name, examine(subject), stacklevel + 1)
+    demonstration, notes = _prepare(subject.recording, subject.recipe)
+    for note in notes:
+        warnings.warn(PreparationWarning(f"'{name}': {note}"), stacklevel=stacklevel)
+    return demonstration
+
+
+def warn(name: str, remarks: Sequence[Remark], stacklevel: int = 2) -> None:
+    """Say what there is to say about a recording of some name."""
+    for remark in remarks:
+        code = remark.code if remark.warns else ""
+        warnings.warn(PreparationWarning(remark.about(name), code), stacklevel=stacklevel)
 
 
 def differentiate(
@@ -236,13 +265,6 @@ def find_gaps(times: Array, max_gap_s: float | None = None) -> tuple[Gap, ...]:
     return tuple(Gap(float(times[row]), float(intervals[row])) for row in rows)
 
 
-def stamps(recording: Recording, recipe: Recipe) -> Array | None:
-    """Times of a recording; from the rate of the recipe where the recording has none."""
-    if recording.times is None and recipe.rate is not None:
-        return np.arange(len(recording)) / recipe.rate
-    return recording.times
-
-
 def _prepare(recording: Recording, recipe: Recipe) -> tuple[Demonstration, list[str]]:
     if not len(recording):
         raise InvalidDataError(f"'{recording.name}' has no samples, expected at least one.")
@@ -250,9 +272,12 @@ def _prepare(recording: Recording, recipe: Recipe) -> tuple[Demonstration, list[
     actions = None if recipe.actions is None else _finite(recording, recipe.actions)
     times = stamps(recording, recipe)
     notes: list[str] = []
-    if times is not None:
-        piece, notes = _without_repeats(_Piece(times, states, actions), recording.name)
-        (times, states, actions), more = _mend(piece, recipe, recording.name)
+    if times is None:
+        states, actions = _in_rows(states, actions, recipe)
+    else:
+        piece, notes = _without_repeats(_Piece(*_sorted(times, states, actions, recipe)), recording.name)
+        pieces = _split(_without_glitches(piece._replace(states=continuous(piece.states, recipe)), recipe), recipe)
+        (times, states, actions), more = _mend(pieces, recipe, recording.name)
         notes += more
     if actions is None:
         raise SettingError(
@@ -287,7 +312,7 @@ def _without_repeats(piece: _Piece, name: str) -> tuple[_Piece, list[str]]:
         row = int(np.argmax(intervals < 0)) + 1
         raise InvalidDataError(
             f"'{name}', row {row}: got time {times[row]:.6g} s after {times[row - 1]:.6g} s, expected later ones. "
-            "Sort the rows, or split the file where a new recording begins."
+            "Sort the rows (--sort), or split the file where a new recording begins."
         )
     fresh = np.append(True, intervals > 0)
     if fresh.all():
@@ -295,13 +320,37 @@ def _without_repeats(piece: _Piece, name: str) -> tuple[_Piece, list[str]]:
     return piece.at(fresh), [f"{(~fresh).sum()} rows repeat the time stamp of the row before and were left out."]
 
 
-def _mend(whole: _Piece, recipe: Recipe, name: str) -> tuple[_Piece, list[str]]:
-    """Split at the gaps, differentiate and resample the pieces, and join them."""
-    gaps = find_gaps(whole.times, recipe.max_gap_s)
-    notes = [_about_gaps(gaps)] if gaps else []
-    pieces = _split(whole, recipe)
+def _sorted(times: Array, states: Array, actions: Array | None, recipe: Recipe) -> tuple[Array, Array, Array | None]:
+    if not recipe.sort:
+        return times, states, actions
+    order = np.argsort(times, kind="stable")
+    return times[order], states[order], None if actions is None else actions[order]
+
+
+def _in_rows(states: Array, actions: Array | None, recipe: Recipe) -> tuple[Array, Array | None]:
+    """States and actions without times: continuous, without glitches and pauses."""
+    piece = _Piece(np.arange(len(states), dtype=np.float64), continuous(states, recipe), actions)
+    pieces = _split(_without_glitches(piece, recipe), recipe)
+    return _joined(pieces)[1:]
+
+
+def _without_glitches(piece: _Piece, recipe: Recipe) -> _Piece:
+    found = [] if recipe.glitches == "keep" else glitches(piece.states)
+    if not found:
+        return piece
+    if recipe.glitches == "repair":
+        return piece._replace(states=repaired(piece.states, found))
+    keep = np.ones(len(piece.times), dtype=bool)
+    for one in found:
+        keep[one.start : one.stop] = False
+    return piece.at(keep)
+
+
+def _mend(pieces: list[_Piece], recipe: Recipe, name: str) -> tuple[_Piece, list[str]]:
+    """Differentiate and resample the pieces, and join them."""
+    notes: list[str] = []
     if recipe.differentiate is not None:
-        interval = _typical(whole.times)
+        interval = _typical(np.concatenate([piece.times for piece in pieces]))
         if recipe.differentiate == "savgol" and any(_is_irregular(np.diff(piece.times), interval) for piece in pieces):
             if recipe.rate is None or abs(recipe.rate * interval - 1.0) > 0.01:  # else it is what was asked for
                 notes.append(
@@ -309,12 +358,29 @@ def _mend(whole: _Piece, recipe: Recipe, name: str) -> tuple[_Piece, list[str]]:
                 )
             pieces = [_resampled(piece, 1 / interval) for piece in pieces]
         needed = _samples_needed(recipe, interval)
+        notes += _about_window(recipe, needed, interval)
         pieces, more = _long_enough(pieces, needed, name)
         notes += more
         pieces = [piece._replace(actions=_velocities(piece.times, piece.states, recipe, needed)) for piece in pieces]
+    if recipe.action_is == "delta":
+        pieces = [_per_second(piece) for piece in pieces]
     if recipe.rate is not None:
         pieces = [_resampled(piece, recipe.rate) for piece in pieces]
     return _joined(pieces), notes
+
+
+def _per_second(piece: _Piece) -> _Piece:
+    """Changes to the next sample as velocities."""
+    return piece._replace(actions=None if piece.actions is None else piece.actions / _typical(piece.times))
+
+
+def _about_window(recipe: Recipe, needed: int, interval: float) -> list[str]:
+    used = needed * interval
+    if recipe.differentiate != "savgol" or not used > 1.5 * recipe.window_s:
+        return []
+    return [
+        f"the smoothing window of {recipe.window_s:g} s was widened to {used:.3g} s, the {needed} samples it needs."
+    ]
 
 
 def _long_enough(pieces: list[_Piece], needed: int, name: str) -> tuple[list[_Piece], list[str]]:
@@ -329,18 +395,18 @@ def _long_enough(pieces: list[_Piece], needed: int, name: str) -> tuple[list[_Pi
     return kept, [note] if lost else []
 
 
-def _about_gaps(gaps: Sequence[Gap]) -> str:
-    longest = max(gaps, key=lambda gap: gap.length)
-    return (
-        f"{len(gaps)} gap{'s' * (len(gaps) > 1)} in the time stamps, the longest {longest.length:.3g} s "
-        f"after {longest.start:.6g} s; nothing is smoothed or interpolated across."
-    )
-
-
 def _split(piece: _Piece, recipe: Recipe) -> list[_Piece]:
-    cuts = np.flatnonzero(np.diff(piece.times) > _longest(piece.times, recipe.max_gap_s)) + 1
-    bounds = [0, *cuts.tolist(), len(piece.times)]
-    return [piece.at(slice(start, stop)) for start, stop in pairwise(bounds)]
+    """Cut at gaps, at seams and at both ends of pauses, as the recipe says, and leave the pauses out."""
+    cuts = set((np.flatnonzero(np.diff(piece.times) > _longest(piece.times, recipe.max_gap_s)) + 1).tolist())
+    if recipe.seams == "cut":
+        cuts |= set(seams(piece.states))
+    still = pauses(piece.states) if recipe.pauses == "drop" else []
+    bounds = sorted(cuts | {0, len(piece.times)} | {row for pause in still for row in pause})
+    return [
+        piece.at(slice(start, stop))
+        for start, stop in pairwise(bounds)
+        if not any(first <= start and stop <= last for first, last in still)
+    ]
 
 
 def _resampled(piece: _Piece, rate: float) -> _Piece:
@@ -380,6 +446,13 @@ def _is_irregular(intervals: Array, typical: float | None = None) -> bool:
         return False
     expected = float(np.median(intervals)) if typical is None else typical
     return bool((np.abs(intervals - expected) > IRREGULAR * expected).any())
+
+
+def window_used(recipe: Recipe, recording: Recording) -> float:
+    """Seconds of the smoothing window that a recording is differentiated with; as asked for where it has no times."""
+    times = stamps(recording, recipe)
+    interval = float("nan") if times is None else _typical(np.sort(times[np.isfinite(times)]))
+    return recipe.window_s if np.isnan(interval) else _samples_needed(recipe, interval) * interval
 
 
 def _samples_needed(recipe: Recipe, interval: float) -> int:

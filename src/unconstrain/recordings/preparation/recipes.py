@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
-from ...base.arrays import check_at_least
+import numpy as np
+
+from ...base.arrays import Array, check_at_least
 from ...base.errors import SettingError
 from ..demonstration import Recording
+from .guesses import guess_actions, guess_states, positions_in
 
 METHODS = ("savgol", "central")
 """Ways to differentiate: Savitzky-Golay smoothing, central differences."""
 
 ORDERS = (2, 3)
 
-VELOCITY_NAMES = ("v{}", "d{}", "{}_dot", "dot_{}", "{}dot")
-"""How people call the velocity of a column."""
-
-POSITIONS = (("x", "y", "z"), ("x", "y"))
-"""Columns that are positions, to be differentiated, where nothing else is said."""
+CHOICES = {
+    "centre": (False, True),
+    "sort": (False, True),
+    "glitches": ("keep", "repair", "drop"),
+    "seams": ("keep", "cut"),
+    "pauses": ("drop", "keep"),
+    "action_is": (None, "velocity", "target", "delta"),
+}
+"""What the settings of few values may be."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +55,22 @@ class Recipe:
         Subtract from the states their mean in each demonstration: for when the place of the surface does not matter.
     max_gap_s : float, optional
         Longer intervals between stamps are gaps; five median intervals by default.
+    sort : bool
+        Put the rows in the order of their time stamps.
+    angles : tuple of str
+        State columns that are wrapped angles, radians or degrees: they are made continuous in each demonstration.
+    quaternions, rotation_vectors : tuple of tuple of str
+        Four state columns each that are a unit quaternion, three that are a rotation vector: of the numbers for the
+        same orientation those closest to the row before are taken.
+    glitches : {"keep", "repair", "drop"}
+        What becomes of samples far off their neighbours: a straight line in their place, or their rows are left out.
+    seams : {"keep", "cut"}
+        Whether nothing is smoothed across jumps to another place, as between demonstrations in one table.
+    pauses : {"drop", "keep"}
+        What becomes of rows in which nothing moves, in the middle of a demonstration; time stamps stay as they are.
+    action_is : {"velocity", "target", "delta"}, optional
+        What the action columns are: velocities, unless it is said; states to come, so that the velocity of the states
+        is learnt; or changes to the next sample, so that they are divided by the interval.
 
     Raises
     ------
@@ -66,6 +88,14 @@ class Recipe:
     still: float | None = None
     centre: bool = False
     max_gap_s: float | None = None
+    sort: bool = False
+    angles: tuple[str, ...] = ()
+    quaternions: tuple[tuple[str, ...], ...] = ()
+    rotation_vectors: tuple[tuple[str, ...], ...] = ()
+    glitches: str = "keep"
+    seams: str = "keep"
+    pauses: str = "drop"
+    action_is: str | None = None
 
     def __post_init__(self) -> None:
         for name in ("states", "actions"):
@@ -78,7 +108,11 @@ class Recipe:
             check_at_least("still", self.still, 0)
         _check_choice("order", self.order, ORDERS)
         object.__setattr__(self, "order", int(self.order))
-        _check_choice("centre", self.centre, (False, True))
+        for name, choices in CHOICES.items():
+            _check_choice(name, getattr(self, name), choices)
+        object.__setattr__(self, "angles", _names("angles", self.angles) if self.angles else ())
+        for name, width in (("quaternions", 4), ("rotation_vectors", 3)):
+            object.__setattr__(self, name, _groups(name, getattr(self, name), width))
         if self.differentiate is not None:
             _check_choice("differentiate", self.differentiate, METHODS)
         if self.actions is not None and self.differentiate is not None:
@@ -91,7 +125,13 @@ class Recipe:
     def is_row_by_row(self) -> bool:
         """Whether each row is prepared without looking at others, so that recordings may be cut anywhere."""
         whole = (self.rate, self.trim, self.still)
-        return self.actions is not None and not self.centre and all(setting is None for setting in whole)
+        defaults = Recipe()
+        others = ("centre", "sort", "angles", "quaternions", "rotation_vectors", "glitches", "seams", "action_is")
+        return (
+            self.actions is not None
+            and all(setting is None for setting in whole)
+            and all(getattr(self, name) == getattr(defaults, name) for name in others)
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain values, ready for JSON."""
@@ -118,55 +158,49 @@ class Recipe:
 def complete_recipe(recipe: Recipe, recording: Recording) -> Recipe:
     """Fill in what a recipe leaves open about states and actions by the names of the columns.
 
-    In this order: columns with a velocity beside them (``vx``, ``dx``, ``x_dot``, ``dot_x`` or
-    ``xdot``); ``x1..xn`` with ``u1..ud``; positions ``x, y, z`` or ``x, y``, to be differentiated.
+    Patterns, ranges and stems become the columns that they mean (:func:`~.guesses.resolve`). What is not said is
+    guessed, in this order: columns with a velocity beside them (``vx``, ``dx``, ``x_dot``, ``dot_x``, ...); ``x1..xn``
+    with ``u1..ud``; numbered columns with their velocities (``q0..`` and ``qd0..``, ``position0..`` and
+    ``velocity0..``); positions (``x, y, z``, ``pose_x...``, ``joint_0...``), to be differentiated.
 
     Raises
     ------
     SettingError
         If the columns do not tell.
+    InvalidDataError
+        If a column that is named does not exist; the message lists those that do.
     """
-    states = recipe.states or _guess_states(recording.columns)
-    if states and (recipe.actions or recipe.differentiate):
-        return replace(recipe, states=states)
-    actions = states and _guess_actions(recording.columns, states)
+    completed = _with_columns(recipe, recording)
+    if completed.actions is not None and completed.action_is == "target":
+        return replace(completed, actions=None, differentiate="savgol")
+    return completed
+
+
+def stamps(recording: Recording, recipe: Recipe) -> Array | None:
+    """Times of a recording; from the rate of the recipe where the recording has none."""
+    if recording.times is None and recipe.rate is not None:
+        return np.arange(len(recording)) / recipe.rate
+    return recording.times
+
+
+def _with_columns(recipe: Recipe, recording: Recording) -> Recipe:
+    columns = recording.columns
+    states = recipe.states and recording.resolve(recipe.states)
+    told = replace(recipe, states=states, actions=recipe.actions and recording.resolve(recipe.actions))
+    recording.select([*(told.states or ()), *(told.actions or ())])
+    states = states or guess_states(columns)
+    if states and (told.actions or told.differentiate):
+        return replace(told, states=states)
+    actions = states and guess_actions(columns, states)
     if actions:
-        return replace(recipe, states=states, actions=actions)
-    if states in POSITIONS:
-        return replace(recipe, states=states, differentiate="savgol")
+        return replace(told, states=states, actions=actions)
+    if states and states == positions_in(columns):
+        return replace(told, states=states, differentiate="savgol")
     raise SettingError(
         f"'{recording.name}': cannot tell {'the actions' if states else 'states and actions'} from its columns "
-        f"{', '.join(recording.columns)}. Say which with states and actions (--state, --action), "
+        f"{', '.join(columns)}. Say which with states and actions (--state, --action), "
         "or take the velocity of the states with differentiate='savgol' (--state, --differentiate)."
     )
-
-
-def _guess_states(columns: Sequence[str]) -> tuple[str, ...] | None:
-    moving = max((_with_velocity(columns, style) for style in VELOCITY_NAMES), key=len)
-    if moving:
-        return moving
-    numbered = _numbered(columns, "x")
-    if numbered:
-        return numbered
-    return next((names for names in POSITIONS if set(names) <= set(columns)), None)
-
-
-def _guess_actions(columns: Sequence[str], states: Sequence[str]) -> tuple[str, ...] | None:
-    for style in VELOCITY_NAMES:
-        velocities = tuple(style.format(name) for name in states)
-        if set(velocities) <= set(columns):
-            return velocities
-    return _numbered(columns, "u") if tuple(states) == _numbered(columns, "x") else None
-
-
-def _with_velocity(columns: Sequence[str], style: str) -> tuple[str, ...]:
-    velocities = {style.format(name) for name in columns}
-    # Beside x, dx, ddx only x is a state: dx is its velocity.
-    return tuple(name for name in columns if style.format(name) in columns and name not in velocities)
-
-
-def _numbered(columns: Sequence[str], letter: str) -> tuple[str, ...] | None:
-    return tuple(name for name in columns if re.fullmatch(rf"{letter}\d+", name)) or None
 
 
 def _names(what: str, names: Any) -> tuple[str, ...] | None:
@@ -176,6 +210,16 @@ def _names(what: str, names: Any) -> tuple[str, ...] | None:
     if not listed or not all(isinstance(name, str) for name in listed) or len(set(listed)) < len(listed):
         raise SettingError(f"{what}: got {names!r}, expected names of columns, at least one and each once.")
     return listed
+
+
+def _groups(what: str, groups: Any, width: int) -> tuple[tuple[str, ...], ...]:
+    """Names of columns, ``width`` together; one group needs no tuple around it."""
+    several = (groups,) if groups and all(isinstance(name, str) for name in groups) else tuple(groups)
+    named = tuple(_names(what, group) or () for group in several)
+    for group in named:
+        if len(group) != width:
+            raise SettingError(f"{what}: got {', '.join(group)}, expected {width} columns together.")
+    return named
 
 
 def _two_ends(ends: Any) -> tuple[float, float] | None:

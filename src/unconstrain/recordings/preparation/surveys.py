@@ -1,15 +1,19 @@
 """What is in a recording, before anything is done to it."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...base.arrays import Array
-from ...base.errors import SettingError
+from ...base.errors import InvalidDataError, SettingError, UnconstrainError
 from ..demonstration import Recording
-from .movements import Gap, find_gaps, stamps
-from .recipes import Recipe, complete_recipe
+from ..remarks import Remark
+from .movements import Gap, find_gaps
+from .plausibility.checks import examine
+from .plausibility.sets import compare, outline, too_few
+from .plausibility.subject import Subject
+from .recipes import Recipe, complete_recipe, stamps
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,10 @@ class Survey:
         How many cells of a column are empty or not finite, for the columns that have such.
     zero_actions : int, optional
         Samples whose action is zero; None where the actions are not columns.
+    warnings : tuple of Remark
+        What is not as it seems, at most one for each code.
+    notes : tuple of Remark
+        How the file was read, where that is worth a word: columns without names, demonstrations taken apart.
     """
 
     name: str
@@ -47,6 +55,8 @@ class Survey:
     non_increasing: tuple[int, ...]
     missing: Mapping[str, int]
     zero_actions: int | None
+    warnings: tuple[Remark, ...]
+    notes: tuple[Remark, ...] = ()
 
 
 def survey(recording: Recording, recipe: Recipe | None = None) -> Survey:
@@ -64,6 +74,33 @@ def survey(recording: Recording, recipe: Recipe | None = None) -> Survey:
     Survey
     """
     asked = recipe or Recipe()
+    return _survey(subject_of(recording, asked), asked)
+
+
+def survey_set(recordings: Iterable[Recording], recipe: Recipe | None = None) -> list[Survey]:
+    """Look at recordings one by one, and at each beside the others; parameters as of :func:`survey`."""
+    asked = recipe or Recipe()
+    surveys, outlines = [], []
+    for recording in recordings:
+        subject = subject_of(recording, asked)
+        surveys.append(_survey(subject, asked))
+        outlines.append(outline(subject))
+    more = compare(outlines)
+    if surveys:
+        more[0] = (*too_few(len(surveys)), *more[0])
+    return [replace(each, warnings=once(each.warnings + added)) for each, added in zip(surveys, more, strict=True)]
+
+
+def once(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
+    """The first remark of each code."""
+    first: dict[str, Remark] = {}
+    for remark in remarks:
+        first.setdefault(remark.code, remark)
+    return tuple(first.values())
+
+
+def _survey(subject: Subject, asked: Recipe) -> Survey:
+    recording = subject.recording
     times = stamps(recording, asked)
     known = np.empty(0) if times is None else times[np.isfinite(times)]
     gaps = find_gaps(known, asked.max_gap_s)
@@ -81,7 +118,25 @@ def survey(recording: Recording, recipe: Recipe | None = None) -> Survey:
         non_increasing=() if times is None else tuple((np.flatnonzero(~(np.diff(times) > 0)) + 1).tolist()),
         missing={name: int(count) for name, count in zip(recording.columns, bad_cells, strict=True) if count},
         zero_actions=_zero_actions(recording, asked),
+        warnings=tuple(remark for remark in examine(subject) if remark.warns),
+        notes=tuple(remark for remark in recording.remarks if not remark.warns),
     )
+
+
+def subject_of(recording: Recording, recipe: Recipe) -> Subject:
+    """What checks look at, as far as the columns tell: only the clock where they do not tell the states."""
+    nothing = replace(recipe, states=None, actions=None, angles=(), quaternions=(), rotation_vectors=())
+    for known in (_completed(recipe, recording), replace(recipe, actions=None)):
+        if known.states and {*known.states, *(known.actions or ())} <= set(recording.columns):
+            return Subject(recording, known)
+    return Subject(recording, nothing)
+
+
+def _completed(recipe: Recipe, recording: Recording) -> Recipe:
+    try:
+        return complete_recipe(recipe, recording)
+    except UnconstrainError:
+        return recipe
 
 
 def _steady_intervals(times: Array, gaps: tuple[Gap, ...]) -> Array:
@@ -93,7 +148,7 @@ def _steady_intervals(times: Array, gaps: tuple[Gap, ...]) -> Array:
 def _zero_actions(recording: Recording, recipe: Recipe) -> int | None:
     try:
         actions = complete_recipe(recipe, recording).actions
-    except SettingError:
+    except (InvalidDataError, SettingError):
         return None
     if actions is None or not set(actions) <= set(recording.columns):
         return None

@@ -1,40 +1,61 @@
 """From files to recordings; one module for each format.
 
-A new format is one module with a :class:`~unconstrain.recordings.readers.table.Format`, listed in :data:`FORMATS`.
+A new format is one module with a :class:`~unconstrain.recordings.readers.table.Format`, listed in
+:data:`~unconstrain.recordings.readers.formats.FORMATS`.
 """
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from glob import glob
 from pathlib import Path
 
 from ...base.errors import ReadError, SettingError
 from ..demonstration import Recording
-from . import hdf5, npz, parquet, text
-from .table import Format, unique_names
+from .folders import files_in
+from .formats import format_of
+from .reading import Reading
+from .table import Assembly, unique_names
 
-__all__ = ["expand", "read", "read_blocks", "unique_names"]
-
-FORMATS = (npz.FORMAT, parquet.FORMAT, hdf5.FORMAT, text.FORMAT)
+__all__ = ["Reading", "expand", "read", "read_blocks", "unique_names"]
 
 PathLike = str | os.PathLike[str]
 
 
-def read(paths: PathLike | Iterable[PathLike], *, group: str | None = None, time: str | None = None) -> list[Recording]:
+def read(
+    paths: PathLike | Iterable[PathLike],
+    *,
+    group: str | None = None,
+    time: str | None = None,
+    time_unit: str | None = None,
+    columns: Sequence[str] | None = None,
+    topic: str | None = None,
+    episodes: Sequence[str] | None = None,
+    task: str | None = None,
+) -> list[Recording]:
     """Read recordings from one file or several.
 
     Parameters
     ----------
     paths : path or iterable of paths
-        CSV, TSV or semicolon-separated text, NumPy archives, Parquet or HDF5
-        (extra ``data``); told apart by suffix, else by content. A folder
-        stands for the Parquet files in it, and a pattern such as ``wipe_*.csv`` for what it matches.
+        Text, NumPy archives, MATLAB, Parquet, HDF5, LeRobot, JSON, Excel, ROS, C3D (:doc:`/your_own_data`);
+        told apart by content and suffix. A folder stands for the files in it, and a pattern such as
+        ``wipe_*.csv`` for what it matches.
     group : str, optional
         Column that tells the demonstrations apart. Without it, and without a column that
         is called like one (``demo``, ``trial``, ``bout``, ...), each file is one demonstration.
     time : str, optional
         Column of time stamps; by default one called like it (``t``, ``time``, ``timestamp``, ...).
+    time_unit : {"s", "ms", "us", "ns"}, optional
+        What the stamps count; by default as the name of their column or their size says.
+    columns : sequence of str, optional
+        Names of the columns, in order, for files that have none.
+    topic : str, optional
+        Topic of a ROS recording, or several with commas between; or sheet of a workbook.
+    episodes : sequence of str, optional
+        Only these demonstrations: names, numbers, ranges such as ``"0-9"``.
+    task : str, optional
+        Only the demonstrations of this task.
 
     Returns
     -------
@@ -48,27 +69,24 @@ def read(paths: PathLike | Iterable[PathLike], *, group: str | None = None, time
     SettingError
         If there is no path, or one column is to be both group and time.
     """
-    recordings = [
-        recording for path in expand(paths) for recording in read_blocks(path, group=group, time=time, whole=True)
-    ]
-    names = unique_names(recording.name for recording in recordings)
-    return [replace(recording, name=name) for recording, name in zip(recordings, names, strict=True)]
+    told = Reading(group, time, time_unit, columns, topic, episodes, task)
+    found = [recording for path in expand(paths) for recording in read_blocks(path, told, whole=True)]
+    if not found:
+        raise ReadError("no demonstration is left to read; check episodes (--episodes) and task (--task).")
+    names = unique_names(recording.name for recording in found)
+    return [replace(recording, name=name) for recording, name in zip(found, names, strict=True)]
 
 
-def read_blocks(
-    path: PathLike, *, group: str | None = None, time: str | None = None, whole: bool = False
-) -> Iterator[Recording]:
+def read_blocks(path: PathLike, reading: Reading | None = None, *, whole: bool = False) -> Iterator[Recording]:
     """Read one file recording by recording, and larger ones by some rows at a time where the format can.
 
-    Blocks of one recording have one name. Parameters and errors as in :func:`read`; with ``whole``
-    each recording comes in one piece.
+    Blocks of one recording have one name. Errors as in :func:`read`; with ``whole`` each recording comes in one piece.
     """
-    if group is not None and group == time:
-        raise SettingError(f"got {group!r} for both group and time, expected two different columns.")
-    file = Path(path)
-    known = _format(file)
-    read = known.read if whole or known.blocks is None else known.blocks
-    yield from read(file, group=group, time=time)
+    file, told = Path(path), reading or Reading()
+    known = format_of(file)
+    assembly = Assembly(file, told)
+    for table in (known.read if whole or known.blocks is None else known.blocks)(file, told):
+        yield from assembly.recordings(table)
 
 
 def expand(paths: PathLike | Iterable[PathLike]) -> list[Path]:
@@ -81,7 +99,7 @@ def expand(paths: PathLike | Iterable[PathLike]) -> list[Path]:
     """
     listed = [Path(path) for path in ([paths] if isinstance(paths, (str, os.PathLike)) else paths)]
     matched = [match for path in listed for match in (_matches(path) if not path.exists() else []) or [path]]
-    files = [file for path in matched for file in (sorted(path.rglob("*.parquet")) if path.is_dir() else []) or [path]]
+    files = [file for path in matched for file in (files_in(path) if path.is_dir() else [path])]
     if not files:
         raise SettingError("got no file to read, expected at least one path.")
     return files
@@ -90,25 +108,3 @@ def expand(paths: PathLike | Iterable[PathLike]) -> list[Path]:
 def _matches(pattern: Path) -> list[Path]:
     # A pattern may be absolute, which Path.glob refuses.
     return [Path(match) for match in sorted(glob(str(pattern)))]  # noqa: PTH207
-
-
-def _format(path: Path) -> Format:
-    if not path.is_file():
-        raise ReadError(f"{path}: {'a folder' if path.is_dir() else 'no such file'}, expected the path of a file.")
-    for known in FORMATS:
-        if path.suffix.lower() in known.suffixes:
-            return known
-    head = _head(path)
-    for known in FORMATS:
-        if known.recognises(head):
-            return known
-    suffixes = ", ".join(suffix for known in FORMATS for suffix in known.suffixes)
-    raise ReadError(f"{path}: neither its suffix nor its content is of a known format. Supported are {suffixes}.")
-
-
-def _head(path: Path) -> bytes:
-    try:
-        with path.open("rb") as file:
-            return file.read(4096)
-    except OSError as error:
-        raise ReadError(f"{path}: could not be read ({error.strerror}).") from error

@@ -1,95 +1,138 @@
-"""HDF5 files: each group that holds data sets of one length is a recording.
+"""HDF5 files: each group that holds data sets of one length is a recording; its data sets are columns (:mod:`~.trees`).
 
-A data set of one dimension is a column of its name. One of two dimensions is
-as many columns, numbered from 1: ``states`` as x1..xn, ``actions`` as u1..ud,
-``position`` as position1..positionN. Data sets directly in the file make one
-recording, called as the file, which a data set of names or numbers
-(``groups``, ``demo``, ``trial``, ...) may split.
+The layouts of robot learning are understood: ``data/demo_0/{actions, obs/...}`` (robomimic, robosuite), with the lists
+in ``mask``; ``observations`` with one row more than ``actions`` (Minari); episodes that ``terminals`` and ``timeouts``
+end (D4RL); ``action`` and ``observations/qpos`` (ALOHA). What comes after each step (``next_obs``) is left out.
 """
 
-from collections.abc import Iterator
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...base.arrays import BLOCK_ROWS, Array, require_extra
-from ...base.errors import ReadError
-from ..demonstration import Recording
-from .table import Format, find_roles, listed, seconds, split_by_group
+from ...base.arrays import BLOCK_ROWS, require_extra
+from .clocks import find_clock
+from .reading import Reading
+from .table import Format, Table, ours_alone
+from .trees import Branch, tables_of
 
-_SHORT = {"states": "x", "actions": "u"}
-_ROLES = {"groups": "group", "times": "time"}
+AFTER = re.compile(r"next_(obs|observations?)|mask|metadata|images?|#refs#|#subsystem#")
+"""Groups and data sets that are not read as columns."""
 
+OBSERVATIONS = ("obs", "observations", "observation")
+"""Groups whose data sets stand beside those of the group that they are in."""
 
-def read_hdf5(path: Path, group: str | None, time: str | None, rows: int | None = None) -> Iterator[Recording]:
-    """Read one file, whole or by so many rows at a time; see :class:`~.table.ReadFile`."""
-    h5py = require_extra("h5py", "data")
-    try:
-        file = h5py.File(path, "r")
-    except OSError as error:
-        raise ReadError(f"{path}: cannot be read ({str(error).splitlines()[0]}). Expected an HDF5 file.") from error
-    with file:
-        found = [(node, sets) for node in _groups_in(file, h5py) if (sets := _data_sets(node, h5py))]
-        if not found:
-            raise ReadError(f"{path}: no data sets of numbers in one or two dimensions, expected some of one length.")
-        for node, sets in found:
-            yield from _of_group(sets, node.name.strip("/") or path.stem, path, group, time, rows)
+INFOS = ("infos", "info")
+"""As those, but their names alone might be mistaken for others."""
 
+ENDS = ("terminals", "timeouts")
+"""Data sets that are true in the last row of an episode."""
 
-def _groups_in(node: Any, h5py: Any) -> Iterator[Any]:
-    """A group and all below it, in the order of their names."""
-    yield node
-    for child in node.values():
-        if isinstance(child, h5py.Group):
-            yield from _groups_in(child, h5py)
+_DEMONSTRATION = re.compile(r"/data/demo_\d+$")
+_CONTROL_RATE = re.compile(r'"control_freq"\s*:\s*([\d.]+)')
+_ROLES = {"groups": "group"}
+
+DEEPEST = 32
+"""Groups within groups, beyond which a file is damaged."""
 
 
-def _data_sets(node: Any, h5py: Any) -> dict[str, Any]:
-    """What may be columns: numbers in one or two dimensions, and words in one."""
-    sets = {name: child for name, child in node.items() if isinstance(child, h5py.Dataset) and child.ndim in (1, 2)}
-    numbers = {name for name, child in sets.items() if child.dtype.kind in "fiub"}
-    return {name: child for name, child in sets.items() if name in numbers or child.ndim == 1} if numbers else {}
+def read_hdf5(path: Path, reading: Reading) -> Iterator[Table]:
+    """Read one file whole; see :class:`~.table.ReadFile`."""
+    return _read(path, reading, None)
 
 
-def _of_group(
-    sets: dict[str, Any], name: str, path: Path, group: str | None, time: str | None, rows: int | None
-) -> Iterator[Recording]:
-    lengths = {title: len(child) for title, child in sets.items()}
-    if len(set(lengths.values())) > 1:
-        said = listed([f"{title} ({length})" for title, length in lengths.items()])
-        raise ReadError(f"{path}, group '{name}': data sets of different lengths, {said}; expected one length.")
-    flat = [title for title, child in sets.items() if child.ndim == 1]
-    known = [title if title in (group, time) else _ROLES.get(title, title) for title in flat]
-    group_at, time_at = find_roles(known, group, time, path)
-    label, clock = (None if at is None else flat[at] for at in (group_at, time_at))
-    length = next(iter(lengths.values()))
-    for start in range(0, length, rows or max(length, 1)):
-        part = slice(start, start + rows if rows else length)
-        columns: dict[str, Array] = {}
-        for title, child in sets.items():
-            if title not in (label, clock) and child.dtype.kind in "fiub":
-                columns |= _columns(title, child[part].astype(np.float64))
-        if not columns:
-            raise ReadError(f"{path}, group '{name}': no column of numbers; it has {listed(list(sets))}.")
-        times = None if clock is None else seconds(sets[clock][part].astype(np.float64), clock)
-        names = None if label is None else [_text(value) for value in sets[label][part].tolist()]
-        yield from split_by_group(list(columns), np.column_stack(list(columns.values())), times, names, name)
-
-
-def _columns(title: str, values: Array) -> dict[str, Array]:
-    if values.ndim == 1:
-        return {title: values}
-    return {f"{_SHORT.get(title, title)}{place + 1}": column for place, column in enumerate(values.T)}
-
-
-def _text(value: Any) -> str:
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
-
-
-def read_hdf5_blocks(path: Path, group: str | None, time: str | None) -> Iterator[Recording]:
+def read_hdf5_blocks(path: Path, reading: Reading) -> Iterator[Table]:
     """Go through one file by some rows at a time."""
-    return read_hdf5(path, group, time, BLOCK_ROWS)
+    return _read(path, reading, BLOCK_ROWS)
 
 
-FORMAT = Format((".h5", ".hdf5"), lambda head: head.startswith(b"\x89HDF\r\n\x1a\n"), read_hdf5, read_hdf5_blocks)
+def _read(path: Path, reading: Reading, rows: int | None) -> Iterator[Table]:
+    h5py = require_extra("h5py", "data")
+    with ours_alone(path, "an HDF5 file"), h5py.File(path, "r") as file:
+        yield from tables_of(_branch(file, path.stem, reading, _masks(file)), path, rows)
+
+
+def _branch(node: Any, name: str, reading: Reading, masks: Mapping[str, list[str]], depth: int = 0) -> Branch:
+    """A group with what is in it, as far as it may become columns."""
+    if depth > DEEPEST:
+        raise ValueError("its groups are nested too deep")
+    members: dict[str, Any] = {}
+    for title, child in node.items():
+        if child is None or AFTER.fullmatch(title) or _is_picture(child):
+            continue
+        if not hasattr(child, "shape"):
+            below = _branch(child, child.name.strip("/"), reading, masks, depth + 1)
+            members |= _beside(below, title, members) if title in (*OBSERVATIONS, *INFOS) else {title: below}
+        elif title in (reading.group, reading.time):
+            members[title] = child
+        else:
+            members[_ROLES.get(title, title)] = child
+    members = _in_one(members) | _episodes(members)
+    # There the states are those of the simulator, not what the actions belong to.
+    simulated = _DEMONSTRATION.search(node.name) is not None and find_clock(list(members)) is None
+    return Branch(members, name, _attributes(node), tuple(masks.get(name.rpartition("/")[2], ())), not simulated)
+
+
+def _is_picture(child: Any) -> bool:
+    return getattr(child, "ndim", 0) > 1 and child.dtype == np.uint8
+
+
+def _in_one(members: Mapping[str, Any]) -> dict[str, Any]:
+    """What is in groups of different contents and of one length, as parts of one movement, side by side."""
+    groups = {title: member.members for title, member in members.items() if isinstance(member, Branch)}
+    sets = [*(member for title, member in members.items() if title not in groups)]
+    sets += [each for group in groups.values() for each in group.values()]
+    lengths = {each.shape[0] if getattr(each, "ndim", 0) else 0 for each in sets}
+    alike = len({tuple(group) for group in groups.values()}) < len(groups)
+    if not groups or alike or len(lengths) != 1 or lengths == {0} or len(groups) == len(members) == 1:
+        return dict(members)
+    beside = {f"{title}.{name}": each for title, group in groups.items() for name, each in group.items()}
+    return {title: member for title, member in members.items() if title not in groups} | beside
+
+
+def _beside(below: Branch, group: str, members: Mapping[str, Any]) -> dict[str, Any]:
+    """What is in a group of observations, beside what the actions are in."""
+    clear = group in OBSERVATIONS
+    return {
+        title if clear and title not in members else f"{group}.{title}": child for title, child in below.members.items()
+    }
+
+
+def _episodes(members: Mapping[str, Any]) -> dict[str, Any]:
+    """The number of the episode of each row, where data sets say which row is the last of one."""
+    ends = [members[name] for name in ENDS if name in members and getattr(members[name], "ndim", 0) == 1]
+    if "observations" not in members or not ends or len({len(each) for each in ends}) > 1:
+        return {}
+    is_end = np.any([np.asarray(each) != 0 for each in ends], axis=0)
+    return {"episode": np.concatenate([[0], np.cumsum(is_end)[:-1]])}
+
+
+def _masks(file: Any) -> dict[str, list[str]]:
+    """For each demonstration the lists that it is in."""
+    lists: dict[str, list[str]] = {}
+    mask = file.get("mask")
+    for title, names in mask.items() if hasattr(mask, "items") else ():
+        for name in names[()].tolist() if getattr(names, "ndim", 0) == 1 else ():
+            lists.setdefault(name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name), []).append(
+                title
+            )
+    return lists
+
+
+def _attributes(node: Any) -> dict[str, Any]:
+    """Single numbers and words that are attached to a group."""
+    found: dict[str, Any] = {}
+    for name, value in node.attrs.items():
+        if isinstance(value, str | int | float | np.number | np.bool_):
+            found[name] = value if isinstance(value, str) else value.item() if hasattr(value, "item") else value
+    rate = next((match[1] for value in found.values() if (match := _CONTROL_RATE.search(str(value)))), None)
+    return found if rate is None else {**found, "control_freq": float(rate)}
+
+
+FORMAT = Format(
+    (".h5", ".hdf5", ".hdf", ".he5"), lambda head: head.startswith(b"\x89HDF\r\n\x1a\n"), read_hdf5, read_hdf5_blocks
+)

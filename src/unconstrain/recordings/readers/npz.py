@@ -1,77 +1,114 @@
-"""NumPy archives: ``states`` (N, n), ``actions`` (N, d), and if known ``times`` (N,) and ``groups`` (N,).
+"""NumPy's files: one array (``.npy``), or several (``.npz``). Nothing in them is ever unpickled.
 
-The columns are called x1..xn and u1..ud. Nothing in the file is ever unpickled.
+An archive of ``states`` (N, n), ``actions`` (N, d), and if known ``times`` (N,) and ``groups`` (N,) has the columns
+x1..xn and u1..ud. Other arrays are read as :mod:`~.trees` says.
 """
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...base.arrays import Array
+from ...base.arrays import BLOCK_ROWS
 from ...base.errors import ReadError
-from ..demonstration import Recording
-from .table import Format, seconds, split_by_group
-
-Contents = dict[str, NDArray[np.generic]]
+from .reading import Reading
+from .table import Format, Table, named_by, ours_alone
+from .trees import Branch, tables_of
 
 _EXPECTED = "Expected a NumPy archive, as from numpy.savez(path, states=..., actions=..., times=..., groups=...)"
+_ROLES = {"groups": "group"}
 
 
-def read_npz(path: Path, group: str | None, time: str | None) -> list[Recording]:
+def read_npz(path: Path, reading: Reading) -> Iterator[Table]:
     """Read one archive; see :class:`~.table.ReadFile`. Errors say what is in there."""
     contents = _load(path)
-    _check_keys(path, contents, {"states", "actions", *filter(None, (group, time))}, {"times", "groups"})
-    states, actions = (_numbers(path, contents, key, 2) for key in ("states", "actions"))
-    columns = [f"x{i + 1}" for i in range(states.shape[1])] + [f"u{i + 1}" for i in range(actions.shape[1])]
-    for key, array in contents.items():
-        if len(array) != len(states):
-            raise ReadError(f"{path}: {len(states)} rows of states, but {len(array)} of {key}; expected as many.")
-    clock, label = time or "times", group or "groups"
-    times = seconds(_numbers(path, contents, clock, 1), clock) if clock in contents else None
-    groups = _groups(path, contents, label) if label in contents else None
-    return split_by_group(columns, np.hstack([states, actions]), times, groups, path.stem)
-
-
-def _load(path: Path) -> Contents:
-    try:
-        # Opened here, since numpy leaves a damaged file open.
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-            return {key: archive[key] for key in archive.files}
-    # Damaged bytes make NumPy, zipfile and zlib raise a dozen unrelated types; none of them must pass this door.
-    except Exception as error:
-        raise ReadError(f"{path}: cannot be read ({type(error).__name__}: {error}). {_EXPECTED}.") from error
-
-
-def _check_keys(path: Path, contents: Contents, needed: set[str], optional: set[str]) -> None:
     if "header" in contents and "array0" in contents:
         raise ReadError(f"{path}: is a policy that was saved, not recordings to learn from.")
-    if not needed <= set(contents) <= needed | optional:
-        held = ", ".join(f"{key} {array.shape}" for key, array in contents.items()) or "nothing"
-        raise ReadError(f"{path}: holds {held}. {_EXPECTED}; needed are {', '.join(sorted(needed))}.")
-
-
-def _numbers(path: Path, contents: Contents, key: str, dimensions: int) -> Array:
-    array = contents[key]
-    if array.dtype.kind not in "fiub" or array.ndim != dimensions or not array.size:
-        raise ReadError(
-            f"{path}: {key} is {array.dtype} of shape {array.shape}, "
-            f"expected real numbers in {dimensions} dimension{'s' * (dimensions > 1)}, not empty."
-        )
-    with np.errstate(all="ignore"):  # a long double beyond float64 becomes infinity, which is found later
-        return array.astype(np.float64)
-
-
-def _groups(path: Path, contents: Contents, key: str) -> list[str]:
-    array = contents[key]
-    if array.dtype.kind not in "iubfU" or array.ndim != 1:
-        raise ReadError(
-            f"{path}: {key} is {array.dtype} of shape {array.shape}, expected one number or text for each sample."
-        )
+    asked = (reading.group, reading.time)
+    if {"states", "actions"} <= set(contents):
+        _check_pairs(path, contents, {"times", "groups", *filter(None, asked)})
+    named = {name if name in asked else _ROLES.get(name, name): array for name, array in contents.items()}
     try:
-        return [str(label) for label in array.tolist()]
-    except (SystemError, ValueError) as error:  # what NumPy and Python raise for characters that do not exist
-        raise ReadError(f"{path}: {key} holds damaged text ({error}).") from error
+        yield from tables_of(Branch(named, path.stem), path)
+    except ReadError as error:
+        raise ReadError(f"{path}: {str(error).removeprefix(f'{path}: ')} {_EXPECTED}.") from error
 
 
-FORMAT = Format((".npz",), lambda head: head.startswith(b"PK\x03\x04"), read_npz)
+def read_npy(path: Path, reading: Reading) -> Iterator[Table]:
+    """Read one array."""
+    return _npy(path, reading, None)
+
+
+def read_npy_blocks(path: Path, reading: Reading) -> Iterator[Table]:
+    """Go through one array by some rows at a time."""
+    return _npy(path, reading, BLOCK_ROWS)
+
+
+def _npy(path: Path, reading: Reading, rows: int | None) -> Iterator[Table]:
+    array = _array(path)
+    fields = array.dtype.names
+    members = {"column": array} if fields is None else {name: array[name] for name in fields}
+    for table in tables_of(Branch(members, path.stem), path, rows):
+        names = named_by(reading.columns, table.columns, path)
+        yield table if names == table.columns else replace(table, columns=names)
+
+
+def _array(path: Path) -> Any:
+    with ours_alone(path, "an array, as from numpy.save"), _nothing_unpickled(path):
+        return np.load(path, mmap_mode="r", allow_pickle=False)
+
+
+def _load(path: Path) -> dict[str, Any]:
+    expected = _EXPECTED.removeprefix("Expected ")
+    # Opened here, since numpy leaves a damaged file open.
+    with (
+        ours_alone(path, expected),
+        _nothing_unpickled(path),
+        path.open("rb") as stream,
+        np.load(stream, allow_pickle=False) as archive,
+    ):
+        return {key: archive[key] for key in archive.files}
+
+
+@contextmanager
+def _nothing_unpickled(path: Path) -> Iterator[None]:
+    """What would have to be unpickled is refused with the way on."""
+    try:
+        yield
+    except ValueError as error:
+        if "allow_pickle" not in str(error):
+            raise
+        raise ReadError(
+            f"{path}: cannot be read: it holds Python objects, which would run code when unpickled. Save arrays of "
+            "numbers instead, one for each demonstration, such as numpy.savez(path, demo_1=..., demo_2=...)."
+        ) from error
+
+
+def _check_pairs(path: Path, contents: Mapping[str, Any], single: set[str]) -> None:
+    """States and actions make the columns; times and groups have a number or a word for each row."""
+    for key in ("states", "actions"):
+        array = contents[key]
+        if array.dtype.kind not in "fiub" or array.ndim != 2 or not array.size:
+            raise ReadError(
+                f"{path}: {key} is {array.dtype} of shape {array.shape}, "
+                "expected real numbers in 2 dimensions, not empty."
+            )
+    for key in single & set(contents):
+        array = contents[key]
+        if array.dtype.kind not in "iubfU" or array.ndim != 1:
+            raise ReadError(f"{path}: {key} is {array.dtype} of shape {array.shape}, expected one for each sample.")
+    rows = len(contents["states"])
+    for key in ("actions", *(single & set(contents))):
+        if len(contents[key]) != rows:
+            raise ReadError(f"{path}: {rows} rows of states, but {len(contents[key])} of {key}; expected as many.")
+
+
+def _is_archive(head: bytes) -> bool:
+    return head.startswith(b"PK\x03\x04") and b".npy" in head[:512]
+
+
+FORMAT = Format((".npz",), _is_archive, read_npz)
+ARRAY = Format((".npy",), lambda head: head.startswith(b"\x93NUMPY"), read_npy, read_npy_blocks)

@@ -3,7 +3,9 @@
 Read by some rows at a time where asked for. Columns of words are left out, unless one names the demonstrations.
 """
 
-from collections.abc import Iterator
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,86 +13,100 @@ import numpy as np
 
 from ...base.arrays import BLOCK_ROWS, Array, require_extra
 from ...base.errors import ReadError
-from ..demonstration import Recording
-from .table import UNITS, Format, find_roles, listed, seconds, split_by_group, unique_names
+from .clocks import UNITS
+from .lerobot import DataSet, data_set_of, whole_episodes
+from .reading import Reading
+from .table import Format, Table, find_roles, listed, ours_alone, unique_names
 
 
-def read_parquet(path: Path, group: str | None, time: str | None) -> list[Recording]:
-    """Read one file whole; see :class:`~.table.ReadFile`."""
-    with _opened(path) as file:
-        return _recordings(_checked(path, file.read), path, group, time)
+def read_parquet(path: Path, reading: Reading) -> Iterator[Table]:
+    """Read one file whole, of a LeRobot data set episode by episode; see :class:`~.table.ReadFile`."""
+    whole = data_set_of(path)
+    if whole.has_episodes:
+        yield from whole_episodes(read_parquet_blocks(path, reading))
+        return
+    with ours_alone(path, "a Parquet file"), _opened(path) as file:
+        yield _table(file.read(), path, reading, whole)
 
 
-def read_parquet_blocks(path: Path, group: str | None, time: str | None) -> Iterator[Recording]:
+def read_parquet_blocks(path: Path, reading: Reading) -> Iterator[Table]:
     """Go through one file by some rows at a time."""
-    with _opened(path) as file:
-        batches = file.iter_batches(batch_size=BLOCK_ROWS, use_threads=False)
-        while (batch := _checked(path, lambda: next(batches, None))) is not None:
-            yield from _recordings(batch, path, group, time)
+    whole = data_set_of(path)
+    with ours_alone(path, "a Parquet file"), _opened(path) as file:
+        for batch in file.iter_batches(batch_size=BLOCK_ROWS, use_threads=False):
+            yield _table(batch, path, reading, whole)
 
 
 def _opened(path: Path) -> Any:
     parquet = require_extra("pyarrow.parquet", "data")
     # Pages are read when they are needed; a buffer in between bounds what a column of a row group takes.
-    return _checked(path, lambda: parquet.ParquetFile(path, buffer_size=2**20, pre_buffer=False))
+    return parquet.ParquetFile(path, buffer_size=2**20, pre_buffer=False)
 
 
-def _checked(path: Path, call: Any) -> Any:
-    from pyarrow import ArrowException
-
-    try:
-        return call()
-    except (ArrowException, OSError) as error:
-        said = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise ReadError(f"{path}: cannot be read ({said}). Expected a Parquet file.") from error
-
-
-def _recordings(table: Any, path: Path, group: str | None, time: str | None) -> list[Recording]:
+def _table(table: Any, path: Path, reading: Reading, whole: DataSet) -> Table:
     titles = unique_names(table.schema.names)
-    group_at, time_at = find_roles(titles, group, time, path)
     if not table.num_rows:
         raise ReadError(f"{path}: no rows, expected at least one.")
+    roles = find_roles(titles, reading, path)
     names: list[str] = []
     columns: list[Array] = []
+    words: dict[str, list[Any]] = {}
     for at, title in enumerate(titles):
-        if at not in (group_at, time_at):
-            for name, values in _numbers(table.column(at), title, path):
+        if title == roles.group or (title in roles.taken and _is_words(table.column(at).type)):
+            words[title] = table.column(at).to_pylist()
+        else:
+            for name, values in _numbers(table.column(at), title, path, whole.names):
                 names.append(name)
                 columns.append(values)
     if not names:
         raise ReadError(f"{path}: no column of numbers; it has {listed(titles)}.")
-    times = None if time_at is None else _times(table.column(time_at), titles[time_at], path)
-    groups = None if group_at is None else [str(value) for value in table.column(group_at).to_pylist()]
-    return split_by_group(names, np.column_stack(columns), times, groups, path.stem)
+    return whole.described(Table(path.stem, tuple(names), np.column_stack(columns), words))
 
 
-def _numbers(column: Any, title: str, path: Path) -> Iterator[tuple[str, Array]]:
+def _numbers(column: Any, title: str, path: Path, names: Mapping[str, list[str]]) -> Iterator[tuple[str, Array]]:
     """A column as columns of numbers: itself, the entries of its lists, or nothing if it holds words."""
     from pyarrow import types
 
     kind = column.type
+    if types.is_timestamp(kind) or types.is_duration(kind):
+        yield title, _elapsed(column)
     if _is_number(kind):
         yield title, _float64(column)
         return
     lists = types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind)
     if lists and _is_number(kind.value_type):
-        rows = column.to_pylist()
-        if None in rows or len(set(map(len, rows))) != 1:
+        rows = _entries(column)
+        if rows is None:
             raise ReadError(f"{path}, column {title!r}: its lists are of different lengths, expected one length.")
-        for place, values in enumerate(np.array(rows, dtype=np.float64).T):
-            yield f"{title}{place + 1}", values
+        entries = names.get(title, [])
+        for place, values in enumerate(rows.T):
+            yield f"{title}.{entries[place]}" if len(entries) == len(rows.T) else f"{title}{place + 1}", values
 
 
-def _times(column: Any, title: str, path: Path) -> Array:
-    from pyarrow import int64, types
+def _entries(column: Any) -> Array | None:
+    """The lists of a column as rows; None if they are of different lengths."""
+    from pyarrow import compute
 
-    if types.is_timestamp(column.type) or types.is_duration(column.type):
-        unit = UNITS[column.type.unit]
-        stamps = _float64(column.cast(int64()))
-        return (stamps - stamps[np.isfinite(stamps)][:1].sum()) * unit
-    if not _is_number(column.type):
-        raise ReadError(f"{path}, column {title!r}: is of type {column.type}, expected time stamps as numbers.")
-    return seconds(_float64(column), title)
+    lengths = compute.unique(compute.list_value_length(column)).to_pylist()
+    if len(lengths) != 1 or lengths[0] is None:
+        return None
+    return _float64(compute.list_flatten(column)).reshape(len(column), lengths[0])
+
+
+def _elapsed(column: Any) -> Array:
+    """Seconds from the first stamp that there is."""
+    from pyarrow import int64
+
+    stamps = column.cast(int64())
+    first = next((stamp for stamp in stamps.to_pylist() if stamp is not None), 0)
+    integers = stamps.fill_null(first).to_numpy(zero_copy_only=False) - first
+    return np.where(column.is_null().to_numpy(zero_copy_only=False), np.nan, integers * UNITS[column.type.unit])
+
+
+def _is_words(kind: Any) -> bool:
+    from pyarrow import types
+
+    return bool(types.is_string(kind) or types.is_large_string(kind) or types.is_dictionary(kind))
 
 
 def _is_number(kind: Any) -> bool:

@@ -1,41 +1,51 @@
 """What every file format ends as: named columns, split into recordings."""
 
+from __future__ import annotations
+
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...base.arrays import Array
-from ...base.errors import ReadError
+from ...base.errors import ReadError, UnconstrainError
 from ..demonstration import Recording
+from ..remarks import Remark
+from .clocks import Clock, ClockColumns, find_clock, find_clock_of, find_pair, read_words, unit_in_name, unit_of_word
+from .reading import Reading
 
-CLOCKS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
-"""Above these magnitudes a stamp counts nano-, micro- or milliseconds since 1970; the length of one in seconds."""
-
-GROUP_NAMES = ("demo", "demonstration", "trial", "bout", "group", "episode", "episode_index", "run")
+GROUP_NAMES = (
+    *("demo", "demonstration", "trial", "bout", "group", "episode", "episode_index", "run"),
+    *("demo_id", "demonstration_id", "trial_id", "episode_id", "run_id", "traj", "trajectory", "traj_id"),
+)
 """A column of one of these names, in any case, tells the demonstrations apart."""
 
-TIME_NAME = re.compile(r"(t|times?|timestamps?|stamps?|rosbagtimestamp)([_ \[(]?(s|ms|us|ns)[\])]?)?", re.IGNORECASE)
-"""A column of such a name holds the time stamps: ``t``, ``Time``, ``timestamp``, ``time_s``, ``t[ms]``, ..."""
+EXPONENTIAL = re.compile(r"[+-]?\d\.\d+[eE][+-]?\d{1,3}")
+"""A number as ``numpy.savetxt`` writes it; demonstrations are called by it in short."""
 
-UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-_UNIT_IN_NAME = re.compile(r"[_ \[(](s|ms|us|ns)[\])]?$", re.IGNORECASE)
+INDEX_NAME = re.compile(
+    r"frame([_ ]?(index|number|id|#))?|frame#|index|idx|step|seq|sample|packetcounter", re.IGNORECASE
+)
+"""A column of such a name counts rows; where it begins anew, so does a demonstration."""
+
+FEWEST_ROWS = 5
+"""What is shorter is no demonstration of its own: its bounds are not taken for such."""
+
+NEAR_START = 5.0
+"""A clock that goes back begins anew where it is within so many intervals of where it began."""
 
 
 class ReadFile(Protocol):
     """What a format must be able to do."""
 
-    def __call__(self, path: Path, *, group: str | None, time: str | None) -> Iterable[Recording]:
-        """Read one file into its recordings; of blocks, those that are called the same are one recording.
-
-        Parameters
-        ----------
-        path : Path
-        group, time : str, optional
-            Columns (or arrays) that tell the demonstrations apart and hold the time stamps, where their names do not
-            say so. Without groups the file is one demonstration, called as the file.
+    def __call__(self, path: Path, reading: Reading, /) -> Iterable[Table]:
+        """Read one file as tables; of blocks, those that are called the same are one table.
 
         Raises
         ------
@@ -49,82 +59,235 @@ class ReadFile(Protocol):
 class Format(NamedTuple):
     """A file format: how to know it, and how to read it.
 
-    ``suffixes`` in small letters with the dot; ``recognises`` looks at the first bytes of a file whose suffix says
-    nothing; ``read`` reads it whole, ``blocks``, if given, by no more than :data:`~unconstrain.base.arrays.BLOCK_ROWS`
-    rows at a time.
+    ``suffixes`` in small letters with the dot; ``recognises`` looks at the first bytes of a file; ``read`` reads it
+    whole, ``blocks``, if given, by some rows at a time. A format ``by_content`` is known by its first bytes whatever
+    the suffix says.
     """
 
     suffixes: tuple[str, ...]
     recognises: Callable[[bytes], bool]
     read: ReadFile
     blocks: ReadFile | None = None
+    by_content: bool = True
 
 
-def find_roles(names: Sequence[str], group: str | None, time: str | None, path: Path) -> tuple[int | None, int | None]:
-    """Where the columns are that name the demonstration and hold the time: as told, else by their names.
+@dataclass(frozen=True)
+class Table:
+    """Columns as a file holds them, before anyone says which one is the clock.
+
+    Parameters
+    ----------
+    name : str
+        What its recording is called where nothing splits it.
+    columns : tuple of str
+    values : ndarray, shape (T, c)
+        Numbers, NaN where there is none.
+    words : mapping of str to sequence
+        Columns that are no numbers, as far as anyone may want them: names of demonstrations, times in words.
+    breaks : tuple of int
+        Rows before which the file itself makes a break, such as a blank line.
+    rate : float, optional
+        Rows a second, where the file says so; used where it has no clock.
+    labels : tuple of str
+        Lists that the file keeps of demonstrations, such as ``train``, in which this one is.
+    units, attributes, remarks
+        As in :class:`~unconstrain.recordings.demonstration.Recording`.
+    """
+
+    name: str
+    columns: tuple[str, ...]
+    values: Array
+    words: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    breaks: tuple[int, ...] = ()
+    rate: float | None = None
+    labels: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    remarks: tuple[Remark, ...] = ()
+
+
+@contextmanager
+def ours_alone(path: Path, expected: str) -> Iterator[None]:
+    """Whatever a library raises becomes one error that names the file: damaged bytes make it raise what it likes.
+
+    Raises
+    ------
+    ReadError
+        With the first line of what was raised, and the kind of file that was expected.
+    """
+    try:
+        yield
+    except UnconstrainError:
+        raise
+    except Exception as error:
+        said = (str(error).splitlines() or [""])[0][:200] or type(error).__name__
+        raise ReadError(f"{path}: cannot be read ({said}). Expected {expected}.") from error
+
+
+class Roles(NamedTuple):
+    """Names of the columns that tell demonstrations apart, hold the time, and count the rows; None if there is none."""
+
+    group: str | None
+    clock: ClockColumns | None
+    counter: str | None
+
+    @property
+    def taken(self) -> set[str]:
+        """Columns that are no values."""
+        clock = (self.clock.whole, self.clock.nanoseconds) if self.clock else ()
+        return {name for name in (self.group, *clock) if name is not None}
+
+
+def find_roles(names: Sequence[str], reading: Reading, path: Path) -> Roles:
+    """What the columns are for: as told, else by their names.
 
     Raises
     ------
     ReadError
         If a column that was told does not exist.
     """
-    group_at = _find(names, group, "group", {at for at, name in enumerate(names) if name.lower() in GROUP_NAMES}, path)
-    stamped = {at for at, name in enumerate(names) if TIME_NAME.fullmatch(name) and at != group_at}
-    return group_at, _find(names, time, "time", stamped, path)
+    for name, role in ((reading.group, "group"), (reading.time, "time")):
+        if name is not None and name not in names:
+            raise ReadError(f"{path}: no column {name!r} for {role}; it has {listed(names)}.")
+    group = reading.group or next((name for name in names if _names_group(name) and name != reading.time), None)
+    others = [name for name in names if name != group]
+    clock = find_clock(others) if reading.time is None else _told_clock(others, reading.time)
+    index = next((name for name in others if INDEX_NAME.fullmatch(name)), None)
+    return Roles(group, clock, index)
 
 
-def seconds(stamps: Array, name: str) -> Array:
-    """Time stamps in seconds.
-
-    Stamps that count nano-, micro- or milliseconds since 1970, as loggers
-    write them, become seconds from the first stamp. Otherwise a unit at the
-    end of the name (``t_ms``, ``time[ns]``) decides; without one they are seconds.
-
-    Parameters
-    ----------
-    stamps : ndarray, shape (T,)
-        May hold NaN.
-    name : str
-        Name of the column.
-
-    Returns
-    -------
-    ndarray, shape (T,)
-    """
-    known = stamps[np.isfinite(stamps)]
-    if not known.size:
-        return stamps
-    for magnitude, unit in CLOCKS:
-        if np.median(known) > magnitude:
-            return (stamps - known[0]) * unit
-    in_name = _UNIT_IN_NAME.search(name)
-    return stamps * UNITS[in_name[1].lower()] if in_name else stamps
-
-
-def split_by_group(
-    columns: Sequence[str], values: Array, times: Array | None, groups: Sequence[str] | None, name: str
-) -> list[Recording]:
-    """One recording for each group, in the order of first appearance.
+class Assembly:
+    """Turns the tables of one file into recordings; remembers its clocks from block to block.
 
     Parameters
     ----------
-    columns : sequence of str
-    values : ndarray, shape (T, c)
-    times : ndarray, shape (T,), optional
-    groups : sequence of str, length T, optional
-        Without it all rows are one recording, called ``name``; with it each is called as its group.
-    name : str
+    path : Path
+    reading : Reading
     """
-    if groups is None:
-        return [Recording(tuple(columns), values, times, name)]
+
+    def __init__(self, path: Path, reading: Reading) -> None:
+        self.path = path
+        self.reading = reading
+        self._clocks: dict[str, Clock] = {}
+        self._parts: dict[str, int] = {}
+        self._starts: dict[str, Start] = {}
+        self._latest: dict[str, float | None] = {}
+
+    def recordings(self, table: Table) -> list[Recording]:
+        """The recordings in a table, or in a block of it, as far as they are asked for."""
+        roles = find_roles([*table.columns, *table.words], self.reading, self.path)
+        times, remarks = self._times(table, roles)
+        places = [at for at, name in enumerate(table.columns) if name not in roles.taken]
+        if not places:
+            raise ReadError(f"{self.path}: no column of numbers; it has {listed([*table.columns, *table.words])}.")
+        names = tuple(table.columns[at] for at in places)
+        whole = Recording(
+            names,
+            table.values[:, _as_slice(np.array(places))],
+            times,
+            table.name,
+            (*table.remarks, *remarks),
+            {name: unit for name, unit in table.units.items() if name in names},
+            table.attributes,
+        )
+        groups = _groups(table, roles.group)
+        tasks = table.words.get("task")
+        split = self._at_breaks(whole, table, roles) if groups is None else split_by_group(whole, groups, tasks)
+        return [each for each in split if self.reading.takes(each.name, table.labels, each.attributes.get("task"))]
+
+    def _times(self, table: Table, roles: Roles) -> tuple[Array | None, tuple[Remark, ...]]:
+        if roles.clock is None:
+            return self._times_of_rate(table), ()
+        name = roles.clock.whole
+        if name in table.words:
+            times = read_words([str(word) for word in table.words[name]])
+            return (times, ()) if times is not None else (None, (self._no_times(name, table.words[name]),))
+        stamps = _column(table, name)
+        if roles.clock.nanoseconds is not None:
+            parts = _column(table, roles.clock.nanoseconds) * 1e-9
+            clock = self._clocks.setdefault(table.name, find_clock_of(stamps, "stamp_s", "s"))
+            return clock.seconds(stamps) + parts, ()
+        unit = self.reading.time_unit or unit_of_word(table.units.get(name, "")) or unit_in_name(name)
+        label = name if unit is None else f"stamp_{unit}"
+        clock = self._clocks.setdefault(table.name, find_clock_of(stamps, label, self.reading.time_unit))
+        return clock.seconds(stamps), ()
+
+    def _no_times(self, name: str, words: Sequence[Any]) -> Remark:
+        """Words that are no times: an error if they were to be, else worth a word."""
+        first = next((str(word) for word in words if str(word).strip()), "")
+        said = f"got {first[:40]!r}, expected a number or a time as ISO 8601 writes it, such as 2024-05-01T10:00:00.02"
+        if self.reading.time is not None:
+            raise ReadError(f"{self.path}, column {name!r}: {said}.")
+        return Remark("dropped-column", f"column {name!r} is called as a clock, but is left out: {said}.", name, 0)
+
+    def _times_of_rate(self, table: Table) -> Array | None:
+        if not table.rate or not np.isfinite(table.rate) or table.rate <= 0:
+            return None
+        return np.arange(len(table.values)) / table.rate
+
+    def _at_breaks(self, whole: Recording, table: Table, roles: Roles) -> list[Recording]:
+        """Recordings between breaks: blank lines, and where the clock or the count of rows begins anew."""
+        counts = whole.times if roles.counter is None or whole.times is not None else _column(table, roles.counter)
+        bounds, where = _continued(_long_enough(table.breaks, len(whole)), whole.times), "blank lines"
+        start = self._starts.setdefault(whole.name, Start.of(counts))
+        part = self._parts.get(whole.name, 0) + start.is_again(self._latest.get(whole.name), counts)
+        if not bounds:
+            bounds, where = _restarts(counts, start), "where the clock or the count of rows begins anew"
+        self._parts[whole.name] = part + len(bounds)
+        self._latest[whole.name] = None if counts is None or not len(counts) else float(counts[-1])
+        said = f"{len(bounds) + 1} demonstrations in one table, taken apart at {where}, the first time at row {{}}."
+        notes = tuple(Remark("split", said.format(row), row=row) for row in bounds[:1])
+        return [
+            replace(
+                rows_of(whole, slice(begin, end)),
+                name=f"{whole.name}.{number}" if number else whole.name,
+                remarks=(*whole.remarks, *notes) if number == part else (),
+            )
+            for number, (begin, end) in enumerate(pairwise([0, *bounds, len(whole)]), start=part)
+        ]
+
+
+class Start(NamedTuple):
+    """Where a clock began, and its usual interval."""
+
+    first: float
+    interval: float
+
+    @classmethod
+    def of(cls, counts: Array | None) -> Start:
+        """The start of some rows; none where they have no clock."""
+        if counts is None or not len(counts):
+            return cls(float("nan"), 0.0)
+        return cls(float(counts[0]), _usual(np.diff(counts)))
+
+    def is_again(self, before: float | None, counts: Array | None) -> bool:
+        """Whether rows begin where a clock began, after rows that ended later."""
+        if before is None or counts is None or not len(counts):
+            return False
+        return bool(counts[0] < before and abs(counts[0] - self.first) <= NEAR_START * self.interval)
+
+
+def split_by_group(whole: Recording, groups: Sequence[str], tasks: Sequence[str] | None = None) -> list[Recording]:
+    """One recording for each group, called as it, in the order of first appearance, with the task of its first row."""
     codes = {text: code for code, text in enumerate(dict.fromkeys(groups))}
     code_of_row = np.fromiter((codes[text] for text in groups), dtype=np.intp, count=len(groups))
     order = np.argsort(code_of_row, kind="stable")
-    parts = np.split(order, np.cumsum(np.bincount(code_of_row))[:-1])
+    parts = np.split(order, np.cumsum(np.bincount(code_of_row))[:-1]) if len(groups) else []
     return [
-        Recording(tuple(columns), values[rows], None if times is None else times[rows], text)
-        for text, rows in zip(codes, parts, strict=True)
+        replace(
+            rows_of(whole, _as_slice(rows)),
+            name=f"{float(text):.15g}" if EXPONENTIAL.fullmatch(text) else text,
+            remarks=whole.remarks if number == 0 else (),
+            attributes=whole.attributes if tasks is None else {**whole.attributes, "task": tasks[int(rows[0])]},
+        )
+        for number, (text, rows) in enumerate(zip(codes, parts, strict=True))
     ]
+
+
+def rows_of(recording: Recording, rows: slice | NDArray[np.intp]) -> Recording:
+    """Some rows of a recording."""
+    times = None if recording.times is None else recording.times[rows]
+    return replace(recording, values=recording.values[rows], times=times)
 
 
 def unique_names(names: Iterable[str]) -> tuple[str, ...]:
@@ -142,16 +305,84 @@ def unique_names(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(unique)
 
 
-def _find(names: Sequence[str], wanted: str | None, role: str, fitting: set[int], path: Path) -> int | None:
-    """Where a column is: by its name, or the first of those that fit."""
-    if wanted is None:
-        return min(fitting, default=None)
-    if wanted not in names:
-        raise ReadError(f"{path}: no column {wanted!r} for {role}; it has {listed(names)}.")
-    return names.index(wanted)
+def named_by(names: Sequence[str] | None, held: Sequence[str], path: Path) -> tuple[str, ...]:
+    """Names of columns: as told, else those that the file has.
+
+    Raises
+    ------
+    ReadError
+        If the names that were told are too many or too few.
+    """
+    if names is None:
+        return tuple(held)
+    if len(names) != len(held):
+        raise ReadError(
+            f"{path}: got {len(names)} names of columns ({listed(names)}), expected {len(held)}, one for each."
+        )
+    return tuple(names)
 
 
 def listed(names: Sequence[str]) -> str:
     """Names with commas between, the first thirty."""
     more = f" and {len(names) - 30} more" if len(names) > 30 else ""
     return ", ".join(names[:30]) + more
+
+
+def _names_group(name: str) -> bool:
+    return name.lower() in GROUP_NAMES
+
+
+def _told_clock(names: Sequence[str], time: str) -> ClockColumns:
+    pair = find_pair([time, *names])
+    return pair if pair is not None and pair.whole == time else ClockColumns(time)
+
+
+def _column(table: Table, name: str) -> Array:
+    return table.values[:, table.columns.index(name)]
+
+
+def _groups(table: Table, group: str | None) -> list[str] | None:
+    if group is None:
+        return None
+    if group in table.words:
+        return [str(word) for word in table.words[group]]
+    return [f"{number:.17g}" for number in _column(table, group).tolist()]
+
+
+def _as_slice(places: NDArray[np.intp]) -> slice | NDArray[np.intp]:
+    """Places in a row as a slice, which copies nothing."""
+    first, last = int(places[0]), int(places[-1])
+    return slice(first, last + 1) if last - first + 1 == len(places) else places
+
+
+def _long_enough(breaks: Sequence[int], rows: int) -> list[int]:
+    """The breaks, if there is a demonstration between any two of them; none otherwise."""
+    bounds = sorted({at for at in breaks if 0 < at < rows})
+    long = np.diff([0, *bounds, rows]).min(initial=rows) >= FEWEST_ROWS
+    return bounds if long else []
+
+
+def _continued(bounds: list[int], times: Array | None) -> list[int]:
+    """The breaks over which the clock does not just go on."""
+    if times is None or not bounds:
+        return bounds
+    steps = np.diff(times)
+    return [at for at in bounds if not 0 < steps[at - 1] <= 3 * _usual(steps)]
+
+
+def _restarts(counts: Array | None, start: Start) -> list[int]:
+    """Rows where a clock begins anew: each time it goes back, it goes back to where it began; none otherwise."""
+    if counts is None:
+        return []
+    back = np.flatnonzero(np.diff(counts) < 0) + 1
+    # The first and the last may go on in the blocks before and after.
+    if np.diff(back).min(initial=FEWEST_ROWS) < FEWEST_ROWS:
+        return []
+    is_near = np.abs(counts[back] - start.first) <= NEAR_START * start.interval
+    return [int(at) for at in back] if is_near.all() else []
+
+
+def _usual(steps: Array) -> float:
+    """The median step forward, 0 if there is none."""
+    forward = steps[steps > 0]
+    return float(np.median(forward)) if forward.size else 0.0

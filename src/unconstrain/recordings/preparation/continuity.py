@@ -1,0 +1,57 @@
+"""States of angles and orientations without the jumps that are none: what a recipe names is made continuous in time."""
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.errors import SettingError
+from ..signals.orientations import TURNS, continuous_quaternions, continuous_rotations
+from .recipes import Recipe
+
+
+def continuous(states: Array, recipe: Recipe) -> Array:
+    """Unwrap the angles, and give quaternions and rotation vectors the numbers closest to those of the row before.
+
+    Parameters
+    ----------
+    states : ndarray, shape (T, n)
+        Columns as ``recipe.states``; in the order of time.
+    recipe : Recipe
+
+    Returns
+    -------
+    ndarray, shape (T, n)
+        The same table where the recipe names no such column.
+    """
+    groups = [
+        *(((name,), _unwrapped) for name in recipe.angles),
+        *((names, continuous_quaternions) for names in recipe.quaternions),
+        *((names, unturned) for names in recipe.rotation_vectors),
+    ]
+    if not groups or not len(states):
+        return states
+    smooth, known = states.copy(), recipe.states or ()
+    for names, mend in groups:
+        columns = [_place(name, known) for name in names]
+        smooth[:, columns] = mend(smooth[:, columns])
+    return smooth
+
+
+def _place(name: str, states: tuple[str, ...]) -> int:
+    if name not in states:
+        raise SettingError(f"got {name!r} as an angle, expected one of the states {', '.join(states)}; add it to them.")
+    return states.index(name)
+
+
+def _unwrapped(angle: Array) -> Array:
+    unwrapped: Array = np.unwrap(angle, period=_turn(angle), axis=0)
+    return unwrapped
+
+
+def unturned(vectors: Array) -> Array:
+    """Rotation vectors (T, 3), radians or degrees, as those of the same rotations closest to the row before."""
+    return continuous_rotations(vectors, _turn(np.linalg.norm(vectors, axis=1)))
+
+
+def _turn(angles: Array) -> float:
+    """One turn in the unit of some angles: degrees where their range is more than a turn in radians."""
+    return TURNS[0] if np.ptp(angles) <= 1.02 * TURNS[0] else TURNS[1]

@@ -1,0 +1,226 @@
+"""Checks of one recording; each is one function from a subject to a remark, or None."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from ...remarks import Remark
+from ...signals.stillness import is_noise, noise_share, pauses
+from ..meaning import are_backwards, are_targets
+from .subject import GAP_INTERVALS, LEAST_ROWS, Subject
+
+SLOWEST, FASTEST = 2.0, 2e4
+"""Samples per second that a movement is recorded with; others are a clock in another unit."""
+
+UNITS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""Units that clocks count in, in seconds."""
+
+SHORTEST_GAP_S = 0.1
+"""Shorter gaps are the jitter of a computer."""
+
+SHORTEST_PIECE = 5
+"""Rows before and after a gap; fewer are a stray row at an end."""
+
+
+def examine(subject: Subject) -> tuple[Remark, ...]:
+    """What is worth saying about one recording, at most once for each code, but for what its recipe cures."""
+    found = [*subject.recording.remarks, *(remark for check in CHECKS if (remark := check(subject)) is not None)]
+    first: dict[str, Remark] = {}
+    for remark in found:
+        first.setdefault(remark.code, remark)
+    return tuple(first.values())
+
+
+def clock_unit(subject: Subject) -> Remark | None:
+    """Stamps that make an absurd rate, by the median interval and by the mean one."""
+    times = subject.recording.times
+    if times is None or len(subject.rows) < LEAST_ROWS:
+        return None
+    stamps = np.sort(times[np.isfinite(times)])
+    intervals = np.diff(stamps)
+    forward = intervals[intervals > 0]
+    if not forward.size:
+        return None
+    rates = 1.0 / float(np.median(forward)), float(len(intervals) / (stamps[-1] - stamps[0]))
+    if max(rates) > SLOWEST and min(rates) < FASTEST:
+        return None
+    unit = next((unit for unit, seconds in UNITS.items() if seconds / max(rates) < 1.0 / SLOWEST), "ns")
+    cure = f"such as --time-unit {unit}" if max(rates) <= SLOWEST else "--time-unit, or the right column with --time"
+    return Remark("clock-unit", f"{rates[0]:.3g} samples a second; say the unit of the time stamps, {cure}.")
+
+
+def clock_gap(subject: Subject) -> Remark | None:
+    """Time without samples in the middle of a recording."""
+    stamps = subject.stamps
+    if stamps is None or len(stamps) < LEAST_ROWS or not subject.is_in_order:
+        return None
+    intervals = np.diff(stamps)
+    moving = intervals[intervals > 0]
+    usual = float(np.median(moving)) if moving.size else 0.0
+    longest = subject.recipe.max_gap_s or max(GAP_INTERVALS * usual, SHORTEST_GAP_S)
+    rows = np.flatnonzero(intervals > longest) + 1
+    rows = rows[(rows >= SHORTEST_PIECE) & (rows <= len(stamps) - SHORTEST_PIECE)]
+    if not rows.size:
+        return None
+    worst = int(rows[np.argmax(intervals[rows - 1])])
+    return Remark(
+        "clock-gap",
+        f"{rows.size} gap{'s' * (rows.size > 1)} in the time stamps, the longest {intervals[worst - 1]:.3g} s after "
+        f"{stamps[worst - 1] - stamps[0]:.6g} s; nothing is smoothed or interpolated across (--max-gap).",
+        row=subject.row(int(rows[0])),
+    )
+
+
+def row_order(subject: Subject) -> Remark | None:
+    """Rows that are not in the order of time, or in none where there are no stamps."""
+    if subject.stamps is not None:
+        back = np.flatnonzero(np.diff(subject.stamps) < 0) + 1
+        if not back.size or subject.recipe.sort or back.size == len(subject.stamps) - 1:
+            return None
+        message = f"time runs backwards at {back.size} row{'s' * (back.size > 1)}; put them in order with --sort."
+        return Remark("row-order", message, row=subject.row(int(back[0])))
+    states = subject.states
+    if len(states) < 2 * LEAST_ROWS or not states.shape[1] or not (noise_share(states) > 0.5).all() or _rests(subject):
+        return None
+    return Remark(
+        "row-order", "neighbouring rows have nothing in common; name the column of time stamps with --time and --sort."
+    )
+
+
+def reversed_in_time(subject: Subject) -> Remark | None:
+    """Stamps that count down, or recorded velocities against the movement."""
+    stamps = subject.stamps
+    if stamps is not None and len(stamps) >= LEAST_ROWS and (np.diff(stamps) < 0).all() and not subject.recipe.sort:
+        return Remark("reversed", "the time stamps count down; put the rows in order with --sort.")
+    if subject.moves and are_backwards(subject.clean, subject.actions):
+        return Remark("reversed", "moves against its own actions; leave it out with --leave-out, or turn it round.")
+    return None
+
+
+def angle_wrap(subject: Subject) -> Remark | None:
+    """An angle that jumps by a whole turn."""
+    if not subject.wraps:
+        return None
+    column, wrap = min(subject.wraps.items(), key=lambda one: one[1].rows[0])
+    name = subject.name(column)
+    message = f"jumps by a turn of {wrap.turn:.4g}, {len(wrap.rows)} in all; it is made continuous with --angle {name}."
+    return Remark("angle-wrap", message, name, subject.row(wrap.rows[0]))
+
+
+def quaternion_flip(subject: Subject) -> Remark | None:
+    """Four columns of unit quaternions that turn their sign."""
+    return _flip(subject, "quaternion-flip")
+
+
+def rotation_vector_flip(subject: Subject) -> Remark | None:
+    """Three columns of a rotation vector that turns into its opposite at half a turn."""
+    return _flip(subject, "rotation-vector-flip")
+
+
+def _flip(subject: Subject, code: str) -> Remark | None:
+    for start, flip in subject.flips.items():
+        if flip.code == code:
+            names = [subject.name(column) for column in range(start, start + flip.width)]
+            times = f"{len(flip.found)} time{'s' * (len(flip.found) > 1)}"
+            message = f"turns its sign {times}; it is made continuous with {flip.option} {','.join(names)}."
+            return Remark(code, message, names[0], subject.row(flip.found[0]))
+    return None
+
+
+def glitch(subject: Subject) -> Remark | None:
+    """Samples far off their neighbours."""
+    if not subject.glitches or subject.recipe.glitches != "keep":
+        return None
+    first, rows = subject.glitches[0], {row for one in subject.glitches for row in range(one.start, one.stop)}
+    message = f"{len(rows)} sample{'s' * (len(rows) > 1)} far off their neighbours; --glitches repair or drop."
+    return Remark("glitch", message, subject.name(first.column), subject.row(first.start))
+
+
+def seam(subject: Subject) -> Remark | None:
+    """Jumps to another place, as between demonstrations under one another in one table."""
+    if subject.recipe.seams == "cut" or not subject.seams:
+        return None
+    message = (
+        f"{len(subject.seams)} jump{'s' * (len(subject.seams) > 1)} to another place, as between demonstrations; "
+        "tell them apart with --group, or cut there with --seams cut."
+    )
+    return Remark("seam", message, row=subject.row(subject.seams[0]))
+
+
+def other_topic(subject: Subject) -> Remark | None:
+    """Rows that alternate between two movements in two places."""
+    if subject.topic is None:
+        return None
+    message = "rows alternate between two places, as where two topics share a table; choose one, such as with --topic."
+    return Remark("other-topic", message, row=subject.row(subject.topic))
+
+
+def targets(subject: Subject) -> Remark | None:
+    """Actions that are the states to come."""
+    recipe = subject.recipe
+    if not subject.moves or recipe.action_is is not None or not are_targets(subject.clean, subject.actions):
+        return None
+    message = "are the states to come, not velocities; learn the velocity of the states with --action-is target."
+    return Remark("targets-as-velocities", message, (recipe.actions or ("",))[0])
+
+
+def pause(subject: Subject) -> Remark | None:
+    """Standing still in the middle."""
+    if not subject.moves or subject.topic is not None:
+        return None
+    bounds = [0, *subject.seams, len(subject.rows)]
+    found = [
+        (first + start, first + stop)
+        for first, last in pairwise(bounds)
+        for start, stop in pauses(subject.clean[first:last])
+    ]
+    if not found:
+        return None
+    rows = sum(stop - start for start, stop in found)
+    done = "left out (--pauses keep)" if subject.recipe.pauses == "drop" else "kept (--pauses drop)"
+    message = f"stands still for {rows} of {len(subject.rows)} rows in the middle; they are {done}."
+    return Remark("pause", message, row=subject.row(found[0][0]))
+
+
+def at_rest(subject: Subject) -> Remark | None:
+    """States that change no more than noise does, all the time."""
+    if not subject.moves or subject.topic is not None or not _rests(subject):
+        return None
+    return Remark("at-rest", "does not move: what changes is noise. Leave it out with --leave-out.")
+
+
+def _rests(subject: Subject) -> bool:
+    """Whether states are constant, or noise about a place that is far from nought beside it."""
+    states = subject.clean
+    extent = np.ptp(states, axis=0).max(initial=0.0)
+    is_small = bool(extent <= 0.05 * np.abs(states).max(initial=0.0))
+    differentiated = subject.stamps is not None and not subject.actions.size
+    return is_noise(states) and (differentiated or is_small)
+
+
+def all_zero(subject: Subject) -> Remark | None:
+    """Action columns without any action."""
+    if not subject.actions.size or subject.actions.any():
+        return None
+    message = "all actions are zero; name others with --action, or take the velocity of the states: --differentiate."
+    return Remark("all-zero", message, (subject.recipe.actions or ("",))[0])
+
+
+CHECKS = (
+    clock_unit,
+    clock_gap,
+    row_order,
+    reversed_in_time,
+    other_topic,
+    angle_wrap,
+    quaternion_flip,
+    rotation_vector_flip,
+    glitch,
+    seam,
+    targets,
+    pause,
+    at_rest,
+    all_zero,
+)

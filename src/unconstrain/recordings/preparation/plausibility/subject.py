@@ -1,0 +1,177 @@
+"""What checks look at: the columns that a recipe uses, without the rows that have gaps in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....base.arrays import Array
+from ...demonstration import Recording
+from ...signals.jumps import Glitch, glitches, repaired, seams, topics
+from ...signals.orientations import Wrap, continuous_quaternions, quaternion_flips, rotation_flips, wraps
+from ..continuity import continuous, unturned
+from ..recipes import Recipe, stamps
+
+LEAST_ROWS = 10
+"""Fewer rows show no movement."""
+
+
+GAP_INTERVALS = 5.0
+"""An interval of this many median ones is a gap, where nothing else is said."""
+
+
+class Flip(NamedTuple):
+    """A kind of orientation whose numbers turn their sign: its code, option, columns, and rows."""
+
+    code: str
+    option: str
+    width: int
+    rows: Callable[[Array], list[int]]
+    mend: Callable[[Array], Array]
+    found: Sequence[int] = ()
+
+
+FLIPS = (
+    Flip("quaternion-flip", "--quaternion", 4, quaternion_flips, continuous_quaternions),
+    Flip("rotation-vector-flip", "--rotation-vector", 3, rotation_flips, unturned),
+)
+
+
+def _fresh(times: Array) -> NDArray[np.bool_]:
+    """Which stamps are not those of the row before."""
+    return np.concatenate([[True], np.diff(times) != 0])[: len(times)]
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """One recording as its recipe means it.
+
+    Parameters
+    ----------
+    recording : Recording
+    recipe : Recipe
+        With states, unless its columns do not tell.
+    """
+
+    recording: Recording
+    recipe: Recipe
+
+    @cached_property
+    def times(self) -> Array | None:
+        """Time stamps of all rows, seconds."""
+        return stamps(self.recording, self.recipe)
+
+    @cached_property
+    def rows(self) -> NDArray[np.intp]:
+        """Rows of the recording whose used cells are finite, the first of each stamp, shape (R,)."""
+        finite = np.ones(len(self.recording), dtype=bool)
+        for used in (self.recipe.states, self.recipe.actions):
+            finite &= np.isfinite(self.recording.select(used or ())).all(axis=1)
+        if self.times is not None:
+            finite &= np.isfinite(self.times)
+        rows = np.flatnonzero(finite)
+        return rows if self.times is None else rows[_fresh(self.times[rows])]
+
+    @cached_property
+    def stamps(self) -> Array | None:
+        """Times of :attr:`rows`, seconds."""
+        return None if self.times is None else self.times[self.rows]
+
+    @cached_property
+    def states(self) -> Array:
+        """States, with angles and orientations as continuous as the recipe makes them, shape (R, n)."""
+        return continuous(self._select(self.recipe.states or ()), self.recipe)
+
+    @cached_property
+    def actions(self) -> Array:
+        """Action columns, shape (R, d); d is 0 where the velocity of the states is the action."""
+        return self._select(self.recipe.actions or ())
+
+    @cached_property
+    def is_in_order(self) -> bool:
+        """Whether rows follow each other in time, as far as is known."""
+        return self.stamps is None or bool((np.diff(self.stamps) >= 0).all())
+
+    @cached_property
+    def moves(self) -> bool:
+        """Whether there are states to look at, one after the other."""
+        return self.states.shape[1] > 0 and len(self.rows) >= LEAST_ROWS and self.is_in_order
+
+    @cached_property
+    def flips(self) -> dict[int, Flip]:
+        """First columns of quaternions and rotation vectors that turn their sign."""
+        found = [
+            (start, flip._replace(found=rows))
+            for flip in (FLIPS if self.moves else ())
+            for start in range(self.states.shape[1] - flip.width + 1)
+            if (rows := flip.rows(self.states[:, start : start + flip.width]))
+        ]
+        kept: dict[int, Flip] = {}
+        for start, flip in sorted(found, key=lambda one: -len(one[1].found)):
+            if not any(start < other + kept[other].width and other < start + flip.width for other in kept):
+                kept[start] = flip
+        return kept
+
+    @cached_property
+    def unturned(self) -> Array:
+        """States with orientations of continuous signs, shape (R, n)."""
+        smooth = self.states.copy()
+        for start, flip in self.flips.items():
+            columns = slice(start, start + flip.width)
+            smooth[:, columns] = flip.mend(smooth[:, columns])
+        return smooth
+
+    @cached_property
+    def wraps(self) -> dict[int, Wrap]:
+        """Columns of states that jump by a whole turn."""
+        found = {column: wraps(angle) for column, angle in enumerate(self.unturned.T)} if self.moves else {}
+        return {column: wrap for column, wrap in found.items() if wrap is not None}
+
+    @cached_property
+    def unwrapped(self) -> Array:
+        """States without jumps by whole turns and turned signs, shape (R, n)."""
+        smooth = self.unturned.copy()
+        for column, wrap in self.wraps.items():
+            smooth[:, column] = np.unwrap(smooth[:, column], period=wrap.turn)
+        return smooth
+
+    @cached_property
+    def glitches(self) -> list[Glitch]:
+        """Samples of states far off their neighbours."""
+        return glitches(self.unwrapped) if self.moves else []
+
+    @cached_property
+    def clean(self) -> Array:
+        """States without jumps by whole turns and without glitches, shape (R, n)."""
+        return repaired(self.unwrapped, self.glitches)
+
+    @cached_property
+    def topic(self) -> int | None:
+        """The first row of a second movement at another place, where rows alternate between two."""
+        return topics(self.unwrapped) if self.moves else None
+
+    @cached_property
+    def seams(self) -> list[int]:
+        """Jumps to another place where time does not jump too, rows of :attr:`states`."""
+        ends = {row for one in self.glitches for row in (one.start, one.stop)}
+        found = [row for row in seams(self.clean) if row not in ends] if self.moves and self.topic is None else []
+        if self.stamps is None or not found:
+            return found
+        intervals = np.diff(self.stamps)
+        return [row for row in found if intervals[row - 1] <= GAP_INTERVALS * float(np.median(intervals))]
+
+    def row(self, index: int) -> int:
+        """The row of the recording behind a row of :attr:`states`."""
+        return int(self.rows[index])
+
+    def name(self, column: int) -> str:
+        """The name of a column of :attr:`states`."""
+        return (self.recipe.states or ())[column]
+
+    def _select(self, names: Sequence[str]) -> Array:
+        return self.recording.select(names)[self.rows]

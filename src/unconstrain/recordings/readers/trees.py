@@ -1,0 +1,299 @@
+"""Nested arrays, as HDF5, MATLAB, NumPy and JSON hold them, as tables.
+
+A mapping whose arrays have one length in common is a table. An array of one dimension is a column of its name; one of
+two is as many columns, numbered from 1, whichever way it lies; one of three holds a demonstration in each part. Each
+member of a sequence of mappings or arrays is a demonstration. Single numbers and words are attributes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.errors import ReadError
+from ..remarks import Remark
+from .table import FEWEST_ROWS, Table, listed, unique_names
+
+SHORT = {"states": "x", "actions": "u"}
+"""What the columns of arrays of these names are called, where both are there: x1..xn and u1..ud."""
+
+ACTIONS = ("actions", "action")
+"""An array of such a name has a row for each sample; observations may have one more, after the last action."""
+
+PERIODS = ("dt", "ts", "sampling_time", "sample_time", "period")
+RATES = ("fs", "rate", "rate_hz", "frequency", "freq", "fps", "hz", "sample_rate", "sampling_rate", "control_freq")
+
+_DEMONSTRATION = re.compile(
+    r"(demo|demonstration|traj|trajectory|trial|episode|ep|run|rec|recording|bout|take|arr)[_ -]?\d+", re.IGNORECASE
+)
+
+EPISODE_ENDS = ("episode_ends",)
+"""Arrays that hold the row after the last of each episode."""
+
+MOST_ROWS = 10**9
+MOST_COLUMNS = 16
+"""Of three dimensions the second is that of the columns if it is no larger and the first is."""
+
+WIDEST = 4
+"""An array that has so many times more columns than rows lies on its side."""
+
+
+@dataclass
+class Branch:
+    """A mapping on the way to the arrays, with what holds for all below it."""
+
+    members: Mapping[str, Any]
+    name: str
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    labels: tuple[str, ...] = ()
+    is_short: bool = True
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """An array with its samples along ``axis``, the first ``length`` of them."""
+
+    array: Any
+    axis: int
+    length: int
+
+    def rows(self, start: int, stop: int) -> Any:
+        """Some samples, one a row."""
+        stop = min(stop, self.length)
+        return self.array[start:stop] if self.axis == 0 else np.asarray(self.array[:, start:stop]).T
+
+
+def tables_of(branch: Branch, path: Path, rows: int | None = None) -> Iterator[Table]:
+    """All tables in a tree, whole or by so many rows at a time.
+
+    Raises
+    ------
+    ReadError
+        If there is none.
+    """
+    found = False
+    for table in _tables(branch, path, rows):
+        found = True
+        yield table
+    if not found:
+        held = described(branch.members)
+        raise ReadError(f"{path}: no arrays of numbers with one length in common; it holds {held}.")
+
+
+def described(members: Mapping[str, Any]) -> str:
+    """What is in a mapping, in a few words."""
+    return listed([f"{name} {_shape(member)}".strip() for name, member in members.items()]) or "nothing"
+
+
+def _tables(branch: Branch, path: Path, rows: int | None) -> Iterator[Table]:
+    arrays = {name: member for name, member in branch.members.items() if _is_array(member)}
+    if episodes := _episodes(arrays):
+        arrays = {name: array for name, array in arrays.items() if name not in EPISODE_ENDS} | episodes
+    branch.attributes = {**branch.attributes, **_attributes(branch.members)}
+    flat = {name: array for name, array in arrays.items() if array.ndim < 3}
+    leaves = {} if _are_demonstrations(flat) else _leaves(flat)
+    deep = {} if leaves else {name: array for name, array in arrays.items() if array.ndim == 3}
+    below = [*(part for name, array in deep.items() for part in _parts(name, array, branch)), *_branches(branch)]
+    if leaves and (not below or _length(leaves) >= FEWEST_ROWS):
+        yield from _cut(leaves, branch, path, rows)
+    elif not below:
+        for name, array in arrays.items():
+            if array.ndim == 2 and (single := _leaves({name: array})):
+                below_it = Branch({}, _under(branch, name), branch.attributes, branch.labels)
+                yield from _cut(single, below_it, path, rows)
+    for child in below:
+        yield from _tables(child, path, rows)
+
+
+def _cut(leaves: dict[str, Leaf], branch: Branch, path: Path, rows: int | None) -> Iterator[Table]:
+    """The table of some arrays, whole or by so many rows at a time."""
+    length = _length(leaves)
+    for start in range(0, length, rows or max(length, 1)):
+        parts = {name: np.asarray(leaf.rows(start, start + (rows or length))) for name, leaf in leaves.items()}
+        words = {name: _words(part, name, path) for name, part in parts.items() if part.dtype.kind in "SUO"}
+        short = SHORT if branch.is_short and set(SHORT) <= set(leaves) else {}
+        numbers = {name: part for name, part in parts.items() if name not in words}
+        columns = [column for name, part in numbers.items() for column in _columns(name, part, short)]
+        if not columns:
+            return
+        yield Table(
+            branch.name,
+            unique_names(name for name, _ in columns),
+            np.column_stack([values for _, values in columns]),
+            words,
+            rate=_rate(branch.attributes),
+            attributes=branch.attributes,
+            labels=branch.labels,
+            remarks=() if start else (*_remarks(leaves), *_left_out(leaves, branch)),
+        )
+
+
+def _columns(name: str, part: Any, short: Mapping[str, str]) -> list[tuple[str, Array]]:
+    with np.errstate(all="ignore"):  # a long double beyond float64 becomes infinity, which is found later
+        values = part.astype(np.float64)
+    if values.ndim == 1 or values.shape[1] == 1:
+        return [(name if name not in short else f"{short[name]}1", values.reshape(len(values)))]
+    return [(f"{short.get(name, name)}{place + 1}", column) for place, column in enumerate(values.T)]
+
+
+def _remarks(leaves: Mapping[str, Leaf]) -> tuple[Remark, ...]:
+    """A word about an array of which nothing tells which way it lies."""
+    turned = [name for name, leaf in leaves.items() if leaf.axis == 1]
+    single = [leaf for leaf in leaves.values() if leaf.array.ndim == 2]
+    if len(leaves) > 1 or not single:
+        return ()
+    rows, columns = single[0].array.shape
+    if not turned and columns <= rows:
+        return ()
+    samples, rest = (columns, "") if turned else (rows, "; transpose it if it lies the other way")
+    return (Remark("orientation", f"an array of {rows} x {columns} was read as {samples} samples{rest}."),)
+
+
+def _left_out(leaves: Mapping[str, Leaf], branch: Branch) -> Iterator[Remark]:
+    """A word about each array of numbers that has another length."""
+    for name, member in branch.members.items():
+        if (
+            name not in (*leaves, *EPISODE_ENDS)
+            and _is_array(member)
+            and member.ndim < 3
+            and member.dtype.kind in "fiu"
+        ):
+            said = f"{name!r} of shape {tuple(member.shape)} was left out: the others have {_length(leaves)} samples."
+            yield Remark("dropped-column", said, name)
+
+
+def _leaves(arrays: Mapping[str, Any]) -> dict[str, Leaf]:
+    """Arrays that share a length, numbers among them; none if they share none."""
+    length = _common_length(arrays)
+    leaves = {name: leaf for name, array in arrays.items() if (leaf := _leaf(array, length)) is not None}
+    has_numbers = any(leaf.array.dtype.kind in "fiub" for leaf in leaves.values())
+    shares = length is not None and (len(leaves) > 1 or len(arrays) == 1)
+    return leaves if has_numbers and shares else {}
+
+
+def _leaf(array: Any, length: int | None) -> Leaf | None:
+    for extra in (0, 1):  # observations may have one more, after the last action
+        for axis in range(array.ndim):
+            if length is not None and array.shape[axis] == length + extra:
+                return Leaf(array, axis, length)
+    return None
+
+
+def _common_length(arrays: Mapping[str, Any]) -> int | None:
+    """Samples: of the actions if there are any, else the length that most arrays share, the largest of several."""
+    numbers = {name: array for name, array in arrays.items() if array.dtype.kind in "fiub"}
+    for name in ACTIONS:
+        if name in numbers:
+            return int(numbers[name].shape[0])
+    if len(arrays) == 1:
+        return next((_longer(array) for array in numbers.values()), None)
+    votes = Counter(size for array in arrays.values() for size in set(array.shape))
+    flat = {array.shape[0] for array in arrays.values() if array.ndim == 1}
+    # What is the smaller side of every array is a number of columns.
+    sides = {max(array.shape) for array in arrays.values()}
+    shared = [size for size, count in votes.items() if count > 1 and size > 1 and size in sides]
+    return max(shared, key=lambda size: (size in flat, votes[size], size), default=None)
+
+
+def _are_demonstrations(arrays: Mapping[str, Any]) -> bool:
+    """Whether each array is one demonstration: they are numbered, and have the same columns."""
+    tables = [array for array in arrays.values() if array.ndim == 2]
+    numbered = all(_DEMONSTRATION.fullmatch(name) for name, array in arrays.items() if array.ndim == 2)
+    return len(tables) > 1 and numbered and len({min(array.shape) for array in tables}) == 1
+
+
+def _longer(array: Any) -> int:
+    if array.ndim == 1:
+        return int(array.shape[0])
+    rows, columns = array.shape
+    return int(columns if columns >= WIDEST * rows else rows)
+
+
+def _length(leaves: Mapping[str, Leaf]) -> int:
+    return next((leaf.length for leaf in leaves.values()), 0)
+
+
+def _branches(branch: Branch) -> Iterator[Branch]:
+    """Mappings and sequences below, with their names."""
+    for name, member in branch.members.items():
+        if isinstance(member, Branch):
+            member.attributes = {**branch.attributes, **member.attributes}
+            member.labels = member.labels or branch.labels
+            yield member
+        elif isinstance(member, Mapping):
+            yield Branch(member, _under(branch, name), branch.attributes, branch.labels, branch.is_short)
+        elif _is_sequence(member):
+            for number, each in enumerate(member, start=1):
+                inside = each if isinstance(each, Mapping) else {name: each}
+                yield Branch(inside, f"{_under(branch, name)}_{number}", branch.attributes, branch.labels)
+
+
+def _parts(name: str, array: Any, branch: Branch) -> list[Branch]:
+    """An array of three dimensions as demonstrations: along the first, or the last if samples come first."""
+    if array.dtype.kind not in "fiub" or min(array.shape) < 1 or array.shape[0] > max(array.shape[1:]) * 1000:
+        return []
+    samples_first = FEWEST_ROWS <= array.shape[0] > array.shape[1] <= MOST_COLUMNS
+    parts = (
+        [array[:, :, at] for at in range(array.shape[2])] if samples_first else [array[at] for at in range(len(array))]
+    )
+    return [
+        Branch({name: part}, f"{_under(branch, name)}_{at}", branch.attributes, branch.labels)
+        for at, part in enumerate(parts, start=1)
+    ]
+
+
+def _episodes(arrays: Mapping[str, Any]) -> dict[str, Any]:
+    """The number of the episode of each row, where an array says where each ends."""
+    ends = next((np.asarray(arrays[name]) for name in EPISODE_ENDS if name in arrays), None)
+    if ends is None or ends.ndim != 1 or ends.dtype.kind not in "iu" or not (np.diff(ends, prepend=0) > 0).all():
+        return {}
+    numbers = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0)) if ends[-1] < MOST_ROWS else np.empty(0)
+    return {"episode": numbers} if any(len(numbers) == len(array) for array in arrays.values()) else {}
+
+
+def _attributes(members: Mapping[str, Any]) -> dict[str, Any]:
+    """Single numbers and words."""
+    single = {name: member.reshape(()).item() for name, member in members.items() if _is_single(member)}
+    return single | {name: member for name, member in members.items() if isinstance(member, str | int | float | bool)}
+
+
+def _rate(attributes: Mapping[str, Any]) -> float | None:
+    """Rows a second, where an attribute says so."""
+    numbers = {name.lower(): value for name, value in attributes.items() if isinstance(value, int | float)}
+    rates = [numbers[name] for name in RATES if name in numbers]
+    rates += [1 / numbers[name] for name in PERIODS if numbers.get(name)]
+    return next((float(rate) for rate in rates if 0 < rate < 1e6), None)
+
+
+def _is_array(member: Any) -> bool:
+    return getattr(member, "ndim", 0) in (1, 2, 3) and member.dtype.kind in "fiubSU" and member.size > 1
+
+
+def _is_single(member: Any) -> bool:
+    return getattr(member, "size", 0) == 1 and member.dtype.kind in "fiubU" and isinstance(member, np.ndarray)
+
+
+def _is_sequence(member: Any) -> bool:
+    return isinstance(member, Sequence) and not isinstance(member, str | bytes)
+
+
+def _words(part: Any, name: str, path: Path) -> list[str]:
+    try:
+        return [word.decode("utf-8", "replace") if isinstance(word, bytes) else str(word) for word in part.tolist()]
+    except (SystemError, ValueError) as error:  # what NumPy and Python raise for characters that do not exist
+        raise ReadError(f"{path}: {name} holds damaged text ({error}).") from error
+
+
+def _under(branch: Branch, name: str) -> str:
+    return f"{branch.name}/{name}" if branch.name else name
+
+
+def _shape(member: Any) -> str:
+    return str(tuple(member.shape)) if hasattr(member, "shape") else type(member).__name__

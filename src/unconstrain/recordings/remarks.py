@@ -1,0 +1,49 @@
+"""What is worth saying about a recording."""
+
+from typing import NamedTuple
+
+WARNINGS = (
+    "angle-wrap",
+    "quaternion-flip",
+    "rotation-vector-flip",
+    "seam",
+    "glitch",
+    "clock-unit",
+    "clock-gap",
+    "targets-as-velocities",
+    "mixed-units",
+    "unit-differs",
+    "pause",
+    "reversed",
+    "at-rest",
+    "all-zero",
+    "few-demonstrations",
+    "row-order",
+    "explains-nothing",
+    "other-topic",
+    "dropped-column",
+)
+"""Codes of remarks that warn; all others tell how a file was read."""
+
+
+class Remark(NamedTuple):
+    """One thing to know about a recording.
+
+    ``code`` is a word for programs, ``message`` a sentence for people; ``column`` and ``row`` (from 0) say where.
+    """
+
+    code: str
+    message: str
+    column: str | None = None
+    row: int | None = None
+
+    @property
+    def warns(self) -> bool:
+        """Whether the recording may not be what it seems, rather than how it was read."""
+        return self.code in WARNINGS
+
+    def about(self, name: str) -> str:
+        """One line on a recording of some name: the code, the place, and the message."""
+        places = [f"'{name}'", *([] if self.row is None else [f"row {self.row}"])]
+        places += [] if self.column is None else [f"column {self.column!r}"]
+        return f"{self.code}: {', '.join(places)}: {self.message}"

@@ -1,0 +1,179 @@
+"""Samples far off their neighbours, and jumps to somewhere else.
+
+Smooth movement leaves small differences of high order, and a fast one is fast for several samples. A glitch has a
+shape that neither has: away and back, within a few samples, by much more than anything around it.
+"""
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.arrays import Array
+
+FAR = 6.0
+"""A jump is this many times larger than nine in ten steps, and half as many times than the steps around it."""
+
+AROUND = 10
+"""Samples on each side that a jump is compared with."""
+
+LONGEST_GLITCH = 30
+"""Samples that are off their neighbours together for longer are no glitch but a place."""
+
+LIKE_AN_IMPULSE = 0.11
+"""A lone bad sample leaves residuals that differ from those of an impulse by less than this share; a corner, by 1/6."""
+
+_INTERPOLATION = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0
+"""A sample minus the cubic through its four neighbours."""
+
+
+class Glitch(NamedTuple):
+    """Rows ``start`` to ``stop`` (half open) of a column that are off their neighbours."""
+
+    column: int
+    start: int
+    stop: int
+
+
+def glitches(values: Array) -> list[Glitch]:
+    """Find samples far off their neighbours, by row.
+
+    Parameters
+    ----------
+    values : ndarray, shape (T, n)
+
+    Returns
+    -------
+    list of Glitch
+    """
+    found = [
+        Glitch(column, start, stop)
+        for column, signal in enumerate(values.T)
+        for start, stop in sorted({*_single(signal), *_bursts(signal)})
+    ]
+    return sorted(found, key=lambda glitch: (glitch.start, glitch.column))
+
+
+def repaired(values: Array, found: list[Glitch]) -> Array:
+    """Put straight lines in the place of glitches, shape (T, n)."""
+    mended = values.copy()
+    rows = np.arange(len(values))
+    for column in {glitch.column for glitch in found}:
+        bad: NDArray[np.bool_] = np.zeros(len(values), dtype=bool)
+        for glitch in found:
+            if glitch.column == column:
+                bad[glitch.start : glitch.stop] = True
+        mended[bad, column] = np.interp(rows[bad], rows[~bad], values[~bad, column])
+    return mended
+
+
+def seams(values: Array) -> list[int]:
+    """Rows at which a table jumps to another place and stays there; the first row after each jump.
+
+    Parameters
+    ----------
+    values : ndarray, shape (T, n)
+        Without glitches.
+    """
+    extent = np.ptp(values, axis=0)
+    moving = extent > 0
+    if not moving.any():
+        return []
+    steps = np.linalg.norm(np.diff(values[:, moving], axis=0) / extent[moving], axis=1)
+    far = _far(steps)
+    alone = [start for start, stop in _runs(far) if stop - start == 1 and _stands_out(steps, far, start, stop)]
+    return [start + 1 for start in alone if AROUND / 2 <= start + 1 <= len(values) - AROUND / 2]
+
+
+def _single(signal: Array) -> Iterator[tuple[int, int]]:
+    """One sample off: the residuals of cubic interpolation around it are those of a lone impulse."""
+    if len(signal) < 2 * AROUND:
+        return
+    residual = np.convolve(np.pad(signal, 2, mode="reflect", reflect_type="odd"), _INTERPOLATION, "valid")
+    size, steps = np.abs(residual), np.abs(np.diff(signal))
+    moving = steps[steps > 0]
+    if not moving.size:
+        return
+    least = max(FAR * float(np.quantile(size, 0.95)), 3.0 * float(np.median(moving)), 5.0 * float(moving.min()))
+    for row in np.flatnonzero(size > least):
+        if _is_impulse(residual, int(row)):
+            yield int(row), int(row) + 1
+
+
+def _is_impulse(residual: Array, row: int) -> bool:
+    """Whether the residuals around a row are the filter's answer to one bad sample, and all others are small."""
+    first, last = max(row - AROUND, 0), min(row + AROUND + 1, len(residual))
+    expected = np.zeros(last - first)
+    for offset, share in enumerate(_INTERPOLATION, start=row - 2 - first):
+        if 0 <= offset < len(expected):
+            expected[offset] = share * residual[row]
+    inner = slice(2 if first == 0 else 0, len(expected) - (2 if last == len(residual) else 0))
+    misfit = np.abs(residual[first:last] - expected)[inner]
+    return bool(misfit.max(initial=0.0) < LIKE_AN_IMPULSE * abs(residual[row]))
+
+
+def _bursts(signal: Array) -> Iterator[tuple[int, int]]:
+    """Several samples off together: a jump away, and the same one back."""
+    steps = np.diff(signal)
+    far = _far(np.abs(steps))
+    runs = [(start, stop) for start, stop in _runs(far) if _stands_out(np.abs(steps), far, start, stop)]
+    for start, stop in runs:
+        if 2 <= stop - start <= 4 and abs(steps[start:stop].sum()) < 0.3 * np.abs(steps[start:stop]).max():
+            yield start + 1, stop
+    single = [start for start, stop in runs if stop - start == 1]
+    for away, back in pairwise(single):
+        if back - away <= min(LONGEST_GLITCH, len(signal) // 5) and _returns(steps, away, back):
+            yield away + 1, back + 1
+
+
+def _returns(steps: Array, away: int, back: int) -> bool:
+    return bool(abs(steps[away] + steps[back]) < 0.3 * abs(steps[away]))
+
+
+def _far(sizes: Array) -> NDArray[np.bool_]:
+    moving = sizes[sizes > 0]
+    usual = float(np.quantile(moving, 0.9)) if moving.size >= AROUND else np.inf
+    far: NDArray[np.bool_] = sizes > FAR * usual
+    return far
+
+
+def _stands_out(sizes: Array, far: NDArray[np.bool_], start: int, stop: int) -> bool:
+    """Whether steps are much larger than all others around them that are not far themselves."""
+    around = slice(max(start - AROUND, 0), stop + AROUND)
+    others = sizes[around][~far[around]]
+    return bool(sizes[start:stop].max() > FAR / 2 * others.max(initial=0.0))
+
+
+def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Half-open stretches in which all are true."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def topics(values: Array) -> int | None:
+    """Find rows that alternate between two movements at different places.
+
+    Parameters
+    ----------
+    values : ndarray, shape (T, n)
+
+    Returns
+    -------
+    int or None
+        The first row of the second movement; None where there is one movement.
+    """
+    extent = np.ptp(values, axis=0)
+    centred = (values - values.mean(axis=0)) / np.where(extent > 0, extent, 1.0)
+    along = centred @ np.linalg.eigh(centred.T @ centred)[1][:, -1]
+    order = np.sort(along)
+    between = np.diff(order)
+    widest = int(np.argmax(between))
+    second = along > (order[widest] + order[widest + 1]) / 2
+    if np.count_nonzero(np.diff(second)) < max(6, len(values) // 20):
+        return None
+    within = np.concatenate([np.linalg.norm(np.diff(centred[side], axis=0), axis=1) for side in (second, ~second)])
+    if np.quantile(within, 0.95) > 0.25 * between[widest]:
+        return None
+    return int(np.argmax(second != second[0]))

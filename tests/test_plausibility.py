@@ -1,0 +1,349 @@
+"""What is not what it seems is said, with its row and what cures it; what is as it seems is left alone."""
+
+import json
+import warnings
+
+import numpy as np
+import pytest
+from scipy.io import loadmat
+from scipy.spatial.transform import Rotation
+
+import faults
+import unconstrain as uc
+from recorded import DATA, RIM, needs_data, needs_rim
+from test_cli import call, run, write
+from unconstrain.base.errors import SettingError
+from unconstrain.recordings.preparation import PreparationWarning, prepare, survey, survey_set, window_used
+from unconstrain.recordings.remarks import WARNINGS
+from unconstrain.recordings.signals.jumps import glitches, seams, topics
+from unconstrain.recordings.signals.stillness import is_noise, pauses
+
+
+def codes(recordings, recipe=None):
+    """Codes said of each recording, of its numbers of demonstrations apart."""
+    return [
+        [remark.code for remark in one.warnings if remark.code != "few-demonstrations"]
+        for one in survey_set(recordings, recipe)
+    ]
+
+
+def quietly(recordings, recipe):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PreparationWarning)
+        return prepare(recordings, recipe)
+
+
+# ----------------------------------------------------------------------------------------------- faults that are put in
+
+
+@pytest.mark.parametrize("fault", faults.FAULTS, ids=lambda fault: fault.__name__)
+def test_faults_are_found_at_their_rows_and_others_are_not(fault):
+    done = faults.tally(fault, 3, seed=7)
+    assert done.rows == (3 if "nothing" not in fault.__name__ else 0)
+    assert done.false == 0, done.others
+
+
+@pytest.mark.slow
+def test_faults_are_found_in_95_sets_of_100_and_false_ones_in_one_at_most():
+    done = [faults.tally(fault, 40, seed=8) for fault in faults.FAULTS]
+    assert min(one.found for one in done[2:]) >= 38
+    assert sum(one.false for one in done) <= 0.01 * sum(one.sets for one in done)
+
+
+def test_every_code_is_put_in_but_those_of_readers_and_fits():
+    put_in = {fault(np.random.default_rng(0)).code for fault in faults.FAULTS}
+    assert set(WARNINGS) - put_in == {"explains-nothing", "dropped-column"}
+
+
+# ------------------------------------------------------------------------------------------------------ real recordings
+
+
+def strokes():
+    for path in sorted((DATA / "lasa_handwriting").glob("*.mat")):
+        for number, stroke in enumerate(loadmat(path, simplify_cells=True)["demos"]):
+            name = f"{path.stem} {number}"
+            yield uc.Recording(("x", "y"), np.asarray(stroke["pos"].T, float), np.asarray(stroke["t"], float), name)
+
+
+def hands():
+    tracks = np.loadtxt(DATA / "libras_hand" / "movement_libras.csv", delimiter=",")[:, :90]
+    for number, track in enumerate(tracks):
+        yield uc.Recording(("x", "y"), track.reshape(45, 2), 0.16 * np.arange(45), f"hand {number}")
+
+
+def contours():
+    for path in sorted((DATA / "kuleuven_contour").glob("data_demo_*.dat")):
+        table = np.loadtxt(path, skiprows=1)
+        yield uc.Recording(("x", "y", "z"), table[:, 1:4], table[:, 0], path.stem)
+
+
+@needs_data
+@pytest.mark.parametrize(("recordings", "every"), [(strokes, 9), (hands, 9), (contours, 3)])
+def test_nothing_is_said_of_real_recordings(recordings, every):
+    for recording in list(recordings())[::every]:
+        assert codes([recording], uc.Recipe(recording.columns, differentiate="savgol")) == [[]], recording.name
+
+
+@pytest.mark.slow
+@needs_data
+@pytest.mark.parametrize(("recordings", "allowed"), [(strokes, 0), (hands, 3), (contours, 0)])
+def test_nothing_is_said_of_any_real_recording(recordings, allowed):
+    said = [codes([one], uc.Recipe(one.columns, differentiate="savgol")) for one in recordings()]
+    assert sum(one != [[]] for one in said) <= allowed
+
+
+@needs_rim
+def test_nothing_is_said_of_wiping_but_of_its_quaternions_where_they_are_used():
+    recordings = [uc.read(path)[0] for path in sorted(RIM.glob("demo_*.csv"))]
+    assert codes(recordings) == [[]] * 6
+    turned = [index for index, one in enumerate(recordings) if _turns_sign(one.select(("qx", "qy", "qz", "qw")))]
+    assert turned == [2, 4]
+    said = codes(recordings, uc.Recipe(("qx", "qy", "qz", "qw"), differentiate="savgol"))
+    assert [index for index, one in enumerate(said) if "quaternion-flip" in one] == turned
+
+
+def _turns_sign(quaternions):
+    return bool(((quaternions[1:] * quaternions[:-1]).sum(axis=1) < 0).any())
+
+
+@needs_data
+def test_a_tracker_that_flips_its_hemisphere_leaves_glitches():
+    recording = uc.read(DATA / "ccl_trakstar_planar" / "planer_circle.csv")[0]
+    assert codes([recording], uc.Recipe(("x", "y", "z"), differentiate="savgol")) == [["glitch"]]
+
+
+# ---------------------------------------------------------------------------------------------------------------- cures
+
+TIMES = np.arange(0, 4, 0.02)
+TRACK = np.column_stack([np.cos(1.5 * TIMES), np.sin(1.5 * TIMES)])
+MOVED = uc.Recipe(("x", "y"), differentiate="savgol")
+
+
+def recording(track=TRACK, times=TIMES, columns=("x", "y")):
+    return uc.Recording(columns, track, times, "wipe")
+
+
+def test_a_pause_is_left_out_and_stamps_stay_right():
+    track = np.insert(TRACK, [80] * 60, TRACK[80], axis=0)
+    times = 0.02 * np.arange(len(track))
+    with pytest.warns(PreparationWarning, match=r"pause: 'wipe', row 80: stands still for 6\d of 260 rows .* left out"):
+        [demonstration] = prepare(recording(track, times), MOVED)
+    gone = ~np.isin(times, demonstration.times)
+    assert 58 <= gone.sum() <= 62
+    np.testing.assert_allclose(np.flatnonzero(gone).mean(), 110, atol=2)
+    speed = np.linalg.norm(demonstration.actions, axis=1)
+    np.testing.assert_allclose(speed, 1.5, atol=0.02)
+    assert len(quietly(recording(track, times), uc.Recipe(("x", "y"), differentiate="savgol", pauses="keep"))[0]) == 260
+
+
+def swings(share):
+    """Twelve demonstrations behind planes that stand still for a share of the time in the middle."""
+    rng, recordings = np.random.default_rng(3), []
+    for number in range(12):
+        normal, x, rows = rng.standard_normal(3), rng.uniform(-1, 1, 3), []
+        normal /= np.linalg.norm(normal)
+        for _ in range(150):
+            rows.append(x)
+            velocity = faults.cycle(x)
+            x = x + 0.02 * (velocity - normal * (normal @ velocity))
+        track = np.insert(np.array(rows), [75] * int(150 * share / (1 - share)), rows[75], axis=0)
+        shaken = track + 2e-4 * np.random.default_rng(number).standard_normal(track.shape)
+        recordings.append(uc.Recording(("x", "y", "z"), shaken, 0.02 * np.arange(len(track)), f"{number}"))
+    return recordings
+
+
+def test_pauses_of_seven_tenths_cost_the_policy_next_to_nothing():
+    states = np.random.default_rng(99).uniform(-0.7, 0.7, (500, 3))
+    truth = np.array([faults.cycle(state) for state in states])
+
+    def error(share):
+        recipe = uc.Recipe(("x", "y", "z"), differentiate="savgol", still=0.05)
+        policy = uc.LocallyLinearPolicy().fit_demonstrations(quietly(swings(share), recipe))
+        return ((policy(states) - truth) ** 2).sum() / ((truth - truth.mean(axis=0)) ** 2).sum()
+
+    assert error(0.7) < 1.3 * error(0.0)
+
+
+@pytest.mark.parametrize("cure", ["repair", "drop"])
+def test_a_glitch_is_repaired_or_dropped(cure):
+    track = TRACK.copy()
+    track[70] += [2, -1]
+    recipe = uc.Recipe(("x", "y"), differentiate="savgol", glitches=cure)
+    [demonstration] = quietly(recording(track), recipe)
+    [clean] = prepare(recording(), MOVED)
+    np.testing.assert_allclose(demonstration.actions, clean.actions, atol=0.01)
+    assert codes([recording(track)], recipe) == [[]]
+
+
+def test_a_cut_at_a_seam_keeps_both_sides_apart():
+    other = TRACK[:100] + np.array([5, 3])
+    both = recording(np.concatenate([TRACK, other]), 0.02 * np.arange(300))
+    [demonstration] = quietly(both, uc.Recipe(("x", "y"), differentiate="savgol", seams="cut"))
+    apart = [prepare(recording(track, 0.02 * np.arange(len(track))), MOVED)[0].actions for track in (TRACK, other)]
+    np.testing.assert_allclose(demonstration.actions, np.concatenate(apart), atol=1e-9)
+
+
+@pytest.mark.parametrize("turn", [2 * np.pi, 360.0])
+def test_a_crank_that_turns_through_half_a_turn_turns_at_its_speed(turn):
+    angle = turn / (2 * np.pi) * ((1.0 + TIMES + np.pi) % (2 * np.pi) - np.pi)
+    crank = recording(np.column_stack([angle, np.sin(TIMES)]), columns=("angle", "y"))
+    recipe = uc.Recipe(("angle", "y"), differentiate="savgol", angles=("angle",))
+    [demonstration] = quietly(crank, recipe)  # degrees are many times larger than y
+    np.testing.assert_allclose(demonstration.actions[:, 0] * 2 * np.pi / turn, 1.0, atol=1e-9)
+    assert "angle-wrap" in codes([crank], uc.Recipe(("angle", "y"), differentiate="savgol"))[0]
+
+
+def test_orientations_are_continuous_where_their_numbers_turn():
+    turned = Rotation.from_rotvec(np.outer(2.5 + 0.5 * TIMES, [0.6, 0, 0.8]))
+    quaternions, vectors = turned.as_quat(canonical=True), turned.as_rotvec()
+    names = ("a", "b", "c", "d")
+    for columns, table, setting in (
+        (names, quaternions, {"quaternions": names}),
+        (names[:3], vectors, {"rotation_vectors": (names[:3],)}),
+    ):
+        plain = uc.Recipe(columns, differentiate="savgol")
+        [[code]] = codes([recording(table, columns=columns)], plain)
+        assert code == ("quaternion-flip" if len(columns) == 4 else "rotation-vector-flip")
+        [demonstration] = prepare(
+            recording(table, columns=columns), uc.Recipe(columns, differentiate="savgol", **setting)
+        )
+        assert np.abs(np.diff(demonstration.states, axis=0)).max() < 0.02
+        rotation = Rotation.from_quat if len(columns) == 4 else Rotation.from_rotvec
+        assert (rotation(demonstration.states).inv() * turned).magnitude().max() < 1e-9
+
+
+def test_settings_that_cure_survive_json_and_are_checked():
+    recipe = uc.Recipe(
+        ("yaw", "a", "b", "c", "d"),
+        differentiate="savgol",
+        angles=("yaw",),
+        quaternions=(("a", "b", "c", "d"),),
+        rotation_vectors=(("a", "b", "c"),),
+        glitches="repair",
+        pauses="keep",
+        sort=True,
+    )
+    assert uc.Recipe.from_dict(json.loads(json.dumps(recipe.to_dict()))) == recipe
+    with pytest.raises(SettingError, match="quaternions: got a, b, expected 4 columns together"):
+        uc.Recipe(quaternions=("a", "b"))
+    with pytest.raises(SettingError, match="pauses: got 'skip', expected one of drop, keep"):
+        uc.Recipe(pauses="skip")
+    with pytest.raises(SettingError, match="got 'yaw' as an angle, expected one of the states x, y; add it to them"):
+        prepare(recording(), uc.Recipe(("x", "y"), differentiate="savgol", angles=("yaw",)))
+
+
+def test_targets_become_the_velocity_of_the_states():
+    ahead = np.concatenate([TRACK[1:], TRACK[-1:]])
+    table = recording(np.hstack([TRACK, ahead]), columns=("x", "y", "ax", "ay"))
+    given = uc.Recipe(("x", "y"), ("ax", "ay"))
+    assert codes([table], given) == [["targets-as-velocities"]]
+    [demonstration] = prepare(table, uc.Recipe(("x", "y"), ("ax", "ay"), action_is="target"))
+    np.testing.assert_array_equal(demonstration.actions, prepare(recording(), MOVED)[0].actions)
+    assert codes([table], uc.Recipe(("x", "y"), ("ax", "ay"), action_is="velocity")) == [[]]
+
+
+def test_differences_are_divided_by_the_interval():
+    change = np.diff(TRACK, axis=0, append=TRACK[-1:])
+    table = recording(np.hstack([TRACK, change]), columns=("x", "y", "ax", "ay"))
+    [demonstration] = prepare(table, uc.Recipe(("x", "y"), ("ax", "ay"), action_is="delta"))
+    np.testing.assert_allclose(demonstration.actions, change / 0.02)
+
+
+def test_the_window_that_is_used_is_the_one_that_is_said():
+    slow = recording(TRACK[::6], TIMES[::6])
+    with pytest.warns(
+        PreparationWarning, match=r"'wipe': the smoothing window of 0.25 s was widened to 0.6 s, the 5 sa"
+    ):
+        prepare(slow, MOVED)
+    assert window_used(MOVED, slow) == pytest.approx(0.6)
+    assert window_used(MOVED, recording()) == pytest.approx(0.26)
+
+
+def test_actions_against_the_movement_and_stamps_that_count_down_are_backwards():
+    velocity = np.gradient(TRACK, TIMES, axis=0)
+    table = recording(np.hstack([TRACK[::-1], velocity[::-1]]), columns=("x", "y", "ax", "ay"))
+    assert codes([table], uc.Recipe(("x", "y"), ("ax", "ay"))) == [["reversed"]]
+    assert codes([recording(times=TIMES[::-1].copy())], MOVED) == [["reversed"]]
+
+
+def test_rows_without_stamps_in_no_order_are_said():
+    shuffled = np.random.default_rng(0).permutation(np.hstack([TRACK, TRACK]))
+    table = recording(shuffled, None, ("x", "y", "vx", "vy"))
+    assert codes([table]) == [["row-order"]]
+    assert codes([recording(np.hstack([TRACK, TRACK[:, ::-1]]), None, ("x", "y", "vx", "vy"))]) == [[]]
+
+
+@pytest.mark.parametrize("fault", faults.FAULTS[2:], ids=lambda fault: fault.__name__)
+def test_every_line_names_what_cures_it(fault):
+    recordings, recipe, code, which, _ = fault(np.random.default_rng(4))
+    [message] = [one.message for one in survey_set(recordings, recipe)[which].warnings if one.code == code]
+    assert "--" in message or "comparable units" in message or "record more" in message
+
+
+@pytest.mark.parametrize("rows", [0, 1, 2, 9, 12])
+def test_short_and_empty_recordings_are_looked_at_without_harm(rows):
+    assert codes([recording(TRACK[:rows], TIMES[:rows])], MOVED) == [[]]
+    assert survey(recording(np.full((rows, 2), np.nan), TIMES[:rows]), MOVED).samples == rows
+
+
+def test_signals_of_nothing_are_nothing():
+    flat = np.zeros((50, 3))
+    assert glitches(flat) == seams(flat) == pauses(flat) == []
+    assert topics(flat) is None
+    assert is_noise(flat)
+
+
+# --------------------------------------------------------------------------------------------------------- command line
+
+
+@pytest.fixture
+def wrapped(tmp_path):
+    """Three recordings of a crank that turns through half a turn, and what the first warning is about."""
+    for number in range(3):
+        angle = (170 + 5 * number + 20 * TIMES + 180) % 360 - 180
+        write(tmp_path / f"crank_{number}.csv", "t,x,yaw", np.column_stack([TIMES, np.sin(TIMES), angle]))
+    return tmp_path
+
+
+def test_inspect_fit_and_diagnose_say_the_same(wrapped):
+    options = (wrapped / "crank_*.csv", "--state", "x,yaw", "--differentiate")
+    shown = json.loads(run("inspect", *options, "--json"))
+    [first] = [one for one in shown[0]["warnings"] if one["code"] == "angle-wrap"]
+    assert set(first) == {"code", "message", "column", "row"}
+    assert (first["column"], first["row"]) == ("yaw", 25)
+    line = f"angle-wrap: 'crank_0', row 25, column 'yaw': {first['message']}"
+    assert line in run("inspect", *options).splitlines()
+    assert f"Note: {line}" in call("fit", *options, "--model", "linear", "-o", wrapped / "p.npz").err.splitlines()
+    assert f"Note: {line}" in call("diagnose", *options).err.splitlines()
+    cured = json.loads(run("inspect", *options, "--angle", "yaw", "--json"))
+    assert "angle-wrap" not in {one["code"] for found in cured for one in found["warnings"]}
+
+
+@pytest.mark.parametrize("command", ["inspect", "fit", "diagnose"])
+def test_strict_ends_with_2_and_writes_nothing(wrapped, command):
+    output = ("-o", wrapped / "p.npz") if command == "fit" else ()
+    options = ("--state", "x,yaw", "--differentiate", *output)
+    ran = call(command, wrapped / "crank_*.csv", *options, "--strict")
+    assert ran.code == 2
+    assert "Error: --strict: not as it seems (angle-wrap" in ran.err
+    assert not (wrapped / "p.npz").exists()
+    ran = call(command, wrapped / "crank_*.csv", *options)
+    assert ran.code == 0
+
+
+def test_a_fit_that_explains_nothing_says_so(tmp_path):
+    out_and_back = np.concatenate([TRACK, TRACK[::-1]])
+    for number in range(4):
+        track = out_and_back * (1 + 0.1 * number)
+        write(tmp_path / f"{number}.csv", "t,x,y", np.column_stack([0.02 * np.arange(400), track]))
+    ran = call("fit", tmp_path / "*.csv", "--model", "linear", "-o", tmp_path / "p.npz")
+    assert ran.code == 0
+    assert "Note: explains-nothing: 'fit': misses " in ran.err
+
+
+def test_demonstrations_can_be_left_out_by_name(wrapped):
+    options = (wrapped / "crank_*.csv", "--state", "x,yaw", "--differentiate", "--leave-out", "crank_1")
+    assert [one["name"] for one in json.loads(run("inspect", *options, "--json"))] == ["crank_0", "crank_2"]
+    ran = call("fit", *options, "--model", "linear", "-o", wrapped / "p.npz")
+    assert "2 demonstrations" in ran.out
+    assert "Note: few-demonstrations: 'fit': 2 demonstrations" in ran.err
