@@ -10,6 +10,7 @@ of another library. Such an array stays on its device.
 """
 
 import importlib
+import math
 from collections.abc import Hashable, Iterator, Sequence
 from numbers import Integral
 from types import ModuleType
@@ -194,6 +195,11 @@ def slices(table: Any, rows: int) -> Iterator[slice]:
     """Slices that go through a table by so many rows at a time, the last by what is left."""
     samples = table.shape[0]
     return (slice(start, min(start + rows, samples)) for start in range(0, samples, rows))
+
+
+def power_of_two(size: float) -> float:
+    """The largest power of two up to a size; 1 for zero. Dividing by it costs no digit."""
+    return math.ldexp(1.0, math.frexp(size)[1] - 1) if size > 0.0 else 1.0
 
 
 def check_at_least(name: str, value: Any, least: float, *, strict: bool = False, whole: bool = False) -> None:

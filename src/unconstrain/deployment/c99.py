@@ -5,8 +5,10 @@ import re
 from collections.abc import Callable
 from importlib import resources
 from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base import files
 from ..base.arrays import Array
@@ -21,7 +23,7 @@ SELF_TESTS = 16
 """States inside the data, and as many far outside, that the self-test of an exported file looks at."""
 
 FAR = 100.0
-"""How far outside, as a multiple of the policy's reach."""
+"""How far outside, as a multiple of the policy's reach; for a polynomial, whose actions grow faster, its root."""
 
 
 def export_c(form: ClosedForm, policy: Callable[[Array], Array], path: str | os.PathLike[str], name: str) -> None:
@@ -67,14 +69,22 @@ def c_source(form: ClosedForm, name: str, states: Array, actions: Array) -> str:
         "origin": _braced(form.origin),
         "maps": _braced(form.maps if form.is_affine else form.maps[:, :, 0]),
         "slopes": "" if form.exponents is None else _braced(form.exponents),
+        "terms": str(form.maps.shape[2]),
+        "degree": str(form.degree),
+        "monomials": "" if form.monomials is None else _braced(form.monomials, str),
         "test_states": _braced(states),
         "test_actions": _braced(actions),
         "tolerance": float(TOLERANCE * np.abs(actions).max()).hex(),
     }
-    blended = ("shares", "maps" if form.is_affine else "constants")
-    body = ("affine",) if form.exponents is None else blended
-    source = "".join(_template(part) for part in ("head", *body, "self_test"))
+    source = "".join(_template(part) for part in ("head", *_body(form), "self_test"))
     return re.sub(r"@([a-z_]+|NAME)@", lambda found: fill[found[1]], source)
+
+
+def _body(form: ClosedForm) -> tuple[str, ...]:
+    """Names of the templates that are the policy."""
+    if form.exponents is not None:
+        return "shares", "maps" if form.is_affine else "constants"
+    return ("affine",) if form.monomials is None else ("polynomial",)
 
 
 def _template(part: str) -> str:
@@ -82,19 +92,22 @@ def _template(part: str) -> str:
     return (resources.files(__package__) / "templates" / f"{part}.c.in").read_text()
 
 
+def _hexadecimal(value: float) -> str:
+    return (float(value) + 0.0).hex()  # adding zero makes a minus zero plain
+
+
 def _probes(form: ClosedForm) -> Array:
     """States for a self-test, inside and far outside, the same for the same policy."""
     drawn = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * SELF_TESTS, len(form.origin)))
-    drawn[SELF_TESTS:] *= FAR
+    drawn[SELF_TESTS:] *= FAR ** (1 / form.degree)
     return form.origin + form.reach * drawn
 
 
-def _braced(values: Array) -> str:
+def _braced(values: NDArray[Any], said: Callable[[Any], str] = _hexadecimal) -> str:
     """An initialiser, by rows."""
     if np.ndim(values) > 1:
-        return "{\n" + ",\n".join(_braced(row) for row in values) + "}"
-    # Adding zero makes a minus zero plain.
-    return "{" + ", ".join((float(value) + 0.0).hex() for value in values) + "}"
+        return "{\n" + ",\n".join(_braced(row, said) for row in values) + "}"
+    return "{" + ", ".join(map(said, values)) + "}"
 
 
 def _version() -> str:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base import files
 from ..base.arrays import Array, require_extra
@@ -36,11 +38,13 @@ def onnx_model(form: ClosedForm) -> bytes:
     n, d, _ = form.sizes
     graph = _Graph()
     relative = graph.add("Sub", "states", graph.constant("origin", form.origin))
-    if form.exponents is None:
-        graph.affine(relative, form.maps[0, :, :n].T, form.maps[0, :, n], "map", to="actions")
-    else:
+    if form.exponents is not None:
         exponents = graph.affine(relative, form.exponents[:, :n].T, form.exponents[:, n], "exponents")
         _blended(graph, form, relative, graph.add("Softmax", exponents, axis=-1))
+    elif form.monomials is not None:
+        _polynomial(graph, form, relative, form.monomials)
+    else:
+        graph.affine(relative, form.maps[0, :, :n].T, form.maps[0, :, n], "map", to="actions")
     double = TensorProto.DOUBLE
     made = helper.make_graph(
         graph.nodes,
@@ -72,6 +76,17 @@ def _blended(graph: _Graph, form: ClosedForm, relative: str, shares: str) -> Non
         graph.constant("sum", np.repeat(np.eye(d), n + 1, axis=0)),
         to="actions",
     )
+
+
+def _polynomial(graph: _Graph, form: ClosedForm, relative: str, monomials: NDArray[np.intp]) -> None:
+    n = len(form.origin)
+    whole = graph.affine(relative, np.eye(n, n + 1), np.eye(n + 1)[n], "whole")  # (z, 1)
+    factors = [
+        graph.add("Gather", whole, graph.constant(f"factor_{place}", column.astype(np.int64)), axis=1)
+        for place, column in enumerate(monomials.T)
+    ]
+    terms = reduce(partial(graph.add, "Mul"), factors)
+    graph.add("MatMul", terms, graph.constant("map", form.maps[0].T), to="actions")
 
 
 class _Graph:

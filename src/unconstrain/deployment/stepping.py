@@ -5,7 +5,7 @@ from threading import local
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import Array
 from ..base.errors import InvalidDataError
@@ -37,7 +37,9 @@ def stepper(model: Model, weights: Array, n: int) -> Step:
     form = model.fields.formula(model.features, weights)
     if form is None:
         return _without_formula(model, weights[0], n)
-    return _affine(form) if form.exponents is None else _blended(form, form.exponents)
+    if form.exponents is not None:
+        return _blended(form, form.exponents)
+    return _affine(form) if form.monomials is None else _polynomial(form, form.monomials)
 
 
 def _without_formula(model: Model, weights: Array, n: int) -> Step:
@@ -61,6 +63,22 @@ def _affine(form: ClosedForm) -> Step:
         z, head, _, _ = buffers.own
         relative(state, head)
         return dot(whole, z, out)
+
+    return step
+
+
+def _polynomial(form: ClosedForm, monomials: NDArray[np.intp]) -> Step:
+    relative, take, multiply, dot = _relative_to(form.origin), np.take, np.multiply, np.dot
+    whole, (first, *others) = np.ascontiguousarray(form.maps[0]), np.ascontiguousarray(monomials.T)
+    buffers = _PerThread(len(form.origin), len(monomials), len(monomials))
+
+    def step(state: ArrayLike, out: Array | None = None) -> Array:
+        z, head, terms, factors = buffers.own
+        relative(state, head)
+        take(z, first, 0, terms, "clip")  # other modes would make a buffer of their own
+        for which in others:
+            multiply(terms, take(z, which, 0, factors, "clip"), terms)
+        return dot(whole, terms, out)
 
     return step
 
@@ -101,7 +119,7 @@ def _relative_to(origin: Array) -> Callable[[ArrayLike, Array], None]:
 
 
 class _PerThread(local):
-    """Buffers: (z, 1), its first n entries, exponents, sums."""
+    """Buffers: (z, 1), its first n entries, exponents or monomials, sums or factors."""
 
     def __init__(self, n: int, models: int, sums: int) -> None:
         z = np.ones(n + 1)

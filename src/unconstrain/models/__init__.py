@@ -1,6 +1,6 @@
 """Models of a policy: features, receptive fields, and their closed form."""
 
-from .features import Affine, FeatureMap, KMeansRBF, NormalisedRBF, Placeable
+from .features import Affine, FeatureMap, KMeansRBF, NormalisedRBF, Placeable, Polynomial
 from .formula import ClosedForm
 from .model import Model
 from .receptive_fields import Everywhere, ReceptiveFields, choose_variance, cover
@@ -14,6 +14,7 @@ __all__ = [
     "Model",
     "NormalisedRBF",
     "Placeable",
+    "Polynomial",
     "ReceptiveFields",
     "choose_variance",
     "cover",

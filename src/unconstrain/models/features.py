@@ -10,10 +10,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import combinations_with_replacement
+from math import comb
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import SMALLEST_VARIANCE, Array, as_matrix, beside, check_at_least, namespace
 from ..base.display import Shown, counted
@@ -23,6 +25,9 @@ from .formula import ClosedForm, exponents
 
 _LEAST_SPREAD = 1e10 * np.sqrt(SMALLEST_VARIANCE)
 """States that spread less count as one: centres placed among them may be a millionth of this apart."""
+
+MOST_MONOMIALS = 2000
+"""Most features of a polynomial: the sums of their products are then 32 MB for each pair of actions and each fold."""
 
 
 class FeatureMap(Protocol):
@@ -83,6 +88,70 @@ class Affine(Shown):
     def _summary(self) -> tuple[str, ...]:
         n = max(np.size(self.centre), np.size(self.scale))
         return () if n == 1 else (f"centred and scaled in {counted(n, 'dimension')}",)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Polynomial(Shown, Parameters):
+    """Monomials of the states up to a degree: products of so many entries of :class:`Affine` features ``(x, 1)``.
+
+    They come in lexicographic order, for two states and degree 2 as
+    ``(x₁², x₁x₂, x₁, x₂², x₂, 1)``; those of degree 1 are the affine features.
+
+    Parameters
+    ----------
+    degree : int
+    centre, scale : float or array_like, shape (n,)
+        The monomials are those of ``(x − centre) / scale``. The functions they
+        span do not depend on either; the condition of the solution does.
+
+    Raises
+    ------
+    SettingError
+        If the degree is no whole number above zero, or states have more than :data:`MOST_MONOMIALS` monomials.
+    """
+
+    degree: int = 2
+    centre: Array | float = 0.0
+    scale: Array | float = 1.0
+
+    def __post_init__(self) -> None:
+        check_at_least("degree", self.degree, 1, whole=True)
+
+    def __call__(self, states: Array) -> Array:
+        """Compute features (N, p) of states (N, n), ``p = (n + degree)! / n! degree!``."""
+        xp, factors = namespace(states), self._affine(states).T
+        first, *others = (beside(place, states) for place in self._monomials(states.shape[1]).T)
+        products = xp.take(factors, first, axis=0)  # (p, N): sums over monomials then run along rows
+        for place in others:
+            products *= xp.take(factors, place, axis=0)
+        return products.T
+
+    def closed_form(self, weights: Array) -> ClosedForm:
+        """Closed form of the policy ``W φ(x)`` with weights (d, p)."""
+        n = next(n for n in range(weights.shape[1]) if comb(n + self.degree, n) == weights.shape[1])
+        affine, monomials = self._affine.closed_form(np.ones((1, n + 1))), self._monomials(n)
+        return replace(affine, maps=weights * affine.maps[:, :, monomials].prod(axis=3), monomials=monomials)
+
+    def place(self, states: Array) -> Polynomial:
+        """Centre and scale on the data, unless centre or scale were given."""
+        placed = self._affine.place(states)
+        return replace(self, centre=placed.centre, scale=placed.scale)
+
+    @property
+    def _affine(self) -> Affine:
+        return Affine(self.centre, self.scale)
+
+    def _monomials(self, n: int) -> NDArray[np.intp]:
+        """Which of the n + 1 affine features each monomial multiplies, shape (p, degree)."""
+        if comb(n + self.degree, n) > MOST_MONOMIALS:
+            raise SettingError(
+                f"degree: got {self.degree} for states of {counted(n, 'column')}, which have more than "
+                f"{MOST_MONOMIALS} monomials. Take a lower degree, fewer columns, or a LocallyLinearPolicy."
+            )
+        return np.array(list(combinations_with_replacement(range(n + 1), self.degree)), np.intp)
+
+    def _summary(self) -> tuple[str, ...]:
+        return f"degree={self.degree}", *self._affine._summary()
 
 
 @dataclass(frozen=True, eq=False, repr=False)

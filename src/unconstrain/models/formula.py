@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..base.display import Shown, counted
@@ -19,23 +20,27 @@ class ClosedForm(Shown):
     where ``e_m = slope_mᵀ z + offset_m`` is the logarithm of a Gaussian
     kernel without ``−‖z‖² / 2σ²``, which is common to all and cancels.
     An affine policy has M = 1, a parametric policy on normalised RBFs A = 0.
+    A polynomial policy has M = 1 and products of entries of ``(z, 1)`` in place of these.
     All of :mod:`~unconstrain.deployment` is generated from it.
 
     Parameters
     ----------
     origin : ndarray, shape (n,)
-    maps : ndarray, shape (M, d, n + 1) or (M, d, 1)
-        ``(A_m, b_m)``, or ``b_m`` alone.
+    maps : ndarray, shape (M, d, n + 1), (M, d, 1) or (1, d, p)
+        ``(A_m, b_m)``, or ``b_m`` alone, or factors of the monomials.
     exponents : ndarray, shape (M, n + 1), optional
         ``(slope_m, offset_m)``; see :func:`exponents`. Without it M is 1.
     reach : ndarray, shape (n,)
         Extent of the data from the origin along each axis; the range of self-tests.
+    monomials : ndarray of int, shape (p, degree), optional
+        Monomial j is the product of the entries ``monomials[j]`` of ``(z, 1)``. Without exponents only.
     """
 
     origin: Array
     maps: Array
     exponents: Array | None
     reach: Array
+    monomials: NDArray[np.intp] | None = None
 
     @property
     def sizes(self) -> tuple[int, int, int]:
@@ -46,6 +51,11 @@ class ClosedForm(Shown):
     def is_affine(self) -> bool:
         """Whether the models are affine maps rather than constants."""
         return self.maps.shape[2] > 1
+
+    @property
+    def degree(self) -> int:
+        """How fast the actions grow far away: at most with this power of the distance."""
+        return 1 if self.monomials is None else self.monomials.shape[1]
 
     def _summary(self) -> tuple[str, ...]:
         return tuple(map(counted, self.sizes, ("state", "action", "model")))

@@ -1,15 +1,20 @@
 """Model of a policy: features and receptive fields, without weights."""
 
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base.arrays import BLOCK_ROWS, Array, as_matrix, is_foreign, namespace, slices
 from ..base.display import Shown
 from ..base.errors import SettingError
-from .features import FeatureMap
+from .features import Affine, FeatureMap, KMeansRBF, Placeable, Polynomial
 from .formula import ClosedForm
-from .receptive_fields import Everywhere, ReceptiveFields
+from .receptive_fields import Everywhere, ReceptiveFields, choose_variance, cover
+
+MOST_WEIGHTS = 500
+"""Models of more weights are not chosen from."""
 
 _ROWS = 4096
 """Rows that are predicted together, so that temporaries stay in cache."""
@@ -41,6 +46,35 @@ class Model(Shown):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centring", self.fields.centring(self.features))
+
+    @classmethod
+    def local(
+        cls, states: Array, variance: float | None = None, at_least: float = 0.7, centres: ArrayLike | None = None
+    ) -> Self:
+        """Affine models in receptive fields over some states, on regressors of one origin (section III-D)."""
+        width = variance if variance is not None else choose_variance(states, at_least)
+        if centres is None:
+            fields = cover(states, width, at_least)
+        else:
+            fields = ReceptiveFields(as_matrix(centres, "centres"), width)
+        return cls(Affine(fields.centres.mean(axis=0), np.sqrt(width)), fields)
+
+    @classmethod
+    def to_choose_from(cls, states: Array, actions: int) -> dict[str, Self]:
+        """Affine, quadratic, cubic and RBF features over some states, and local models, by name.
+
+        Without those of more than :data:`MOST_WEIGHTS` weights, or more than half as many as there are numbers.
+        """
+        every: dict[str, Placeable] = {
+            "affine": Affine(),
+            "quadratic": Polynomial(2),
+            "cubic": Polynomial(3),
+            "rbf": KMeansRBF(),
+        }
+        placed = {name: cls(features.place(states), Everywhere()) for name, features in every.items()}
+        most = min(MOST_WEIGHTS, states.shape[0] * actions // 2)
+        few = {name: one for name, one in placed.items() if actions * one.design(states[:1]).shape[1] <= most}
+        return {"affine": placed["affine"]} | few | {"local": cls.local(states)}
 
     def design(self, states: Array) -> Array:
         """Features of states (N, n), finite, shape (N, p).
@@ -94,8 +128,8 @@ class Model(Shown):
             name = getattr(self.features, "__name__", type(self.features).__name__)
             raise SettingError(
                 f"cannot export a policy on the features {name}: they are Python code. Can be exported are locally "
-                "linear policies, and parametric ones on Affine, NormalisedRBF or KMeansRBF features, or on features "
-                "that offer closed_form(weights) -> unconstrain.ClosedForm."
+                "linear policies, and parametric ones on Affine, Polynomial, NormalisedRBF or KMeansRBF features, or "
+                "on features that offer closed_form(weights) -> unconstrain.ClosedForm."
             )
         return form
 

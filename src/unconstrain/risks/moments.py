@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import reduce
 from itertools import combinations, combinations_with_replacement
 from operator import add, sub
@@ -116,6 +116,11 @@ class Moments(Shown):
             change @ self.gram @ back,
             moved.transpose(0, 3, 1, 4, 2).reshape(models, new * d, new * d),
         )
+
+    def in_units(self, action: float, weight: float) -> Moments:
+        """Moments with actions and sample weights measured in units ``1 / action`` and ``1 / weight`` as large."""
+        energy, cross = action * (action * self.energy), action * self.cross
+        return weight * replace(self, energy=energy, cross=cross)
 
     def on_host(self) -> Moments:
         """Moments as NumPy arrays."""

@@ -23,6 +23,7 @@ from ..base.arrays import (
     slices,
 )
 from ..base.errors import InvalidDataError
+from .suspects import credibility, lengths_in
 
 FOREIGN_BLOCK_ROWS = 2**20
 """Rows of an array of another library that are summed together: its device may want much to do at once."""
@@ -55,7 +56,7 @@ class Batch(NamedTuple):
         Raises
         ------
         InvalidDataError
-            If lengths differ, a number is not finite, or no sample counts.
+            If lengths differ or a number is not finite.
         """
         if actions is None:
             raise InvalidDataError("requires y to be passed, but the target y is None: expected the observed actions.")
@@ -69,15 +70,13 @@ class Batch(NamedTuple):
                 "expected one action for each state."
             )
         weights = None if sample_weight is None else as_weights(sample_weight, samples)
-        if weights is not None and not weights.any():
-            raise InvalidDataError("sample_weight: all weights are zero, expected at least one that counts.")
         names = None if groups is None else as_groups(groups, samples)
         return cls(states, table, weights, names, None if times is None else as_vector(times, "times", samples)), flat
 
     def blocks(self) -> Iterator[Batch]:
         """Go through it by some rows at a time, without those of no weight."""
         xp = namespace(self.states)
-        for rows in slices(self.states, FOREIGN_BLOCK_ROWS if is_foreign(self.states) else BLOCK_ROWS):
+        for rows in self._slices():
             columns = (None if one is None else one[rows] for one in self[2:])
             part = Batch(self.states[rows, :], self.actions[rows, :], *columns)  # type: ignore[arg-type]
             if part.weights is not None and not part.weights.all():
@@ -85,6 +84,21 @@ class Batch(NamedTuple):
             if part.states.shape[0]:
                 states, actions = (xp.asarray(table, dtype=xp.float64) for table in part[:2])
                 yield part._replace(states=states, actions=actions)
+
+    def tempered(self, longest: float) -> Batch:
+        """With less weight for actions longer than what is plausible; itself where there is none."""
+        if not np.isfinite(longest):
+            return self
+        xp = namespace(self.actions)
+        parts = (xp.asarray(self.actions[rows, :], dtype=xp.float64) for rows in self._slices())
+        factors = credibility(np.concatenate([lengths_in(longest, part) for part in parts]))
+        return self if (factors == 1.0).all() else self._replace(weights=self.counts * factors)
+
+    def without(self, rows: NDArray[np.intp]) -> Batch:
+        """With a weight of zero for some of the samples: the same as their not being there."""
+        counts = self.counts.copy()
+        counts[rows] = 0.0
+        return self._replace(weights=counts)
 
     def followed_by(self, other: Batch) -> Batch:
         """Both in one; groups and times only where both have them."""
@@ -94,6 +108,9 @@ class Batch(NamedTuple):
         for mine, theirs in zip(self[3:], other[3:], strict=True):
             columns.append(None if mine is None or theirs is None else np.concatenate([mine, theirs]))
         return Batch(*columns)
+
+    def _slices(self) -> Iterator[slice]:
+        return slices(self.states, FOREIGN_BLOCK_ROWS if is_foreign(self.states) else BLOCK_ROWS)
 
     @property
     def counts(self) -> Array:

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from ..base.arrays import Array, Groups, on_host
 from ..base.errors import InvalidDataError
 from .batches import Batch
+from .order import content, mixed
+from .suspects import lengths_in
 
 PLACING_SAMPLES = 20_000
 """Features and fields are placed on at most this many different states."""
@@ -34,10 +36,10 @@ class FirstLook:
 
     Parameters
     ----------
-    weight : float
-        ``Σ w``.
+    weight, heaviest : float
+        ``Σ w``, and the largest w.
     mean, scatter : ndarray, shape (n,)
-        Weighted mean of the states, and ``Σ w (x − mean)²``.
+        Weighted mean of the states, and ``Σ w (x − mean)² / Σ w``.
     size : ndarray, shape (n,)
         Largest absolute value of each state.
     actions : int
@@ -49,11 +51,14 @@ class FirstLook:
         So the choice depends neither on the order of the samples nor on how they come in batches.
     states : ndarray, shape (K, n)
         Those states.
+    lengths : ndarray, shape (K,)
+        Of the longest action in each of them.
     groups : dict, optional
-        Names of the demonstrations, in the order of first appearance.
+        The :func:`content` (n + 2,) of each demonstration by name, in the order of first appearance.
     """
 
     weight: float
+    heaviest: float
     mean: Array
     scatter: Array
     size: Array
@@ -61,7 +66,8 @@ class FirstLook:
     fastest: float
     keys: NDArray[np.uint64]
     states: Array
-    groups: dict[Hashable, None] | None
+    lengths: Array
+    groups: dict[Hashable, Array] | None
 
     @property
     def different(self) -> Array:
@@ -80,22 +86,25 @@ class FirstLook:
 
     @classmethod
     def _at_block(cls, block: Batch, largest_key: np.uint64) -> FirstLook:
-        states, actions, counts, groups = on_host(block.states), on_host(block.actions), block.counts, block.groups
+        states, actions, counts = on_host(block.states), on_host(block.actions), block.counts
         weight = float(counts.sum())
         columns, shares = np.ascontiguousarray(states.T), counts / weight  # sums along memory are fast
         mean = (shares * columns).sum(axis=1)
         keys = mixed((columns + 0.0).view(np.uint64), 0)
-        keys, first = _smallest(keys, largest_key)
+        every, (keys, first) = keys, _smallest(keys, largest_key)
+        fastest = float(np.abs(actions).max())
         return cls(
             weight,
+            float(counts.max()),
             mean,
-            weight * (shares * (columns - mean[:, None]) ** 2).sum(axis=1),
+            (shares * (columns - mean[:, None]) ** 2).sum(axis=1),
             np.abs(columns).max(axis=1),
             actions.shape[1],
-            float(np.abs(actions).max()),
+            fastest,
             keys,
             states[first],
-            None if groups is None else dict.fromkeys(in_order(groups)),
+            _largest_at(keys, every, fastest * lengths_in(fastest or 1.0, actions)),
+            None if block.groups is None else _contents(block.groups, states, actions, counts),
         )
 
     def __add__(self, other: FirstLook) -> FirstLook:
@@ -116,18 +125,21 @@ class FirstLook:
             raise InvalidDataError("groups: got them for some batches only, expected them for all or for none.")
         weight = self.weight + other.weight
         gap, share = other.mean - self.mean, other.weight / weight
-        keys, first = np.unique(np.concatenate([self.keys, other.keys]), return_index=True)
-        first = first[:PLACING_SAMPLES]
+        every = np.concatenate([self.keys, other.keys])
+        keys, first = np.unique(every, return_index=True)
+        keys, first = keys[:PLACING_SAMPLES], first[:PLACING_SAMPLES]
         return FirstLook(
             weight,
+            max(self.heaviest, other.heaviest),
             self.mean + share * gap,
-            self.scatter + other.scatter + self.weight * share * gap**2,
+            self.scatter + share * (other.scatter - self.scatter) + share * (self.weight / weight) * gap**2,
             np.maximum(self.size, other.size),
             self.actions,
             max(self.fastest, other.fastest),
-            keys[:PLACING_SAMPLES],
+            keys,
             np.concatenate([self.states, other.states])[first],
-            None if self.groups is None else self.groups | (other.groups or {}),
+            _largest_at(keys, every, np.concatenate([self.lengths, other.lengths])),
+            None if self.groups is None else _added(self.groups, other.groups or {}),
         )
 
     @staticmethod
@@ -153,7 +165,7 @@ def is_typical(seen: Batch, newest: int) -> bool:
     whole, half = FirstLook.at(seen), FirstLook.at(seen.at(np.arange(count // 2)))
     if whole is None or half is None or len(whole.keys) < enough:
         return False
-    return bool((whole.scatter / whole.weight <= _WIDENED**2 * half.scatter / half.weight).all())
+    return bool((whole.scatter <= _WIDENED**2 * half.scatter).all())
 
 
 def _different(seen: Batch, start: int, stop: int) -> int:
@@ -186,20 +198,27 @@ def _smallest(keys: NDArray[np.uint64], largest: np.uint64) -> tuple[NDArray[np.
     return different[:PLACING_SAMPLES], places[first[:PLACING_SAMPLES]]
 
 
+def _contents(groups: Groups, states: Array, actions: Array, counts: Array) -> dict[Hashable, Array]:
+    """Content of each demonstration, in the order of first appearance."""
+    names, first, places = np.unique(np.asarray(groups), return_index=True, return_inverse=True)
+    sums, order = content(places, states, actions, counts), np.argsort(first)
+    return dict(zip(names[order].tolist(), sums[order], strict=True))
+
+
+def _added(mine: dict[Hashable, Array], theirs: dict[Hashable, Array]) -> dict[Hashable, Array]:
+    return mine | {name: mine[name] + sums if name in mine else sums for name, sums in theirs.items()}
+
+
+def _largest_at(keys: NDArray[np.uint64], every: NDArray[np.uint64], values: Array) -> Array:
+    """Largest of the values (N,) that have each of some keys (K,), ascending; ``every`` (N,) are the values' own."""
+    low = np.flatnonzero(every <= keys[-1])
+    largest = np.zeros(len(keys))
+    np.maximum.at(largest, np.searchsorted(keys, every[low]), values[low])
+    return largest
+
+
 def in_order(names: Groups) -> list[Hashable]:
     """Different names in the order of first appearance."""
     different, first = np.unique(np.asarray(names), return_index=True)
     ordered: list[Hashable] = different[np.argsort(first)].tolist()
     return ordered
-
-
-def mixed(columns: NDArray[np.uint64], seed: int) -> NDArray[np.uint64]:
-    """A hash for each row of a table, given by columns (k, N): SplitMix64's finaliser, shape (N,)."""
-    hashes = np.full(columns.shape[1], seed % 2**32 + 1, dtype=np.uint64)
-    with np.errstate(over="ignore"):
-        for column in columns:
-            hashes = (hashes ^ column) * np.uint64(0x9E3779B97F4A7C15)
-            hashes = (hashes ^ (hashes >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-            hashes = (hashes ^ (hashes >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-            hashes ^= hashes >> np.uint64(31)
-    return hashes

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ..base.arrays import Array, Groups, check_at_least
 from ..base.errors import SettingError
 from ..base.parameters import Parameters
-from .first_look import FirstLook, in_order, mixed
+from .first_look import FirstLook, in_order
+from .order import by_content, mixed
 
 Unit = Literal["auto", "demonstration", "sample"]
 
@@ -105,10 +106,12 @@ Validation = Folds | HeldOut
 class Split:
     """Which fold each sample is in, decided as samples arrive, so that one pass over any stream is enough.
 
-    A demonstration's fold depends on the order in which demonstrations are
-    first seen. A sample's fold is a hash of its state, to a thousandth of the
-    spread at first look: it depends neither on order nor on units, equal
-    samples stay together, and so a weight of two is the same as a repetition.
+    Demonstrations seen at first look are dealt in turn, in an order drawn by
+    hashes of their mean states: their fold depends neither on the order of arrival nor on
+    their names. What comes later in a stream is dealt as it arrives. A
+    sample's fold is a hash of its state, to a thousandth of the spread at
+    first look: it depends neither on order nor on units, equal samples stay
+    together, and so a weight of two is the same as a repetition.
 
     Parameters
     ----------
@@ -142,11 +145,15 @@ class Split:
         several = look.groups is not None and (more or len(look.groups) > 1)
         automatic: Literal["demonstration", "sample"] = "demonstration" if several else "sample"
         by = automatic if validation.by == "auto" else validation.by
-        spread = np.sqrt(look.scatter / look.weight)
+        spread = np.sqrt(look.scatter)
         # A coordinate that has not moved yet may do so later; its size is all that is known of it.
         scale = np.where(spread > 1e-9 * look.size, spread, np.where(look.size > 0, look.size, 1.0))
         split = cls(validation, by, look.mean, scale)
-        return split.dealing(look.groups or ()) if by == "demonstration" else split
+        if by == "sample" or not look.groups:
+            return split
+        names = list(look.groups)
+        order = by_content(np.stack(list(look.groups.values())), split.origin, split.scale)
+        return split.dealing(names[place] for place in order)
 
     def dealing(self, names: Iterable[Hashable]) -> Split:
         """With further demonstrations dealt, in their order; those that are known keep their fold."""

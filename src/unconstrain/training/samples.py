@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from ..base.arrays import Array
 from ..base.display import Shown, counted
 from ..risks import Moments, Quadratic, gather
+from .suspects import unlike_neighbours
 
-_OF_MODELS = ("centring", "roughness")
+_OF_ALL = ("centring", "roughness", "places", "notes")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -25,7 +26,7 @@ class Samples(Shown):
     features : ndarray, shape (N, p)
     actions : ndarray, shape (N, d)
     counts : ndarray, shape (N,)
-        Sample weights; two is the same as a repetition.
+        Sample weights, one on average over those of any weight; copies of a sample are one, with the sum of theirs.
     memberships : ndarray, shape (N, M)
         How much each sample counts in each model, without its sample weight.
     shares : ndarray, shape (N, M)
@@ -38,10 +39,12 @@ class Samples(Shown):
         T_m, with which model m is solved in features ``T_m φ``, for the sake of rounding.
     roughness : ndarray, shape (M, p, p)
         Measures how rough each model's policy is, over ``T_m φ``; zero where nothing is said of it.
-    places : ndarray of int, shape (N,)
-        Where each sample is among all that were given.
+    places : ndarray of int, one for each sample that was given
+        Where it is among these, or was before some were taken.
     times : ndarray, shape (N,), optional
         Seconds, where they were given.
+    notes : tuple of str
+        What had to be assumed of their order.
     """
 
     states: Array
@@ -56,6 +59,7 @@ class Samples(Shown):
     roughness: Array
     places: NDArray[np.intp]
     times: Array | None = None
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         """Number of samples N."""
@@ -63,7 +67,7 @@ class Samples(Shown):
 
     def __getitem__(self, rows: slice | NDArray[np.intp] | NDArray[np.bool_]) -> Samples:
         """Some of them."""
-        per_sample = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in _OF_MODELS}
+        per_sample = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in _OF_ALL}
         some: dict[str, Any] = {name: None if part is None else part[rows] for name, part in per_sample.items()}
         return replace(self, **some)
 
@@ -75,16 +79,20 @@ class Samples(Shown):
     @property
     def energy(self) -> float:
         """Mean of ‖u‖²."""
-        return float(self.counts @ (self.actions**2).sum(axis=1) / self.counts.sum())
+        return self.mean((self.actions**2).sum(axis=1))
+
+    def mean(self, values: Array) -> float:
+        """Mean of one value for each sample, (N,), weighted."""
+        return float(self.counts @ values / self.counts.sum())
 
     def predict(self, weights: Array) -> Array:
         """What models of these weights (M, d, p), over ``T_m φ``, predict, shape (N, d)."""
         plain = weights @ self.centring
-        if plain.shape[0] == 1:
+        models, d, p = plain.shape
+        if models == 1:
             return self.features @ plain[0].T
-        return np.asarray(
-            sum(share[:, None] * (self.features @ one.T) for share, one in zip(self.shares.T, plain, strict=True))
-        )
+        each = self.features @ plain.reshape(models * d, p).T
+        return np.einsum("nm,nmd->nd", self.shares, each.reshape(-1, models, d))
 
     def moments(self, actions: Array, weights: Array) -> Moments:
         """Moments of any actions (N, d) at these features, each sample weighted (N,)."""
@@ -95,12 +103,18 @@ class Samples(Shown):
         """``Σ w ‖v − π̃‖²`` for targets v (N, d), without the sums that it does not need."""
         counted = (self.counts * weights)[:, None] * self.memberships
         d, p = targets.shape[1], self.features.shape[1]
-        gram = gather(self.features, np.ones((len(self), 1)), counted).gram
-        cross = (counted.T @ (self.features[:, :, None] * targets[:, None, :]).reshape(len(self), -1)).reshape(-1, p, d)
+        gram = _sum_of_products(counted, self.features, self.features)
+        cross = _sum_of_products(counted, self.features, targets)
         gram = self.centring @ gram @ self.centring.swapaxes(1, 2)
         linear = (self.centring @ cross).reshape(len(gram), p * d)
         hessian = np.einsum("mij,kl->mikjl", gram, np.eye(d)).reshape(-1, p * d, p * d)
         return Quadratic(hessian, linear, counted.T @ (targets**2).sum(axis=1))
+
+    @property
+    def suspects(self) -> NDArray[np.intp]:
+        """Which of all that were given look wrong beside their neighbours in time, ascending; see :mod:`.suspects`."""
+        rows = np.flatnonzero(self.counts)
+        return np.flatnonzero(np.isin(self.places, rows[unlike_neighbours(self.actions[rows], self.groups[rows])]))
 
     @property
     def counted(self) -> Samples:
@@ -115,3 +129,11 @@ class Samples(Shown):
         sizes = self.states.shape[1], self.actions.shape[1], self.features.shape[1], self.memberships.shape[1]
         nouns = ("state", "action", "feature", "model")
         return counted(len(self), "sample"), *map(counted, sizes, nouns)
+
+
+def _sum_of_products(weights: Array, one: Array, other: Array) -> Array:
+    """``Σ_n w_nm a_n b_nᵀ`` of two tables (N, a) and (N, b), shape (M, a, b)."""
+    if weights.shape[1] == 1:
+        return ((one * weights).T @ other)[None]
+    products = one[:, :, None] * other[:, None, :]
+    return (weights.T @ products.reshape(len(one), -1)).reshape(-1, *products.shape[1:])

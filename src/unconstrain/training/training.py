@@ -5,22 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import partial, reduce
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array, beside, is_foreign, on_host
+from ..base.arrays import Array, beside, is_foreign, on_host, power_of_two
 from ..base.display import Shown, counted
 from ..base.errors import SettingError
 from ..base.threads import Workers, workers
 from ..models import Model
-from ..risks import FoldedMoments, Sums
+from ..risks import FoldedMoments, Moments, Sums
 from .batches import Batch
 from .first_look import FirstLook
 from .folds import Split
+from .order import arranged, distinct
 from .samples import Samples
+from .suspects import longest_plausible
 
 AT_REST = 1e-12
 """Actions shorter than this share of the largest at first look are rounding around rest."""
@@ -46,8 +49,18 @@ class Training(Shown):
     gathered : FoldedMoments
         Sums over the features φ(x), fold by fold.
     batches : tuple of Batch, optional
-        The samples, where they are kept.
+        The samples as they were given, where they are kept.
+    action_unit, weight_unit : float
+        Powers of two about the largest action and sample weight at first look. Sums and samples are in these units,
+        and so is ``at_rest``: squares of actions that are numbers at all are then numbers, too.
+    most : int, optional
+        Samples are kept up to so many, and none if there are more; None keeps all.
+    longest : float
+        Longest plausible action. Longer ones count less; see :mod:`.suspects`.
     """
+
+    MOST_KEPT: ClassVar[int] = 200_000
+    """Samples that are kept for a learner that can do without: of more, sums alone."""
 
     model: Model
     actions: int
@@ -55,12 +68,24 @@ class Training(Shown):
     at_rest: float
     gathered: FoldedMoments
     batches: tuple[Batch, ...] | None = None
+    action_unit: float = 1.0
+    weight_unit: float = 1.0
+    most: int | None = 0
+    longest: float = np.inf
 
     @classmethod
-    def begin(cls, look: FirstLook, model: Model, split: Split, *, keep: bool = False) -> Training:
-        """Nothing seen but a first look; with ``keep``, samples are kept from now on."""
+    def begin(
+        cls, look: FirstLook, model: Model, split: Split, most: int | None = 0, *, more: bool = False
+    ) -> Training:
+        """Nothing seen but a first look; up to ``most`` samples are kept from now on, all for None.
+
+        With ``more``, it is at the first of further batches, which may well be faster: no length is implausible.
+        """
         nothing = FoldedMoments((), split.validation.held_out)
-        return cls(model, look.actions, split, AT_REST * look.fastest, nothing, () if keep else None)
+        units = power_of_two(look.fastest), power_of_two(look.heaviest)
+        at_rest = AT_REST * (look.fastest / units[0])
+        longest = np.inf if more else longest_plausible(look.lengths)
+        return cls(model, look.actions, split, at_rest, nothing, None if most == 0 else (), *units, most, longest)
 
     def with_batches(self, batches: Iterable[Batch]) -> Training:
         """With further samples summed, in one pass.
@@ -70,43 +95,67 @@ class Training(Shown):
         SettingError
             If demonstrations are held out and a batch does not name them.
         """
-        split, kept = self.split, []
+        split, kept, room = self.split, list(self.batches or ()), self._room(self.batches)
         d, (models, p) = self.actions, self._sizes
         sums = [Sums(models, d, p, self.at_rest) for _ in range(split.validation.count)]
         for batch in batches:
-            if self.batches is not None:
+            batch = batch.tempered(self.longest)
+            room -= batch.states.shape[0]
+            if room >= 0:
                 batch = deepcopy(batch)  # the caller may use a buffer again
                 kept.append(batch)
             with workers() as threads:  # not around the batches: what makes them is the caller's
                 for block in batch.blocks():
                     split = split.seeing(block.groups)
-                    _add(block, self.model, split, sums, threads)
+                    _add(self._in_units(block), self.model, split, sums, threads)
         further = FoldedMoments(tuple(each.moments.on_host() for each in sums), self.gathered.held_out)
         return replace(
             self,
             split=split,
             gathered=self.gathered + further,
-            batches=None if self.batches is None else (*self.batches, *kept),
+            batches=tuple(kept) if room >= 0 else None,
         )
 
     def __add__(self, other: Training) -> Training:
         """Two parts of the same data, begun alike; this one's samples come first."""
-        both = self.batches is not None and other.batches is not None
         return replace(
             self,
             split=self.split.dealing(other.split.fold_of),
             gathered=self.gathered + other.gathered,
-            batches=(*self.batches, *other.batches) if both else None,  # type: ignore[misc]
+            batches=(*self.batches, *other.batches) if self._room(self.batches, other.batches) >= 0 else None,  # type: ignore[misc]
         )
+
+    def _room(self, *parts: Sequence[Batch] | None) -> float:
+        """How many more samples may be kept beside these; less than none where some were not kept."""
+        if any(part is None for part in parts):
+            return -np.inf
+        most = np.inf if self.most is None else self.most
+        return most - sum(batch.states.shape[0] for part in parts for batch in part or ())
 
     def of_folds(self, indices: Sequence[int]) -> Training:
         """What is in some of the folds, each held out in turn; without the samples."""
         parts = tuple(self.gathered.parts[i] for i in indices)
         return replace(self, gathered=FoldedMoments(parts, range(len(parts))), batches=None)
 
+    def without(self, rows: NDArray[np.intp]) -> Training:
+        """The same without some of the samples, which were kept: rows among all that were given."""
+        batches, start = [], 0
+        for batch in self.batches or ():
+            stop = start + batch.states.shape[0]
+            batches.append(batch.without(rows[(start <= rows) & (rows < stop)] - start))
+            start = stop
+        nothing = FoldedMoments((), self.gathered.held_out)
+        begun = replace(self, gathered=nothing, batches=(), longest=np.inf)  # they were tempered when kept
+        return replace(begun.with_batches(batches), longest=self.longest)
+
     def without_samples(self) -> Training:
         """The sums alone."""
         return replace(self, batches=None)
+
+    @property
+    def moments(self) -> Moments:
+        """Sums over the features φ(x) of all folds, in the units of what was given."""
+        return self.gathered.whole.in_units(self.action_unit, self.weight_unit)
 
     @property
     def folds(self) -> FoldedMoments:
@@ -117,65 +166,65 @@ class Training(Shown):
     @property
     def filled(self) -> FoldedMoments:
         """As ``folds``, of those that hold anything, with the weights that samples have in ``samples``."""
-        folds, factor = self.folds, _proportion(self._counts())
+        folds, (given, _, places) = self.folds, self._distinct()
+        factor = _proportion(_summed(given.counts, places))
         parts = tuple(factor * folds.parts[i] for i in folds.filled)
         return FoldedMoments(parts, range(len(parts)))
 
     @property
     def samples(self) -> Samples:
-        """All samples that were given, those of no weight too.
+        """All samples that were given, those of no weight too, each of several copies once; see :mod:`.order`.
 
-        Weights such as 1/N are no weak data: where they are below one on average, they are scaled up to it. Folds are
-        numbered as in ``filled``.
+        Folds are numbered as in ``filled``.
 
         Raises
         ------
         SettingError
             If they were not kept.
         """
-        blocks, counts = [_on_host(batch) for batch in self._kept()], self._counts()
-        states, actions = (np.concatenate([block[i] for block in blocks]) for i in (0, 1))
-        named = [block.groups for block in blocks]
-        groups = np.zeros(len(states)) if any(one is None for one in named) else np.concatenate(named)  # type: ignore[arg-type]
-        times = None if any(block.times is None for block in blocks) else np.concatenate([b.times for b in blocks])
-        order = np.argsort(groups, kind="stable")  # in the order of time, wherever demonstrations come interleaved
+        given, first, places = self._distinct()
+        counts, each = _summed(given.counts, places), given.at(first)
+        order, demonstrations, notes = arranged(each._replace(weights=counts))
+        place = np.empty_like(order)
+        place[order] = np.arange(len(order))
+        each, counts = each.at(order), counts[order]
         models, p = self._sizes
         centring, fields = self.model.centring, self.model.fields
-        every = Samples(
-            states,
-            self.model.design(states),
-            actions,
+        return Samples(
+            each.states,
+            self.model.design(each.states),
+            each.actions,
             _proportion(counts) * counts,
-            fields.weights(states),
-            fields.shares(states),
-            np.unique(groups, return_inverse=True)[1],
-            self._folds_of(blocks, counts),
+            fields.weights(each.states),
+            fields.shares(each.states),
+            demonstrations,
+            self._folds_of(each, counts),
             np.tile(np.eye(p), (models, 1, 1)) if centring is None else centring,
             self.model.roughness(models, p),
-            np.arange(len(states)),
-            times,
+            place[places],
+            each.times,
+            notes,
         )
-        return every[order]
 
-    def _kept(self) -> tuple[Batch, ...]:
+    def _distinct(self) -> tuple[Batch, NDArray[np.intp], NDArray[np.intp]]:
+        """All samples in one, the first of each kind of copies, and which kind each is of."""
         if self.batches is None:
             raise SettingError(
                 "learner: it needs the samples, and this policy has their sums alone: it was stored, or fitted by a "
                 "learner that needs no samples. Fit with this learner from the start."
             )
-        return self.batches
+        given = reduce(Batch.followed_by, map(_on_host, self.batches))
+        return self._in_units(given), *distinct(given)
 
-    def _counts(self) -> Array:
-        """Sample weights, ones where none were given, shape (N,)."""
-        return np.concatenate([batch.counts for batch in self._kept()])
+    def _in_units(self, batch: Batch) -> Batch:
+        return batch._replace(actions=batch.actions / self.action_unit, weights=batch.counts / self.weight_unit)
 
-    def _folds_of(self, blocks: Sequence[Batch], counts: Array) -> NDArray[np.intp]:
+    def _folds_of(self, samples: Batch, counts: Array) -> NDArray[np.intp]:
         """Fold of each sample, (N,), numbered among those that hold anything; others are with the first."""
         rows, found = np.flatnonzero(counts), np.zeros(len(counts), dtype=np.intp)
-        dealt = [self.split.assign(part.states, part.groups) for block in blocks for part in [_of_weight(block)]]
         filled, number = self.gathered.filled, np.zeros(self.split.validation.count, dtype=np.intp)
         number[filled] = np.arange(len(filled))  # what no field sees is in none of them either
-        found[rows] = number[np.concatenate(dealt)]
+        found[rows] = number[self.split.assign(samples.states[rows], samples.at(rows).groups)]
         return found
 
     @property
@@ -190,12 +239,13 @@ class Training(Shown):
         return counted(len(self.split.origin), "state"), counted(self.actions, "action"), folds, kept
 
 
+def _summed(counts: Array, places: NDArray[np.intp]) -> Array:
+    return np.bincount(places, counts).astype(np.float64, copy=False)
+
+
 def _proportion(counts: Array) -> float:
-    return max(1.0, np.count_nonzero(counts) / counts.sum())
-
-
-def _of_weight(batch: Batch) -> Batch:
-    return batch if batch.weights is None else batch.at(np.flatnonzero(batch.weights))
+    """What makes the mean weight one, over the samples of any: only ratios of weights count."""
+    return float(np.count_nonzero(counts) / counts.sum())
 
 
 def _on_host(batch: Batch) -> Batch:
