@@ -10,7 +10,7 @@ import hashlib
 import json
 import os
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -20,15 +20,26 @@ import numpy as np
 
 from .base import files
 from .base.errors import ModelFileError
-from .learners import Belief, Direct, Hybrid, Inconsistency, Likelihood, NoiseCorrected, Robust, Segments, Solution
-from .models import Affine, Everywhere, KMeansRBF, Model, NormalisedRBF, ReceptiveFields
+from .learners import (
+    Belief,
+    Direct,
+    Hybrid,
+    Inconsistency,
+    Judged,
+    Likelihood,
+    NoiseCorrected,
+    Robust,
+    Segments,
+    Solution,
+)
+from .models import Affine, Everywhere, KMeansRBF, Model, NormalisedRBF, Polynomial, ReceptiveFields
 from .policies import LocallyLinearPolicy, ParametricPolicy, Policy
 from .risks import FoldedMoments, Moments
 from .training import Folds, HeldOut, Split, Training
 
 __all__ = ["load", "load_notes", "register", "save"]
 
-VERSION = 2
+VERSION = 3
 """Of the file format. Older files stay readable; newer ones are refused."""
 
 _FORMAT = "unconstrain-policy"
@@ -37,8 +48,8 @@ _HEADER = "header"
 _KNOWN: dict[str, type] = {
     kind.__name__: kind
     for kind in (
-        *(Affine, Everywhere, KMeansRBF, Model, NormalisedRBF, ReceptiveFields),
-        *(Belief, Direct, Hybrid, Inconsistency, Likelihood, NoiseCorrected, Robust, Segments, Solution),
+        *(Affine, Everywhere, KMeansRBF, Model, NormalisedRBF, Polynomial, ReceptiveFields),
+        *(Belief, Direct, Hybrid, Inconsistency, Judged, Likelihood, NoiseCorrected, Robust, Segments, Solution),
         *(FoldedMoments, Folds, HeldOut, Moments, Split, Training),
         *(LocallyLinearPolicy, ParametricPolicy),
     )
@@ -100,7 +111,9 @@ def load(path: str | os.PathLike[str]) -> Policy:
     header, arrays = _read(path)
     try:
         content = header["content"]["policy"]
-        policy = _unpack(_from_version_1(content) if header["version"] == 1 else content, arrays)
+        for version, change in _CHANGES.items():
+            content = _changed(content, change) if header["version"] <= version else content
+        policy = _unpack(content, arrays)
     except ModelFileError as error:
         raise ModelFileError(f"{path}: {error}") from error
     # A file that was tampered with, digest included, can make any constructor fail, in any way.
@@ -129,15 +142,19 @@ def _without_samples(policy: Policy) -> Policy:
     return slim
 
 
-def _from_version_1(value: Any) -> Any:
-    """The content of a file of format version 1 as version 2 says the same."""
+def _changed(value: Any, change: Callable[[str, dict[str, Any]], dict[str, Any]]) -> Any:
+    """The content of a file with every class in it changed, the innermost first."""
     if isinstance(value, list):
-        return [_from_version_1(item) for item in value]
+        return [_changed(item, change) for item in value]
     if not isinstance(value, dict):
         return value
     if "class" not in value:
-        return {name: _from_version_1(item) for name, item in value.items()}
-    kind, parts = value["class"], {name: _from_version_1(part) for name, part in value["parts"].items()}
+        return {name: _changed(item, change) for name, item in value.items()}
+    return change(value["class"], {name: _changed(part, change) for name, part in value["parts"].items()})
+
+
+def _from_version_1(kind: str, parts: dict[str, Any]) -> dict[str, Any]:
+    """A class of format version 1 as version 2 says the same."""
     if kind == "Splitter":
         return {"class": "Split", "parts": {name.removeprefix("_"): part for name, part in parts.items()}}
     if kind == "RobustSolution":
@@ -158,7 +175,15 @@ def _from_version_1(value: Any) -> Any:
     return {"class": kind, "parts": parts}
 
 
-_BELIEF_1 = tuple(one.name for one in fields(Belief))
+def _from_version_2(kind: str, parts: dict[str, Any]) -> dict[str, Any]:
+    """A class of format version 2 in version 3, where candidates are judged by another rule."""
+    kept = {name: part for name, part in parts.items() if kind != "Belief" or name not in _RULE_2}
+    return {"class": kind, "parts": kept}
+
+
+_CHANGES = {1: _from_version_1, 2: _from_version_2}
+_RULE_2 = ("compared", "refuted", "candidates")
+_BELIEF_1 = ("noise", "misfit", "free_share", "free", "from_noise", "undetermined", "held_out_score", *_RULE_2)
 _EVERYWHERE = {"class": "Everywhere", "parts": {}}
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from math import exp
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..base.errors import InvalidDataError
@@ -24,8 +25,43 @@ SMALL = 0.1
 MISFIT = 1.5
 """Residuals above this many times the noise by differences in time are mostly misfit of the model."""
 
+LITTLE = 0.01
+"""Shares of samples below this are not worth a sentence."""
+
+ENOUGH = 3
+"""Demonstrations that have to show something for it to be sure."""
+
 FREE, CONSTRAINED = 0.5, 0.1
 """A demonstration looks free above the first, and constrained below the second mean probability of free samples."""
+
+
+MOST_NAMED = 8
+"""So many samples that look wrong are named."""
+
+
+class Place(NamedTuple):
+    """Where a sample is: its demonstration, its number in it, counted from one, and its time in seconds, if known."""
+
+    demonstration: str
+    sample: int
+    time: float | None
+
+    def __str__(self) -> str:
+        time = "" if self.time is None else f" ({self.time:.4g} s)"
+        return f"{self.demonstration} sample {self.sample}{time}"
+
+
+def places_of(rows: NDArray[np.intp], demonstrations: Iterable[tuple[str, Demonstration]]) -> list[Place]:
+    """Where some samples of named demonstrations, or blocks of them, laid end to end are, rows ascending."""
+    found: list[Place] = []
+    start, before = 0, Counter[str]()
+    for name, demo in demonstrations:
+        inside = rows[(start <= rows) & (rows < start + len(demo))] - start
+        times = [None] * len(inside) if demo.times is None else demo.times[inside].tolist()
+        samples = (before[name] + inside + 1).tolist()
+        found += [Place(name, *place) for place in zip(samples, times, strict=True)]
+        start, before[name] = start + len(demo), before[name] + len(demo)
+    return found
 
 
 @dataclass(frozen=True)
@@ -50,6 +86,8 @@ class Region:
         Unit vector of actions along which it is largest there.
     along : float
         Undetermined standard deviation along it, as a share of the typical action.
+    shown_by : tuple of str
+        Demonstrations that moved along it in this region, by more than the noise.
     """
 
     centre: tuple[float, ...]
@@ -60,6 +98,7 @@ class Region:
     demonstration: str
     direction: tuple[float, ...]
     along: float
+    shown_by: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -81,10 +120,8 @@ class Diagnosis:
     ----------
     method : str
         Which candidate :class:`~unconstrain.Robust` took.
-    compared : dict
-        Ratio of each candidate's held-out inconsistency to that of noise-corrected moments.
-    refuted : bool
-        Whether that ratio is above the cut-off for the most probable policy.
+    candidates : dict
+        Estimated squared error of each candidate, as a share of the mean squared action, by name.
     noise : float
         Standard deviation of the noise on each action coordinate, misfit of the model included; units of the action.
     noise_share : float
@@ -103,10 +140,15 @@ class Diagnosis:
         the typical action.
     free_share : float
         Estimated share of samples that nothing constrained.
+    undecided_share : float
+        Estimated share of samples that were free or always held in the same way: the data cannot tell.
     regions : tuple of Region
         All, by decreasing undetermined spread.
     movements : tuple of Movement
         Each demonstration.
+    suspects : tuple of Place
+        Samples that look wrong beside their neighbours in time, and were left out; none where the policy was fitted to
+        others.
     undetermined, from_noise : ndarray, shape (N,)
         Length of the standard deviations at each recorded state, as a share of the typical action.
     free : ndarray, shape (N,), optional
@@ -114,8 +156,7 @@ class Diagnosis:
     """
 
     method: str
-    compared: dict[str, float]
-    refuted: bool
+    candidates: dict[str, float]
     noise: float
     noise_share: float
     jitter: float
@@ -124,8 +165,10 @@ class Diagnosis:
     directions_determined: float
     states_determined: float
     free_share: float
+    undecided_share: float
     regions: tuple[Region, ...]
     movements: tuple[Movement, ...]
+    suspects: tuple[Place, ...]
     undetermined: Array
     from_noise: Array
     free: Array | None
@@ -135,7 +178,8 @@ class Diagnosis:
         plain = {one.name: getattr(self, one.name) for one in fields(self)}
         kept = {name: value for name, value in plain.items() if name not in ("undetermined", "from_noise", "free")}
         kept["jitter"] = self.jitter if np.isfinite(self.jitter) else None
-        return kept | {name: [vars(one) for one in plain[name]] for name in ("regions", "movements")}
+        named = {name: [vars(one) for one in plain[name]] for name in ("regions", "movements")}
+        return kept | named | {"suspects": [one._asdict() for one in self.suspects]}
 
 
 def diagnose(policy: Policy, demonstrations: Sequence[Demonstration]) -> Diagnosis:
@@ -166,8 +210,7 @@ def diagnose(policy: Policy, demonstrations: Sequence[Demonstration]) -> Diagnos
     free = solution.free if len(solution.free) == len(states) else None
     return Diagnosis(
         method=solution.method,
-        compared={name: exp(gap) for name, gap in belief.compared.items()},
-        refuted=belief.refuted,
+        candidates={name: one.risk for name, one in belief.candidates.items()},
         noise=solution.noise,
         noise_share=float(np.sqrt(d)) * solution.noise / typical,
         jitter=float(np.sqrt(robust.noise_by_differences(actions, groups))),
@@ -176,8 +219,10 @@ def diagnose(policy: Policy, demonstrations: Sequence[Demonstration]) -> Diagnos
         directions_determined=solution.determined_share,
         states_determined=float(known.mean()),
         free_share=solution.free_share,
+        undecided_share=belief.undecided_share,
         regions=_regions(policy, demos, undetermined, known, typical),
         movements=_movements(demos, undetermined, known, free),
+        suspects=() if free is None else tuple(places_of(belief.suspects, zip(_names(demos), demos, strict=True))),
         undetermined=undetermined,
         from_noise=from_noise,
         free=free,
@@ -204,7 +249,7 @@ def _typical(actions: Array, solution: Solution) -> float:
 def _regions(
     policy: Policy, demos: list[Demonstration], undetermined: Array, known: Array, typical: float
 ) -> tuple[Region, ...]:
-    states, _, groups = stack(demos)
+    states, actions, groups = stack(demos)
     fields = policy.fields_ if hasattr(policy, "fields_") else cover(states, choose_variance(states))
     nearest = fields.weights(states).argmax(axis=1)
     found = [
@@ -213,7 +258,7 @@ def _regions(
     found.sort(key=lambda one: -undetermined[one[1]].max())
     worst = [int(rows[undetermined[rows].argmax()]) for _, rows in found]
     directions, along = _least_determined(policy, states[worst])
-    names = _names(demos)
+    names, noise = _names(demos), policy.solution_.noise
     return tuple(
         Region(
             _numbers(centre),
@@ -224,9 +269,15 @@ def _regions(
             names[groups[row]],
             _numbers(direction),
             float(size) / typical,
+            tuple(names[one] for one in _moved(actions[rows] @ direction, groups[rows], max(noise, SMALL * typical))),
         )
         for (centre, rows), row, direction, size in zip(found, worst, directions, along, strict=True)
     )
+
+
+def _moved(speeds: Array, groups: NDArray[np.intp], least: float) -> list[int]:
+    """Demonstrations whose root-mean-square speed is above some speed."""
+    return [int(one) for one in np.unique(groups) if np.sqrt((speeds[groups == one] ** 2).mean()) > least]
 
 
 def _least_determined(policy: Policy, states: Array) -> tuple[Array, Array]:
@@ -273,11 +324,22 @@ def sentences(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -
     """
     return [
         _about_noise(found),
-        _about_method(found),
+        about_choice(found.method, found.candidates),
         _about_variability(found),
         *_about_regions(found, states, actions),
         _about_freedom(found),
+        *about_suspects(found.suspects),
     ]
+
+
+def about_suspects(places: Sequence[Place]) -> list[str]:
+    """Samples that look wrong, in a sentence, if there are any."""
+    if not places:
+        return []
+    number = "1 sample looks" if len(places) == 1 else f"{len(places)} samples look"
+    more = ", ..." if len(places) > MOST_NAMED else ""
+    named = ", ".join(map(str, places[:MOST_NAMED]))
+    return [f"{number} wrong beside the neighbours in time, and counted nothing: {named}{more}."]
 
 
 def _about_noise(found: Diagnosis) -> str:
@@ -296,22 +358,37 @@ def _about_noise(found: Diagnosis) -> str:
     )
 
 
-def _about_method(found: Diagnosis) -> str:
-    """The candidate that was taken, and the reason; see :class:`~unconstrain.Robust`."""
-    if "likelihood" not in found.compared or len(found.compared) < 2:
-        return f"Policy: learnt as {found.method}; nothing was compared with it."
-    other = found.compared["likelihood"]
-    times = f"its held-out inconsistency is {other:.2f} times that of noise-corrected moments"
-    if found.method == "likelihood":
-        return f"Policy: the most probable one if constraints vary at random: {times}, which does not refute it."
-    corrected = found.method == "noise-corrected"
-    kind = "from noise-corrected moments" if corrected else "softened, since its residuals are not noise"
-    why = "or nearly all samples are in its uniform component"
-    if found.noise_share > robust.SPHERE_HIDDEN_BY_NOISE:
-        why = "and so much noise hides which samples are free"
-    elif found.refuted:
-        why = "so constraints do not seem to vary at random"
-    return f"Policy: the consistent one, {kind}. The most probable one was not taken: {times}, {why}."
+_WAYS = {
+    "direct": "ordinary regression, as constraints do not show",
+    "softened hybrid": "consistent with the actions, and near to them",
+    "noise-corrected": "consistent with the actions, with the noise taken out",
+    "segments": "with one constraint for each demonstration",
+    "likelihood": "samples look free, or constrained at random",
+    "hybrid": "consistent with the actions, and as near to them as that allows",
+}
+"""What is told of each way of learning; the softness of softened hybrids follows after a comma."""
+
+
+def about_choice(method: str, candidates: Mapping[str, float]) -> str:
+    """Which candidate was taken and how much worse the others are, in two sentences; see :class:`~unconstrain.Robust`.
+
+    Parameters
+    ----------
+    method : str
+        Name of the candidate that was taken.
+    candidates : mapping
+        Estimated squared error of each, by name.
+    """
+    way, _, softness = method.partition(", ")
+    said = f"Learnt as {way}{f' (softness {softness})' * bool(softness)}: {_WAYS.get(way, 'as asked for')}."
+    if len(candidates) < 2:
+        return f"{said} Nothing was compared with it."
+    least = {}
+    for name, risk in sorted(candidates.items(), key=lambda one: -one[1]):
+        least[name.partition(", ")[0]] = risk
+    own = max(candidates[method], 1e-300)
+    others = [f"{risk / own:.3g} times for {name}" for name, risk in reversed(least.items()) if name != way]
+    return f"{said} Estimated squared error, against this: {', '.join(others)}."
 
 
 def _about_variability(found: Diagnosis) -> str:
@@ -319,9 +396,12 @@ def _about_variability(found: Diagnosis) -> str:
     verdict = "rich enough" if share > 0.95 else "rich enough in most places" if share > 0.7 else "not rich enough"
     if found.noise_share > robust.SPHERE_HIDDEN_BY_NOISE:
         verdict = "unknown under so much noise"
+    open_, few = round(found.directions * (1.0 - found.directions_determined)), len(found.movements) < ENOUGH
+    verdict = "unknown from fewer than three demonstrations" if few else verdict
+    policy = "Supposing that they held nothing throughout, the policy" if few else "The policy"
     return (
-        f"Variability of the constraints: {verdict}. The data determines {found.directions_determined:.0%} of "
-        f"{found.directions} weight directions, and the policy at {share:.0%} of the recorded states."
+        f"Variability of the constraints: {verdict}. {policy} is determined at {share:.0%} of the recorded states; "
+        f"{open_} of its {found.directions} weights' directions are not shown by three demonstrations or more."
     )
 
 
@@ -335,18 +415,34 @@ def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[st
     if not open_:
         return [f"Every recorded state is determined. If you record more: {advice}"]
     where = f"{len(open_)} of {len(found.regions)} regions have states at which the policy is not determined."
-    return [where, f"What would help most: {advice}"]
+    return [f"{where} {_least_shown(worst, states, actions)}", f"What would help most: {advice}"]
+
+
+def _least_shown(region: Region, states: Sequence[str], actions: Sequence[str]) -> str:
+    """What was seen of the direction that is least determined in a region."""
+    where = f"along {named(region.direction, actions)} near {named(region.state, states)}"
+    if not region.shown_by:
+        return f"Nothing was ever seen {where}."
+    if len(region.shown_by) < ENOUGH:
+        only = " and ".join(f"'{one}'" for one in region.shown_by)
+        return f"Only {only} moved {where}: record two more there."
+    return f"What was seen {where} is too little, or does not agree."
 
 
 def _about_freedom(found: Diagnosis) -> str:
-    share = f"about {found.free_share:.0%} of the samples"
+    said = f"Free: about {found.free_share:.0%} of the samples"
+    if found.undecided_share >= LITTLE:
+        said += (
+            f"; {found.undecided_share:.0%} were free or always held in the same way, which looks alike. "
+            "Demonstrations held in another way would tell"
+        )
     if found.free is None:
-        return f"Free: {share} that the policy was fitted to."
+        return f"{said}. That is of the samples that the policy was fitted to."
     means = np.array([one.free for one in found.movements], dtype=np.float64)
     free, held = int((means > FREE).sum()), int((means < CONSTRAINED).sum())
     between = len(means) - free - held
-    return f"Free: {share}. Of {len(means)} demonstrations, {free} look free and {held} constrained" + (
-        f"; {between} are uncertain." if between else "."
+    return f"{said}. Of {len(means)} demonstrations, {free} look free and {held} constrained" + (
+        f"; of {between} that is not certain." if between else "."
     )
 
 

@@ -7,13 +7,14 @@ from .inconsistency import Inconsistency
 from .learner import Learner
 from .named import named
 from .robust import Likelihood, NoiseCorrected, Robust, Segments
-from .solution import Belief, Solution, Uncertainty
+from .solution import Belief, Judged, Solution, Uncertainty
 
 __all__ = [
     "Belief",
     "Direct",
     "Hybrid",
     "Inconsistency",
+    "Judged",
     "Learner",
     "Likelihood",
     "NoiseCorrected",

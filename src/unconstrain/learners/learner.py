@@ -17,7 +17,10 @@ class Learner(Parameters, ABC):
     """
 
     needs_samples: ClassVar[bool] = False
-    """Whether ``learn`` uses ``training.samples``, which are then kept, or the moments in ``training.folds`` only."""
+    """Whether ``learn`` cannot do without ``training.samples``, which are then kept, however many they are."""
+
+    uses_samples: ClassVar[bool] = False
+    """Whether ``learn`` uses ``training.samples`` where they are kept, and can do with the moments elsewhere."""
 
     @abstractmethod
     def learn(self, training: Training) -> Solution:
@@ -35,8 +38,8 @@ class Learner(Parameters, ABC):
         """
 
     def solve(self, training: Training) -> Solution:
-        """The solution with weights over the features φ(x)."""
-        return self.learn(training).over(training.model)
+        """The solution with weights over the features φ(x), in the units of what was given."""
+        return self.learn(training).over(training.model).in_units(training.action_unit, training.weight_unit)
 
     def held_out_score(self, training: Training) -> float:
         """Cross-validated share of the squared motion explained: one minus the inconsistency over the energy.

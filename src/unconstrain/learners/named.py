@@ -16,7 +16,7 @@ BY_NAME: dict[str, type[Learner]] = {
 
 
 def named(learner: Learner | str | None) -> Learner:
-    """The learner itself, or by name with its default settings; :class:`~unconstrain.Hybrid` for None.
+    """The learner itself, or by name with its default settings; :class:`~unconstrain.Robust` for None.
 
     Raises
     ------
@@ -24,7 +24,7 @@ def named(learner: Learner | str | None) -> Learner:
         If it is neither.
     """
     if learner is None:
-        return Hybrid()
+        return Robust()
     if isinstance(learner, str) and learner in BY_NAME:
         return BY_NAME[learner]()
     if not isinstance(learner, Learner):

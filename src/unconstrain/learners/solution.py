@@ -31,6 +31,36 @@ class Uncertainty(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class Judged(Shown):
+    """Estimated error of a candidate, without the truth; see :mod:`unconstrain.learners.robust.choice`.
+
+    All are shares of the mean squared action.
+
+    Parameters
+    ----------
+    loss : float
+        Mean squared residual along the held-out actions, without the noise's part.
+    variance : float
+        Variance across the action.
+    bias : float
+        Squared bias across the action.
+    risk : float
+        Sum of the three, up to the least loss of all candidates.
+    weights : ndarray, shape (M, d, p)
+        What was learnt.
+    """
+
+    loss: float
+    variance: float
+    bias: float
+    risk: float
+    weights: Array
+
+    def _summary(self) -> tuple[str, ...]:
+        return tuple(f"{name}={getattr(self, name):.3g}" for name in ("risk", "loss", "variance", "bias"))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Belief(Shown):
     """Estimates beside the weights, of a learner that uses the samples.
 
@@ -40,22 +70,23 @@ class Belief(Shown):
         Standard deviation of the noise on each action coordinate, misfit of the model included.
     misfit : float
         Standard deviation of the model's misfit per action coordinate: the part of the residuals that is smooth in
-        time, and 1.5 % of the actions' root-mean-square length as a floor.
+        time, and 0.5 % of the actions' root-mean-square length as a floor.
     free_share : float
         Estimated share of samples that nothing constrained.
     free : ndarray, shape (N,)
-        Probability that each sample was free, in the order in which they were given.
+        Probability that each sample was free, in the order in which they were given; at most a half where it may as
+        well have been held in a way that no other demonstration shows.
     from_noise, undetermined : ndarray, shape (M, d p, d p)
         Posterior covariance of the weights over ``T_m φ``, due to noise and to directions that the data does not
         determine.
     held_out_score : float
         Share of the squared motion that is explained where held out, as by ``Policy.score``.
-    compared : dict
-        Logarithm of each candidate's held-out inconsistency over that of noise-corrected moments.
-    refuted : bool
-        Whether that ratio is above the cut-off for the most probable policy.
     candidates : dict
-        Weights (M, d, p) of each candidate, by name.
+        Judged error of each candidate, by name, where the learner chose among several.
+    undecided_share : float
+        Estimated share of samples that were free, or held in a way that no other demonstration shows.
+    suspects : ndarray of int, shape (K,)
+        Samples that look wrong and were left out, by their places among those given.
     """
 
     noise: float
@@ -65,9 +96,9 @@ class Belief(Shown):
     from_noise: Array
     undetermined: Array
     held_out_score: float = float("nan")
-    compared: dict[str, float] = field(default_factory=dict)
-    refuted: bool = False
-    candidates: dict[str, Array] = field(default_factory=dict)
+    candidates: dict[str, Judged] = field(default_factory=dict)
+    undecided_share: float = 0.0
+    suspects: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
 
     def uncertainty(self, model: Model, states: Array) -> Uncertainty:
         """Posterior standard deviations of the prediction at N states.
@@ -80,6 +111,17 @@ class Belief(Shown):
         undetermined = spread.of(self.undetermined)
         return Uncertainty(from_noise, undetermined, np.hypot(from_noise, undetermined))
 
+    def in_units(self, action: float) -> Belief:
+        """With actions measured in a unit ``1 / action`` as large."""
+        return replace(
+            self,
+            noise=action * self.noise,
+            misfit=action * self.misfit,
+            from_noise=action * (action * self.from_noise),
+            undetermined=action * (action * self.undetermined),
+            candidates={name: replace(one, weights=action * one.weights) for name, one in self.candidates.items()},
+        )
+
     def covariances(self, model: Model, states: Array) -> Array:
         """Covariance of the prediction at N states in what the data does not determine, shape (N, d, d).
 
@@ -91,7 +133,8 @@ class Belief(Shown):
     def _summary(self) -> tuple[str, ...]:
         noise = f"noise={self.noise:.3g}", f"misfit={self.misfit:.3g}"
         free = f"{self.free_share:.0%} of {counted(len(self.free), 'sample')} free"
-        return *noise, free, *(("likelihood refuted",) if self.refuted else ())
+        unknown = (f"{self.undecided_share:.0%} free or always held alike",) if self.undecided_share >= 0.01 else ()
+        return *noise, free, *unknown
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -119,6 +162,8 @@ class Solution(Shown):
         Name of the learner, or of the candidate that was taken.
     belief : Belief, optional
         Of learners that use the samples.
+    notes : tuple of str
+        What had to be assumed, and what could not be tried, sentence by sentence.
     """
 
     weights: Array
@@ -129,6 +174,7 @@ class Solution(Shown):
     scores: Array | None = None
     method: str = ""
     belief: Belief | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def determined_share(self) -> float:
@@ -147,7 +193,7 @@ class Solution(Shown):
         if self.belief is None:
             raise MissingBeliefError(
                 f"belief: got a solution of {self.method or 'a learner'} from moments alone, which estimates none. "
-                "Fit with learner=Robust()."
+                "Fit with learner=Robust(), where it can see the samples."
             )
         return self.belief
 
@@ -167,8 +213,8 @@ class Solution(Shown):
         return self.believed.free_share
 
     @property
-    def candidates(self) -> dict[str, Array]:
-        """Weights (M, d, p) of each candidate, by name."""
+    def candidates(self) -> dict[str, Judged]:
+        """Judged error of each candidate, by name."""
         return self.believed.candidates
 
     def over(self, model: Model) -> Solution:
@@ -177,9 +223,22 @@ class Solution(Shown):
         if centring is None:
             return self
         belief = self.belief and replace(
-            self.belief, candidates={name: one @ centring for name, one in self.belief.candidates.items()}
+            self.belief,
+            candidates={
+                name: replace(one, weights=one.weights @ centring) for name, one in self.belief.candidates.items()
+            },
         )
         return replace(self, weights=self.weights @ centring, belief=belief)
+
+    def in_units(self, action: float, weight: float) -> Solution:
+        """With actions and sample weights measured in units ``1 / action`` and ``1 / weight`` as large."""
+        return replace(
+            self,
+            weights=action * self.weights,
+            eigenvalues=None if self.eigenvalues is None else weight * self.eigenvalues,
+            scores=None if self.scores is None else action * (action * self.scores),
+            belief=self.belief and self.belief.in_units(action),
+        )
 
     def _summary(self) -> tuple[str, ...]:
         directions = counted(self.directions * len(self.determined), "direction")

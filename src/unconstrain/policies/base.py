@@ -1,7 +1,7 @@
 """What both policies share: learning from samples as they come, predicting, leaving for a robot."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import copy, deepcopy
 from functools import partial
 from itertools import chain
@@ -18,7 +18,7 @@ from ..base.errors import InvalidDataError, SettingError
 from ..base.estimators import checked_states
 from ..base.parameters import Parameters
 from ..deployment import Deployable
-from ..learners import Belief, Learner, Solution, Uncertainty, named
+from ..learners import Belief, Learner, Robust, Solution, Uncertainty, named
 from ..models import FeatureMap, Model
 from ..recordings import Demonstration, stack, times_of
 from ..risks import Moments, unit_actions
@@ -48,6 +48,10 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
     @abstractmethod
     def place(self, look: FirstLook) -> Model:
         """Fix features and fields on what was seen at first look."""
+
+    def places(self, look: FirstLook) -> Mapping[str, Model]:
+        """Models to choose from, by name; the only one by default."""
+        return {"": self.place(look)}
 
     # Learning: each works on a draft, which takes this policy's place when all has gone well.
 
@@ -79,7 +83,8 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
     def _fit(self, learner: Learner, *batch: Any) -> Self:
         draft = self._draft(*_FITTED)
         checked = draft._checked(*batch, reset=True)
-        return self._become(draft._began(FirstLook.at(checked), learner, more=False)._learnt([checked], learner))
+        began = draft._began(FirstLook.at(checked), learner, more=False, seen=[checked])
+        return self._become(began._learnt([checked], learner))
 
     def partial_fit(
         self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, groups: Groups | None = None
@@ -100,7 +105,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         if not first and waiting is None:
             return self._become(draft._learnt([batch], learner))
         seen = batch if waiting is None else waiting.followed_by(batch)
-        draft._began(FirstLook.at(seen), learner, more=True)._learnt([seen], learner)
+        draft._began(FirstLook.at(seen), learner, more=True, seen=[seen])._learnt([seen], learner)
         enough = is_typical(seen, newest=batch.states.shape[0])
         draft._waiting = None if enough else deepcopy(seen)  # who gave it may use its memory again
         return self._become(draft)
@@ -123,7 +128,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         """
         learner = self._check_speed_power(getattr(batches, "speed_power", 0.0))
         if iter(batches) is not batches:
-            return self._fit_parts([batches], lambda function, parts: function(*parts), learner)
+            return self._fit_parts([batches], lambda function, parts: function(*parts), learner, together=True)
         draft = self._draft(*_FITTED)
         checked = draft._each_checked(batches)
         seen: Batch | None = None
@@ -133,7 +138,8 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
                 break
             seen = deepcopy(seen)  # before the next batch, which may come in the same memory
         look, first = (None, ()) if seen is None else (FirstLook.at(seen), (seen,))
-        return self._become(draft._began(look, learner, more=True)._learnt(chain(first, checked), learner))
+        began = draft._began(look, learner, more=True, seen=first)
+        return self._become(began._learnt(chain(first, checked), learner))
 
     def fit_parts(self, parts: Sequence[Any], summed: Callable[..., Any]) -> Self:
         """Learn from parts wherever they are; see :mod:`unconstrain.cluster`.
@@ -146,13 +152,14 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         cluster.check_learner(learner)
         if not parts:
             raise InvalidDataError("got no part to learn from, expected at least one.")
-        return self._fit_parts(parts, summed, learner)
+        return self._fit_parts(parts, summed, learner, together=False)
 
-    def _fit_parts(self, parts: Sequence[Any], summed: Callable[..., Any], learner: Learner) -> Self:
+    def _fit_parts(self, parts: Sequence[Any], summed: Callable[..., Any], learner: Learner, *, together: bool) -> Self:
         draft = self._draft(*_FITTED)
         seen = summed(partial(_seen, draft), parts)
         draft.__dict__.update(seen.noted)
-        draft._began(seen.look, learner, more=False)
+        again = copy(draft)._each_checked(parts[0], reset=False) if together else None
+        draft._began(seen.look, learner, more=False, together=together, seen=again)
         draft.training_ = summed(partial(_gathered, draft), parts)
         return self._become(draft._solved(learner))
 
@@ -167,7 +174,8 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         speed_power : float
             Samples count by this power of their speed. 0 is the paper; 2
             helps on noisy recordings, since the direction of a slow movement
-            is mostly noise.
+            is mostly noise. Learners that look at samples weigh speed
+            themselves: with this, the default is :class:`~unconstrain.Hybrid`.
         """
         demos = [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
         states, actions, groups = stack(demos)
@@ -298,7 +306,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
     def moments_(self) -> Moments:
         """Moments of all samples so far, over the features as they are summed."""
         check_is_fitted(self, "solution_")
-        return self.training_.gathered.whole
+        return self.training_.moments
 
     # Inside.
 
@@ -313,12 +321,23 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         self.__dict__ = draft.__dict__  # at once: another thread sees the old policy or the new one
         return self
 
-    def _began(self, look: FirstLook | None, learner: Learner, *, more: bool) -> Self:
-        """Choose all that has to be chosen before the first sample is summed."""
+    def _began(
+        self,
+        look: FirstLook | None,
+        learner: Learner,
+        *,
+        more: bool,
+        together: bool = True,
+        seen: Iterable[Batch] | None = None,
+    ) -> Self:
+        """Choose all that has to be chosen before the first sample is summed, in one place or in several."""
         if look is None:
-            raise InvalidDataError("got no sample that counts, expected at least one.")
+            raise InvalidDataError("got no sample that counts: there is none, or all weights are zero.")
         split = Split.begin(self.validation if self.validation is not None else Folds(), look, more)
-        self.training_ = Training.begin(look, self.place(look), split, keep=learner.needs_samples)
+        keep = None if learner.needs_samples else Training.MOST_KEPT if learner.uses_samples and together else 0
+        places = self.places(look).items()
+        begun = {name: Training.begin(look, one, split, keep, more=more) for name, one in places}
+        self.training_ = begun[next(iter(begun)) if len(begun) == 1 else Robust().suited(begun, seen)]
         return self
 
     def _learnt(self, batches: Iterable[Batch], learner: Learner) -> Self:
@@ -330,10 +349,13 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         return self
 
     def _check_speed_power(self, speed_power: float) -> Learner:
-        learner = named(self.learner)
         check_at_least("speed_power", speed_power, 0.0)
-        if speed_power and learner.needs_samples:
-            raise SettingError("speed_power: learners that look at the samples weigh speed themselves, expected 0.")
+        learner = named("hybrid" if self.learner is None and speed_power else self.learner)
+        if speed_power and (learner.needs_samples or learner.uses_samples):
+            raise SettingError(
+                "speed_power: learners that look at the samples weigh speed themselves, expected 0; or take "
+                "learner=Hybrid()."
+            )
         return learner
 
     def _each_checked(self, batches: Iterable[Sequence[Any]], *, reset: bool = True) -> Iterator[Batch]:

@@ -2,12 +2,10 @@
 
 from typing import cast
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import as_matrix
 from ..learners import Learner
-from ..models import Affine, Model, ReceptiveFields, choose_variance, cover
+from ..models import Model, ReceptiveFields
 from ..training import FirstLook, Validation
 from .base import Policy
 
@@ -28,7 +26,7 @@ class LocallyLinearPolicy(Policy):
     centres : array_like, shape (M, n), optional
         Use these instead.
     learner : Learner or str, optional
-        Or its name: "robust", "hybrid", "inconsistency", "direct"; :class:`~unconstrain.Hybrid` by default.
+        Or its name: "robust", "hybrid", "inconsistency", "direct"; :class:`~unconstrain.Robust` by default.
     validation : Folds or HeldOut, optional
         What the learner chooses its thresholds on; ten folds by default.
 
@@ -57,13 +55,7 @@ class LocallyLinearPolicy(Policy):
 
     def place(self, look: FirstLook) -> Model:
         """Lay fields over the states seen at first look; regressors share one origin."""
-        states = look.different
-        variance = self.variance if self.variance is not None else choose_variance(states, self.at_least)
-        if self.centres is None:
-            fields = cover(states, variance, self.at_least)
-        else:
-            fields = ReceptiveFields(as_matrix(self.centres, "centres"), variance)
-        return Model(Affine(fields.centres.mean(axis=0), np.sqrt(variance)), fields)
+        return Model.local(look.different, self.variance, self.at_least, self.centres)
 
     @property
     def fields_(self) -> ReceptiveFields:

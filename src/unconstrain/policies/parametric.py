@@ -1,5 +1,8 @@
 """Policies on fixed features (section III-C)."""
 
+from collections.abc import Mapping
+from typing import Literal
+
 from ..base.errors import SettingError
 from ..learners import Learner
 from ..models import Everywhere, FeatureMap, KMeansRBF, Model, Placeable
@@ -12,12 +15,14 @@ class ParametricPolicy(Policy):
 
     Parameters
     ----------
-    features : callable, optional
+    features : callable or "auto", optional
         A feature map, such as :class:`~unconstrain.NormalisedRBF` or
-        :class:`~unconstrain.Affine`, or anything that maps (N, n) to (N, p).
-        By default 25 normalised RBFs placed on the data.
+        :class:`~unconstrain.Polynomial`, or anything that maps (N, n) to (N, p).
+        By default 25 normalised RBFs placed on the data. "auto" chooses among
+        affine, quadratic and cubic features, these RBFs and local models by
+        estimated error (:mod:`unconstrain.learners.robust.choice`).
     learner : Learner or str, optional
-        Or its name: "robust", "hybrid", "inconsistency", "direct"; :class:`~unconstrain.Hybrid` by default.
+        Or its name: "robust", "hybrid", "inconsistency", "direct"; :class:`~unconstrain.Robust` by default.
     validation : Folds or HeldOut, optional
         What the learner chooses its threshold on; ten folds by default.
 
@@ -31,7 +36,7 @@ class ParametricPolicy(Policy):
 
     def __init__(
         self,
-        features: FeatureMap | Placeable | None = None,
+        features: FeatureMap | Placeable | Literal["auto"] | None = None,
         learner: Learner | str | None = None,
         validation: Validation | None = None,
     ) -> None:
@@ -43,5 +48,13 @@ class ParametricPolicy(Policy):
         """Lay the features over the states seen at first look."""
         features = self.features if self.features is not None else KMeansRBF()
         if not callable(features) and not isinstance(features, Placeable):
-            raise SettingError(f"features: got {features!r}, expected a function of states such as NormalisedRBF.")
+            raise SettingError(
+                f"features: got {features!r}, expected 'auto' or a function of states such as NormalisedRBF."
+            )
         return Model(features.place(look.different) if isinstance(features, Placeable) else features, Everywhere())
+
+    def places(self, look: FirstLook) -> Mapping[str, Model]:
+        """Models to choose from, by name."""
+        if not isinstance(self.features, str) or self.features != "auto":
+            return super().places(look)
+        return Model.to_choose_from(look.different, look.actions)

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ...base.arrays import Array
 from .posterior import Posterior
 from .smoothness import Smoothness
@@ -23,8 +25,11 @@ class Candidate:
         Residual variance per coordinate, of noise and misfit.
     smoothness : Smoothness
         Smoothness prior in ``posterior``.
-    most_consistent : ndarray, shape (N, d)
-        As ``held_out``, with the softness of the least held-out inconsistency.
+    refits : ndarray, shape (R, M, d, p)
+        Weights learnt without each of R folds: those that predict ``held_out``.
+    softness : float
+        Of a softened hybrid, infinite for direct regression; zero where no share of the standard risk biases the
+        policy towards the actions.
     """
 
     name: str
@@ -33,4 +38,11 @@ class Candidate:
     held_out: Array
     variance: float
     smoothness: Smoothness
-    most_consistent: Array
+    refits: Array
+    softness: float = 0.0
+
+
+def scaled(posterior: Posterior, variance: Array) -> Posterior:
+    """Divided by the residual variance, shape (M,)."""
+    by = 1.0 / np.maximum(variance, 1e-300)
+    return Posterior(by * posterior.evidence, by * posterior.prior)

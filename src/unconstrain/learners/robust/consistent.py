@@ -1,4 +1,4 @@
-"""Candidates that minimise the inconsistency: noise-corrected, softened, and by segments."""
+"""Candidates that minimise an error of consistency: noise-corrected, and by segments."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from ...base.arrays import Array
 from ...risks import (
     NOISE,
-    FoldedMoments,
     Moments,
     Quadratic,
     eigensystem,
@@ -25,9 +24,9 @@ from ...risks import (
     vec,
 )
 from ...training import Samples
-from ..hybrid import SOFTNESSES, chosen_softness
+from ..hybrid import SOFTNESSES
 from ..thresholds import judged, within_errors
-from .candidate import Candidate
+from .candidate import Candidate, scaled
 from .constants import (
     BALANCE_STEPS,
     EIGENVALUE_STANDARD_ERRORS,
@@ -36,7 +35,7 @@ from .constants import (
     SOFTNESS_RANGE,
     SOFTNESS_STANDARD_ERRORS,
 )
-from .noise import corrected, correlation_time, noise_by_differences
+from .noise import corrected, correlation_time, inefficiency, noise_by_differences
 from .posterior import Posterior, unit_information
 from .segments import constrained_error
 from .smoothness import Smoothness
@@ -60,25 +59,24 @@ def noise_corrected(samples: Samples, noise: float | None = None) -> Candidate:
         policy = samples.predict(whole.posterior(softness, smoothness.prior(unit)).weights(d))
         time = correlation_time(_residuals(samples, policy, used)[:, None], samples.groups)
         if noise is None:
-            variance = min(most, _mean(samples, distances(samples.actions, policy).radial ** 2))
+            variance = min(most, samples.mean(distances(samples.actions, policy).radial ** 2))
     smooth, proposed = smoothness.prior(unit), float(np.median(softness))
     softnesses = (proposed, *SOFTNESSES)
-    held_out, loss = parts.held_out(softnesses, smooth, used)
+    held_out, loss, refits = parts.held_out(softnesses, smooth, used)
     chosen = _nearest(loss, np.log(np.array(softnesses) / proposed))
-    best = int(loss.mean(axis=0).argmin())
     posterior = Posterior(whole.consistent, softnesses[chosen] * whole.risk + smooth)
     weights = posterior.weights(d)
     of_noise, residual = whole.noise(weights), whole.residual(weights)
-    inflated = time * of_noise + _inefficiency(time, samples) * (residual - of_noise)
+    inflated = time * of_noise + inefficiency(time, samples) * (residual - of_noise)
     smoothness = replace(smoothness, precision=smoothness.precision * unit / np.maximum(inflated, 1e-300))
     return Candidate(
         "noise-corrected",
         weights,
-        _scaled(posterior, inflated),
+        scaled(posterior, inflated),
         held_out[chosen],
         variance,
         smoothness,
-        held_out[best],
+        refits[chosen],
     )
 
 
@@ -97,43 +95,15 @@ def _nearest(loss: Array, distance: Array) -> int:
     return int(near[np.abs(distance[near]).argmin()])
 
 
-def softened(samples: Samples, folds: FoldedMoments) -> Candidate:
-    """:class:`~unconstrain.Hybrid` with ``alpha="auto"``."""
-    whole, d = folds.whole, samples.actions.shape[1]
-    softness = chosen_softness(folds)
-
-    def posterior(moments: Moments) -> Posterior:
-        return Posterior(inconsistency(moments), softness * standard_risk(moments))
-
-    weights = posterior(whole).weights(d)
-    held_out = np.empty_like(samples.actions)
-    for fold, part in enumerate(folds.parts):
-        rest = total([one for one in folds.parts if one is not part])
-        rows = samples.folds == fold
-        held_out[rows] = samples[rows].predict(posterior(rest).weights(d))
-    radial = distances(samples.actions, samples.predict(weights)).radial
-    sizes = np.maximum(whole.weight, np.finfo(float).tiny)
-    residual = np.maximum(judged(inconsistency(whole), vec(weights)), 1e-12 * whole.energy) / sizes
-    inefficiency = _inefficiency(correlation_time(radial[:, None], samples.groups), samples)
-    return Candidate(
-        "hybrid",
-        weights,
-        _scaled(posterior(whole), inefficiency * residual),
-        held_out,
-        _mean(samples, radial**2),
-        Smoothness.of(samples),
-        held_out,
-    )
-
-
-def by_segments(samples: Samples, labels: NDArray[np.intp], noise: float) -> Candidate:
+def by_segments(samples: Samples, labels: NDArray[np.intp], noise: Array) -> Candidate:
     """Minimise the constrained error with each segment's projection, with a prior of standard risk.
 
     Predictions are cross-validated by fold, except for the projections: each is from all samples of its segment.
+    ``noise`` (N,) is the variance on each action coordinate, one number for each segment.
     """
     d, ones = samples.actions.shape[1], np.ones(len(samples))
     parts = [samples.folds == fold for fold in range(int(samples.folds.max()) + 1)]
-    errors = [constrained_error(samples[rows], labels[rows], noise) for rows in parts]
+    errors = [constrained_error(samples[rows], labels[rows], noise[rows]) for rows in parts]
     risks = [samples[rows].risk(samples.actions[rows], ones[rows]) for rows in parts]
     sizes = samples.sizes
     factor = unit_information(d * samples.features.shape[1], sizes)
@@ -149,10 +119,11 @@ def by_segments(samples: Samples, labels: NDArray[np.intp], noise: float) -> Can
         loss, taken = judged(whole.evidence, weights), judged(reduce(add, risks), weights)
         softness = np.clip(factor * loss / np.maximum(taken - loss, 1e-3 * taken + 1e-300), *SOFTNESS_RANGE)
     found = posterior(everything, softness)
-    held_out = np.empty_like(samples.actions)
+    held_out, refits = np.empty_like(samples.actions), []
     for fold, rows in enumerate(parts):
         rest = [i for i in everything if i != fold] or everything
-        held_out[rows] = samples[rows].predict(posterior(rest, softness).weights(d))
+        refits.append(posterior(rest, softness).weights(d))
+        held_out[rows] = samples[rows].predict(refits[-1])
     best = found.weights(d)
     radial = distances(samples.actions, samples.predict(best)).radial
     residual = np.maximum(loss, 1e-12 * reduce(add, risks).constant) / np.maximum(sizes, 1e-300)
@@ -160,11 +131,11 @@ def by_segments(samples: Samples, labels: NDArray[np.intp], noise: float) -> Can
     return Candidate(
         "segments",
         best,
-        _scaled(found, time * residual),
+        scaled(found, time * residual),
         held_out,
-        _mean(samples, radial**2),
+        samples.mean(radial**2),
         Smoothness.of(samples),
-        held_out,
+        np.stack(refits),
     )
 
 
@@ -182,18 +153,19 @@ class _Folds:
         weighted, plain = (total(moments[fold] for fold in kept) for moments in (self._weighted, self._plain))
         return _Corrected(weighted, plain, variance, self._samples.sizes)
 
-    def held_out(self, softnesses: Sequence[float], smooth: Quadratic, variance: float) -> tuple[Array, Array]:
-        """Cross-validated predictions for each softness, (K, N, d), and mean square of ρ in each fold, (R, K)."""
+    def held_out(self, softnesses: Sequence[float], smooth: Quadratic, variance: float) -> tuple[Array, Array, Array]:
+        """For K softnesses, cross-validated predictions (K, N, d); by R folds, mean square of ρ (R, K), and weights."""
         predictions = np.empty((len(softnesses), *self._samples.actions.shape))
-        loss = np.empty((len(self._parts), len(softnesses)))
+        loss, refits = np.empty((len(self._parts), len(softnesses))), []
         for fold, part in enumerate(self._parts):
             rest = self.corrected(variance, without=fold)
             found = softened_minima(rest.consistent + smooth, rest.risk, softnesses)
+            refits.append(unvec(np.moveaxis(found, -1, 0), part.actions.shape[1]))
             for k in range(len(softnesses)):
-                predicted = part.predict(unvec(found[..., k], part.actions.shape[1]))
+                predicted = part.predict(refits[-1][k])
                 predictions[k, self._samples.folds == fold] = predicted
                 loss[fold, k] = part.counts @ _residuals(part, predicted, variance) ** 2 / part.counts.sum()
-        return predictions, loss
+        return predictions, loss, np.stack(refits, axis=1)
 
 
 class _Corrected:
@@ -266,22 +238,3 @@ def _truncated(objective: Quadratic, gram: Array, variance: float, sizes: Array)
         np.einsum("mij,mj->mi", vectors, linear),
         objective.constant,
     )
-
-
-def _inefficiency(time: float, samples: Samples) -> Array:
-    """Statistical inefficiency of the misfit, (M,): the number of samples over the effective number.
-
-    Misfit is a function of the state. It is taken to have as many degrees of freedom as the model has, P, and so at
-    most P independent values, however many samples there are.
-    """
-    return np.maximum(time, samples.sizes / (samples.actions.shape[1] * samples.features.shape[1]))
-
-
-def _scaled(posterior: Posterior, variance: Array) -> Posterior:
-    """Divided by the residual variance, shape (M,)."""
-    by = 1.0 / np.maximum(variance, 1e-300)
-    return Posterior(by * posterior.evidence, by * posterior.prior)
-
-
-def _mean(samples: Samples, values: Array) -> float:
-    return float(samples.counts @ values / samples.counts.sum())

@@ -1,6 +1,7 @@
 """Learners that use the samples themselves: they estimate the noise and need no α."""
 
 from abc import abstractmethod
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
@@ -8,28 +9,29 @@ import numpy as np
 
 from ...base.arrays import Array, check_at_least
 from ...base.errors import SettingError
-from ...risks import Quadratic, inconsistency, unit_actions, vec
-from ...training import Samples, Training
+from ...risks import inconsistency, unit_actions, vec
+from ...training import Batch, Samples, Training
 from ..direct import Direct
 from ..hybrid import Hybrid
 from ..learner import Learner
 from ..solution import Belief, Solution
 from ..thresholds import judged
+from .belief import solution, weak_prior
 from .candidate import Candidate
-from .consistent import by_segments, noise_corrected, softened
-from .constants import (
-    INCONSISTENCY_RATIO,
-    LEAST_INFORMATIVE,
-    LEAST_MISFIT,
-    NEARLY_EXACT,
-    NEGLIGIBLE_RESIDUAL,
-    NOISE_TO_CORRECT,
-    SPHERE_HIDDEN_BY_NOISE,
-)
-from .likelihood import free_probability, maximise, mixture_of
-from .noise import noise_by_differences
-from .posterior import Posterior, unit_information
+from .choice import Comparison
+from .consistent import by_segments, noise_corrected
+from .constants import BLOCKS_IN_A_FOLD, LEAST_INFORMATIVE, LEAST_MISFIT, SPHERE_HIDDEN_BY_NOISE
+from .likelihood import maximise
+from .noise import noise_by_differences, noise_of_each
+from .posterior import Posterior
 from .segments import found_segments
+from .softened import softened
+
+SUMS_ALONE = (
+    "Learnt from sums alone, as the softened hybrid, since samples were not kept: there were more than "
+    f"{Training.MOST_KEPT:,}, or they came over a cluster or from a file. Likelihood and noise correction were not "
+    "tried."
+)
 
 
 class SampleLearner(Learner):
@@ -40,11 +42,22 @@ class SampleLearner(Learner):
     def learn(self, training: Training) -> Solution:
         """Learn from the samples; as :class:`~unconstrain.Hybrid` with one action, no motion or a single fold."""
         everything = training.samples
-        samples = everything.counted
+        suspects = everything.suspects
+        if len(suspects):
+            training = training.without(suspects)
+            everything = training.samples
+        found = self._learnt(training, everything)
+        return replace(found, belief=replace(found.believed, suspects=suspects))
+
+    def _learnt(self, training: Training, everything: Samples) -> Solution:
+        samples = in_blocks(everything.counted)
         if _trivial(samples):
-            return _plain(training, samples, everything)
-        chosen, more = self.candidate(samples, training)
-        return _solution(chosen, samples, everything, **more)
+            found = _plain(training, samples, everything)
+        else:
+            chosen, more = self.candidate(samples, training)
+            more["held_out_score"] = _explained(samples, chosen.held_out)
+            found = solution(chosen, samples, everything, training.model, **more)
+        return replace(found, notes=everything.notes)
 
     @abstractmethod
     def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
@@ -62,11 +75,9 @@ class _Maximising(SampleLearner):
         check_at_least("steps", self.steps, 1, whole=True)
         check_at_least("most", self.most, 1, whole=True)
 
-    def _maximised(
-        self, samples: Samples, training: Training, corrected: Candidate, consistent: Candidate
-    ) -> tuple[Candidate, Array]:
-        """The most probable policy, from two starts: the consistent policy and direct regression."""
-        starts = [consistent.weights, Direct().learn(training).weights]
+    def _maximised(self, samples: Samples, training: Training, corrected: Candidate) -> tuple[Candidate, Array]:
+        """The most probable policy, from two starts: noise-corrected moments and direct regression."""
+        starts = [corrected.weights, Direct().learn(training).weights]
         return maximise(samples, starts, corrected.smoothness, self.steps, self.most)
 
 
@@ -89,8 +100,7 @@ class Likelihood(_Maximising):
 
     def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
         """The most probable policy."""
-        corrected, consistent = _consistent(samples, training)
-        return self._maximised(samples, training, corrected, consistent)[0], {}
+        return self._maximised(samples, training, noise_corrected(samples))[0], {}
 
 
 @dataclass(frozen=True)
@@ -144,28 +154,31 @@ class Segments(SampleLearner):
 
     def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
         """The policy of least constrained error."""
-        most = noise_by_differences(samples.actions, samples.groups)
-        noise = self.noise if self.noise is not None else float(np.sqrt(min(most, samples.energy)))
-        by_group = self.labels == "groups"
-        if by_group and samples.groups.max() == 0:
+        if self.labels == "groups" and samples.groups.max() == 0:
             raise SettingError("labels: 'groups' needs groups=, one name for each demonstration, at least two.")
-        labels = samples.groups if by_group else found_segments(samples.actions, samples.groups, noise)
-        return by_segments(samples, labels, noise), {}
+        most = _most_noise(samples)
+        known = float(np.sqrt(most)) if self.noise is None else self.noise
+        found = self.labels == "found"
+        labels = found_segments(samples.actions, samples.groups, known) if found else samples.groups
+        if self.noise is None:
+            return by_segments(samples, labels, noise_of_each(samples.actions, labels, most)), {}
+        return by_segments(samples, labels, np.full(len(samples), self.noise**2)), {}
 
 
 @dataclass(frozen=True)
 class Robust(_Maximising):
     """Learn under noise and any kind of constraints, without a setting to tune.
 
-    Learns two policies and takes one. The *consistent* policy is
-    :class:`NoiseCorrected` where the residuals are noise or small, and
-    :class:`~unconstrain.Hybrid` with ``alpha="auto"`` otherwise. The *most
-    probable* policy is that of :class:`Likelihood`. It is taken unless noise
-    hides the sphere, or nearly all samples are in the uniform component, or
-    its held-out inconsistency is too far above that of noise-corrected
-    moments: then the constraints do not vary at random, as it supposes.
+    Learns several policies and takes the one of least estimated error; see
+    :mod:`unconstrain.learners.robust.choice`. Candidates are direct
+    regression, softened hybrids (eqs 4 to 6), :class:`NoiseCorrected`,
+    :class:`Segments` by demonstration, and :class:`Likelihood` unless noise
+    hides the sphere or nearly all samples are in its uniform component.
 
-    Needs the samples, not only their moments, and keeps them.
+    Keeps the samples, up to 200,000 of them, and uses them. Where they are
+    more, on a cluster, or in a stored policy that learns on, the moments have
+    to do: it then is :class:`~unconstrain.Hybrid` with ``alpha="auto"``, and
+    ``solution_.notes`` says so.
 
     Parameters
     ----------
@@ -173,100 +186,91 @@ class Robust(_Maximising):
         See :class:`Likelihood`.
     """
 
+    needs_samples: ClassVar[bool] = False
+    uses_samples: ClassVar[bool] = True
+
+    def learn(self, training: Training) -> Solution:
+        """Learn from the samples where they were kept, and from the moments elsewhere."""
+        if training.batches is None:
+            return replace(Hybrid(alpha="auto").learn(training), notes=(SUMS_ALONE,))
+        return super().learn(training)
+
     def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
-        """The likelihood's or the consistent policy."""
-        corrected, consistent = _consistent(samples, training)
-        likely, mixture = self._maximised(samples, training, corrected, consistent)
-        learnt = {one.name: one for one in (corrected, consistent, likely)}
-        gaps = {
-            name: compared(samples, one.held_out, corrected.most_consistent, corrected.variance)
-            for name, one in learnt.items()
-        }
-        informed = 1.0 - float(mixture[-1])
-        gap, error = gaps[likely.name]
-        refuted = bool(gap > max(np.log(INCONSISTENCY_RATIO ** min(1.0, 2.0 * informed)), error))
-        hidden = _more_than(SPHERE_HIDDEN_BY_NOISE, likely.variance, samples)
-        usable = informed > LEAST_INFORMATIVE and not refuted and not hidden
-        return likely if usable else consistent, {
-            "compared": {name: gap for name, (gap, _) in gaps.items()},
-            "refuted": refuted,
-            "candidates": {name: one.weights for name, one in learnt.items()},
-        }
+        """The candidate of least estimated error."""
+        compared = self.compared(samples, training)
+        return compared.best, {"candidates": compared.judged()}
+
+    def compared(self, samples: Samples, training: Training) -> Comparison:
+        """All candidates."""
+        corrected, most = noise_corrected(samples), _most_noise(samples)
+        noise = noise_of_each(samples.actions, samples.groups, most)
+        learnt = [*softened(samples), corrected]
+        if samples.groups.max() > 0:
+            learnt.append(by_segments(samples, samples.groups, noise))
+        likely, mixture = self._maximised(samples, training, corrected)
+        if 1.0 - mixture[-1] > LEAST_INFORMATIVE and not _hidden(likely.variance, samples):
+            learnt.append(likely)
+        return Comparison(learnt, np.minimum(noise, min(most, corrected.variance)), samples)
+
+    def suited(self, begun: Mapping[str, Training], seen: Iterable[Batch] | None) -> str:
+        """The name of the model in which the policy of least estimated error is learnt.
+
+        Candidates are the best of each model, by the rule of :mod:`.choice`, which takes them for equally biased
+        before held-out data refutes any.
+
+        Parameters
+        ----------
+        begun : mapping
+            Training in each model, by name, with nothing seen.
+        seen : iterable of Batch, optional
+            What to learn from; the first 200,000 samples of it are looked at.
+
+        Raises
+        ------
+        SettingError
+            If nothing was seen.
+        """
+        if seen is None:
+            raise SettingError(
+                "features: 'auto' looks at the samples themselves, which stay where they are on a cluster. Fit a part "
+                "with fit(...) first, and take its features_."
+            )
+        first = list(_first(seen))
+        keeping = {name: replace(one, batches=(), most=None) for name, one in begun.items()}
+        trainings = {name: one.with_batches(first) for name, one in keeping.items()}
+        samples = {name: in_blocks(one.samples.counted) for name, one in trainings.items()}
+        any_ = next(iter(samples.values()))
+        if _trivial(any_):
+            return next(iter(samples))
+        best = {name: self.compared(samples[name], one).best for name, one in trainings.items()}
+        noise = noise_of_each(any_.actions, any_.groups, _most_noise(any_))
+        least = min(one.variance for one in best.values())
+        alike = [replace(one, name=name, softness=0.0) for name, one in best.items()]
+        return Comparison(alike, np.minimum(noise, least), list(samples.values())).best.name
 
 
-def _consistent(samples: Samples, training: Training) -> tuple[Candidate, Candidate]:
-    """The policy of noise-corrected moments, and the consistent policy: the same where residuals are noise or small.
-
-    Elsewhere, as where a demonstrator varies, it is a softened hybrid of the softness that held-out data allows.
-    """
-    corrected = noise_corrected(samples)
-    exact = 1.0 - _explained(samples, corrected.held_out) < NEARLY_EXACT
-    noisy = _more_than(NOISE_TO_CORRECT, corrected.variance, samples)
-    return corrected, corrected if noisy or exact else softened(samples, training.filled)
-
-
-def compared(samples: Samples, one: Array, other: Array, variance: float) -> tuple[float, float]:
-    """Logarithm of the inconsistency of ``one`` over that of ``other``: median over the folds, and standard error.
-
-    The inconsistency is the mean square of ρ (:mod:`unconstrain.learners.robust.noise`), whose variance does not
-    depend on the constraint.
-    """
-    actions, d = samples.actions, samples.actions.shape[1]
-    counts = np.bincount(samples.folds, samples.counts)
-
-    def loss(policy: Array) -> Array:
-        residual = (actions * (actions - policy)).sum(axis=1) - d * variance
-        return np.asarray(np.bincount(samples.folds, samples.counts * residual**2) / counts)
-
-    floor = (NEGLIGIBLE_RESIDUAL * samples.energy) ** 2
-    gap = np.log(loss(one) + floor) - np.log(loss(other) + floor)
-    return float(np.median(gap)), float(gap.std(ddof=1) / np.sqrt(len(gap)))
+def _first(batches: Iterable[Batch]) -> Iterator[Batch]:
+    """Batches up to the number of samples that may be kept."""
+    room = Training.MOST_KEPT
+    for batch in batches:
+        yield batch
+        room -= batch.states.shape[0]
+        if room <= 0:
+            return
 
 
-def _solution(chosen: Candidate, samples: Samples, everything: Samples, **more: Any) -> Solution:
-    variance, mixture = mixture_of(samples, samples.predict(chosen.weights))
-    free = free_probability(everything, everything.predict(chosen.weights), variance, mixture)
-    models, d, p = chosen.weights.shape
-    vague = _vague_posterior(samples, chosen.posterior.evidence)
-    from_noise, undetermined = vague.covariances()
-    return Solution(
-        chosen.weights,
-        vague.determined(),
-        d * p,
-        np.zeros(models),
-        method=chosen.name,
-        belief=Belief(
-            noise=float(np.sqrt(variance)),
-            misfit=float(np.sqrt(_misfit(samples, variance))),
-            free_share=float(everything.counts @ free / everything.counts.sum()),
-            free=free[np.argsort(everything.places)],
-            from_noise=from_noise,
-            undetermined=undetermined + _prior_sensitivity(chosen, vague),
-            held_out_score=_explained(samples, chosen.held_out),
-            **more,
-        ),
-    )
+def in_blocks(samples: Samples) -> Samples:
+    """With neighbours in the same fold where demonstrations are not told apart: they say nearly the same."""
+    if samples.groups.max() > 0:
+        return samples
+    count = min(int(samples.folds.max()) + 1, len(samples))
+    blocks = min(BLOCKS_IN_A_FOLD * count, len(samples))
+    return replace(samples, folds=np.arange(len(samples)) * blocks // len(samples) % count)
 
 
-def _vague_posterior(samples: Samples, evidence: Quadratic) -> Posterior:
-    """Posterior with a weak prior: unit information of p samples, their residuals as large as the actions."""
-    d, p = samples.actions.shape[1], samples.features.shape[1]
-    risk = samples.risk(samples.actions, np.full(len(samples), d / max(samples.energy, 1e-300)))
-    return Posterior(evidence, unit_information(p, samples.sizes) * risk)
-
-
-def _prior_sensitivity(chosen: Candidate, vague: Posterior) -> Array:
-    """Outer product of the change in the weights under the weak prior, (M, P, P), to be added to a covariance."""
-    prior = vague.prior + chosen.smoothness.prior()
-    apart = vec(chosen.weights) - vec(Posterior(vague.evidence, prior).weights(chosen.weights.shape[1]))
-    return np.asarray(apart[:, :, None] * apart[:, None, :])
-
-
-def _misfit(samples: Samples, variance: float) -> float:
-    """Variance of the misfit per coordinate: residual variance less that of the noise by differences in time."""
-    least = LEAST_MISFIT**2 * samples.energy
-    smooth = variance - max(noise_by_differences(samples.actions, samples.groups), least)
-    return least / samples.actions.shape[1] + max(smooth, 0.0)
+def _most_noise(samples: Samples) -> float:
+    """Variance of the noise by differences in time over all demonstrations, at most that of the actions."""
+    return min(noise_by_differences(samples.actions, samples.groups), samples.energy)
 
 
 def _explained(samples: Samples, policy: Array) -> float:
@@ -287,20 +291,20 @@ def _plain(training: Training, samples: Samples, everything: Samples) -> Solutio
     size, d = found.directions, samples.actions.shape[1]
     residual = judged(inconsistency(whole), vec(found.weights)) / np.maximum(samples.sizes - size, 1.0)
     evidence = (1.0 / np.maximum(residual, LEAST_MISFIT**2 * samples.energy + 1e-300)) * inconsistency(whole)
-    from_noise, undetermined = _vague_posterior(samples, evidence).covariances()
+    from_noise, undetermined = Posterior(evidence, weak_prior(samples)).covariances()
     return replace(
         found,
         belief=Belief(
             noise=float(np.sqrt(residual.mean())),
             misfit=LEAST_MISFIT * float(np.sqrt(samples.energy / d)),
             free_share=1.0,
-            free=np.ones(len(everything)),
+            free=np.ones(len(everything.places)),
             from_noise=from_noise,
             undetermined=undetermined,
         ),
     )
 
 
-def _more_than(share: float, variance: float, samples: Samples) -> bool:
-    """Whether noise of a variance per coordinate exceeds a share of the actions."""
-    return samples.actions.shape[1] * variance > share**2 * samples.energy
+def _hidden(variance: float, samples: Samples) -> bool:
+    """Whether noise of a variance per coordinate hides the sphere."""
+    return samples.actions.shape[1] * variance > SPHERE_HIDDEN_BY_NOISE**2 * samples.energy

@@ -1,8 +1,6 @@
 """Maximum a posteriori policy under the mixture model of :mod:`.sphere`, by expectation maximisation."""
 
 from collections.abc import Sequence
-from functools import reduce
-from operator import add
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +10,15 @@ from ...base.arrays import Array
 from ...risks import inconsistency
 from ...training import Samples
 from .candidate import Candidate
-from .constants import ANGULAR_SPREADS, EM_LEAST_STEPS, EM_TOLERANCE, LEAST_MISFIT, POOLED_PSEUDO_COUNT
+from .constants import (
+    ANGULAR_SPREADS,
+    EM_LEAST_STEPS,
+    EM_TOLERANCE,
+    LEAST_MISFIT,
+    POOLED_PSEUDO_COUNT,
+    RACE_STEPS,
+    REFIT_STEPS,
+)
 from .noise import correlation_time, noise_by_differences
 from .posterior import Posterior, unit_information
 from .smoothness import Smoothness
@@ -28,8 +34,8 @@ def maximise(
     ----------
     samples : Samples
     starts : sequence of ndarray, shape (M, d, p)
-        A later start's optimum replaces an earlier one's only if its log-likelihood is higher by more than one
-        standard error over the folds.
+        A later start goes on in place of an earlier one if after some steps its log-likelihood is higher by more than
+        one standard error over the folds.
     smoothness : Smoothness
         Initial smoothness prior.
     steps : int
@@ -44,20 +50,23 @@ def maximise(
         Mixing proportions: of each spread, and of the uniform component.
     """
     thinned, noise = samples[:: -(-len(samples) // most)], noise_by_differences(samples.actions, samples.groups)
-    optima = [_maximise_from(thinned, start, smoothness, steps, noise) for start in starts]
+    first = min(steps, RACE_STEPS)
+    optima = [_maximise_from(thinned, _start(thinned, start, smoothness), first, noise) for start in starts]
     best = optima[0]
     for optimum in optima[1:]:
         if exceeds_error(thinned, optimum.log_likelihood - best.log_likelihood):
             best = optimum
+    best = _maximise_from(thinned, best, steps - first, noise) if steps > first else best
     model = _GaussNewton(samples, samples.predict(best.weights), best.variance, best.mixture, best.smoothness)
-    parts = [model.posterior(samples.folds == fold) for fold in range(int(samples.folds.max()) + 1)]
-    d = samples.actions.shape[1]
-    whole = reduce(add, parts)
-    held_out = np.empty_like(samples.actions)
-    for fold in range(len(parts)):
-        rest = reduce(add, [part for i, part in enumerate(parts) if i != fold] or parts)
-        held_out[samples.folds == fold] = samples[samples.folds == fold].predict(rest.weights(d))
-    found = Candidate("likelihood", whole.weights(d), whole, held_out, best.variance, best.smoothness, held_out)
+    whole, held_out, refits = model.posterior(), np.empty_like(samples.actions), []
+    weights = whole.weights(samples.actions.shape[1])
+    for fold in range(int(samples.folds.max()) + 1):
+        rest = thinned[thinned.folds != fold]
+        refits.append(
+            _maximise_from(rest, best, REFIT_STEPS, noise).weights if len(rest) and rest.energy > 0.0 else weights
+        )
+        held_out[samples.folds == fold] = samples[samples.folds == fold].predict(refits[-1])
+    found = Candidate("likelihood", weights, whole, held_out, best.variance, best.smoothness, np.stack(refits))
     return found, best.mixture
 
 
@@ -119,10 +128,14 @@ class _Optimum(NamedTuple):
     log_likelihood: Array
 
 
-def _maximise_from(samples: Samples, weights: Array, smoothness: Smoothness, steps: int, noise: float) -> _Optimum:
+def _start(samples: Samples, weights: Array, smoothness: Smoothness) -> _Optimum:
+    return _Optimum(weights, *_initial(samples, samples.predict(weights)), smoothness, np.full(len(samples), -np.inf))
+
+
+def _maximise_from(samples: Samples, start: _Optimum, steps: int, noise: float) -> _Optimum:
     """Expectation maximisation from some weights; ``noise`` is the variance estimated by differences in time."""
+    weights, variance, mixture, smoothness, _ = start
     policy, last = samples.predict(weights), -np.inf
-    variance, mixture = _initial(samples, policy)
     for step in range(steps):
         model = _GaussNewton(samples, policy, variance, mixture, smoothness)
         residual, mixture = _m_step(samples, policy, model.place, model.found)

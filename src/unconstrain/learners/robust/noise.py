@@ -27,7 +27,8 @@ from scipy.stats import chi2
 
 from ...base.arrays import Array
 from ...risks import Moments, standard_risk
-from .constants import DIFFERENCE_ORDER, LEAST_AUTOCORRELATION, MOST_LAGS
+from ...training import Samples
+from .constants import DIFFERENCE_ORDER, LEAST_AUTOCORRELATION, LEAST_DIFFERENCES, MOST_LAGS
 
 
 def noise_by_differences(actions: Array, groups: NDArray[np.intp]) -> float:
@@ -59,6 +60,25 @@ def noise_by_differences(actions: Array, groups: NDArray[np.intp]) -> float:
     return float(np.median(lengths) / chi2.median(actions.shape[1]) / (weights**2).sum())
 
 
+def noise_of_each(actions: Array, labels: NDArray[np.intp], most: float) -> Array:
+    """Noise variance of each sample: that of its segment by differences in time, where it is long enough, (N,).
+
+    Parameters
+    ----------
+    actions : ndarray, shape (N, d)
+    labels : ndarray of int, shape (N,)
+        Demonstration or segment of each sample.
+    most : float
+        Variance of short segments.
+    """
+    found = np.full(len(actions), most)
+    for label in np.unique(labels):
+        rows = labels == label
+        if rows.sum() >= LEAST_DIFFERENCES:
+            found[rows] = noise_by_differences(actions[rows], labels[rows])
+    return found
+
+
 def correlation_time(residuals: Array, groups: NDArray[np.intp]) -> float:
     """Integrated autocorrelation time of residuals, ``1 + 2 Σ_k r_k``, in samples.
 
@@ -86,6 +106,15 @@ def correlation_time(residuals: Array, groups: NDArray[np.intp]) -> float:
             break
         time += 2.0 * correlation
     return time
+
+
+def inefficiency(time: float, samples: Samples) -> Array:
+    """Statistical inefficiency of the misfit, (M,): the number of samples over the effective number.
+
+    Misfit is a function of the state. It is taken to have as many degrees of freedom as the model has, P, and so at
+    most P independent values, however many samples there are.
+    """
+    return np.maximum(time, samples.sizes / (samples.actions.shape[1] * samples.features.shape[1]))
 
 
 def corrected(weighted: Moments, plain: Moments, variance: float) -> Moments:

@@ -51,13 +51,17 @@ class Posterior:
         Eigenvalues of B have a floor: features that no sample excites have no prior
         precision, and their weights must not count as known.
         """
-        values, axes = eigensystem(self.prior.hessian)
-        floored = np.maximum(values, LEAST_PRIOR_PRECISION * values.mean(axis=1, keepdims=True))
-        prior = (axes * floored[:, None, :]) @ axes.swapaxes(1, 2)
+        prior = self.floored_prior()
         eigenvalues, vectors = eigensystem(self.evidence.hessian + prior)
         lowest = np.maximum(1e-15 * eigenvalues[:, -1:], 1e-300)
         both = (vectors / np.maximum(eigenvalues, lowest)[:, None, :]) @ vectors.swapaxes(1, 2)
         return both @ self.evidence.hessian @ both, both @ prior @ both
+
+    def floored_prior(self) -> Array:
+        """Hessian of the prior with a floor under its eigenvalues, shape (M, P, P)."""
+        values, axes = eigensystem(self.prior.hessian)
+        floored = np.maximum(values, LEAST_PRIOR_PRECISION * values.mean(axis=1, keepdims=True))
+        return np.asarray((axes * floored[:, None, :]) @ axes.swapaxes(1, 2))
 
     def determined(self) -> NDArray[np.intp]:
         """Number of directions in which the evidence has more than half of the posterior precision, shape (M,)."""

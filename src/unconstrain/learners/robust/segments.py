@@ -91,14 +91,24 @@ def found_segments(actions: Array, groups: NDArray[np.intp], noise: float) -> ND
     return np.cumsum(starts) - 1
 
 
-def constrained_error(samples: Samples, labels: NDArray[np.intp], noise: float) -> Quadratic:
-    """``Σ w ‖N̂ u − N̂ π̃‖²`` with the projection N̂ estimated from each segment's actions."""
+def constrained_error(samples: Samples, labels: NDArray[np.intp], noise: Array) -> Quadratic:
+    """``Σ w ‖N̂ u − N̂ π̃‖²`` with the projection N̂ estimated from each segment's actions.
+
+    Parameters
+    ----------
+    samples : Samples
+    labels : ndarray of int, shape (N,)
+        Segment of each sample.
+    noise : ndarray, shape (N,)
+        Variance of the noise on each action coordinate, one number for each segment.
+    """
     d, p = samples.actions.shape[1], samples.features.shape[1]
     models = samples.memberships.shape[1]
     whole = Quadratic(np.zeros((models, p * d, p * d)), np.zeros((models, p * d)), np.zeros(models))
     for label in np.unique(labels):
-        segment = samples[labels == label]
-        projection = projection_of(segment.actions, noise)
+        rows = labels == label
+        segment = samples[rows]
+        projection = projection_of(segment.actions, float(np.sqrt(noise[rows][0])))
         risk = segment.risk(segment.actions @ projection, np.ones(len(segment)))
         blocks = risk.hessian.reshape(models, p, d, p, d)
         hessian = np.einsum("miajb,bc->miajc", blocks, projection).reshape(models, p * d, p * d)

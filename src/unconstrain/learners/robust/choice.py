@@ -1,0 +1,217 @@
+"""Choice of a candidate by an estimate of its error, without the truth.
+
+The squared error of a policy has a component along the action and components
+across it. Held-out actions show the former. Nothing shows the latter, but a
+candidate's own variance and bias across the action can be estimated:
+
+    risk_k = (loss_k − least loss) + variance_k + bias_k
+
+loss_k is the mean square of the residual ``r = ‖u‖ − ûᵀπ̃`` of held-out
+samples. variance_k is the jackknife's, from the policies learnt without each
+fold. bias_k compares the candidate with others of less bias, j, as Goldenshluger
+and Lepski do (*Annals of Statistics* 39(3), 2011):
+
+    bias_k = max_j (E ‖π̃_k − π̃_j‖² − variance of π̃_k − π̃_j)₊
+
+Softened hybrids (eq. 6 with ``E_i + s E_2``) have the less bias the smaller
+their softness s; s is infinite for direct regression, and zero for learners
+that minimise an error of consistency alone. A candidate j that is less
+consistent than k where held out, beyond chance, shows no bias of k; nor does
+one that is so by the residuals weighted by ‖u‖², as under noise alone.
+
+Residuals have the variance ``‖π‖² (σ² / ‖u‖² + κ²)`` under any constraint:
+noise of variance σ² turns the direction of a slow action, and people vary by
+a factor of standard deviation κ. Samples are weighted by its inverse up to
+‖π‖², so that the weight saturates at ``‖u‖ = σ / κ``, and by the inverse of
+``1 + h`` with the leverage h of a held-out state, which is the factor of its
+variance from estimating the weights: predictions far from all other
+demonstrations say little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import nnls
+
+from ...base.arrays import Array
+from ...risks import unit_actions
+from ...training import Samples
+from ..solution import Judged
+from .candidate import Candidate
+from .constants import (
+    COMPARED_STATES,
+    LEAST_DEMONSTRATIONS,
+    NEGLIGIBLE_LOSS,
+    REFUTED,
+    SHARE_OF_JACKKNIFE,
+    TIED,
+    VARIANCE_ROUNDS,
+)
+
+TINY = 1e-12
+"""Shares of the mean squared action below this are rounding."""
+
+
+class Comparison:
+    """Candidates that were learnt from the same samples, possibly in different features.
+
+    Parameters
+    ----------
+    candidates : sequence of K Candidate
+    noise : ndarray, shape (N,)
+        Variance σ² of the noise on each action coordinate of each sample.
+    samples : Samples or sequence of K Samples
+        Those of all candidates, or of each.
+    """
+
+    def __init__(self, candidates: Sequence[Candidate], noise: Array, samples: Samples | Sequence[Samples]) -> None:
+        self._candidates = candidates
+        self._views = [samples] * len(candidates) if isinstance(samples, Samples) else list(samples)
+        self._samples = samples = self._views[0]
+        self._directions, self._lengths = unit_actions(samples.actions)
+        self._held_out = np.stack([one.held_out for one in candidates])
+        self._residuals = self._lengths - (self._held_out * self._directions).sum(axis=2)
+        self._places = slice(None, None, -(-len(samples) // COMPARED_STATES))
+        self._leverage = np.max([leverage(one) for one in dict.fromkeys(self._views)], axis=0)
+        self._noise, self._variation = self._variances(noise)
+
+    def judged(self) -> dict[str, Judged]:
+        """Figures of each candidate, by name, as shares of the mean squared action."""
+        unit = max(self._samples.energy, 1e-300)
+        figures = np.column_stack([self._losses.sum(axis=1), self._variance, self._bias, self.risks]) / unit
+        return {
+            one.name: Judged(loss, variance, bias, risk, one.weights)
+            for one, (loss, variance, bias, risk) in zip(self._candidates, figures.tolist(), strict=True)
+        }
+
+    @property
+    def best(self) -> Candidate:
+        """The candidate of least risk; of softened hybrids, the softest that is as good within chance."""
+        best = int(self.risks.argmin())
+        if self._candidates[best].softness == 0.0:
+            return self._candidates[best]
+        near = [
+            k for k, risk in enumerate(self.risks) if risk <= self.risks[best] + TIED * _gap(self._losses, k, best)[1]
+        ]
+        return max((self._candidates[k] for k in near), key=lambda one: one.softness)
+
+    @cached_property
+    def risks(self) -> Array:
+        """Estimated squared error, shape (K,), up to what all have in common."""
+        loss = self._losses.sum(axis=1)
+        risk = loss - np.nanmin(loss) + self._variance + self._bias
+        found: Array = np.where(np.isfinite(risk), risk, np.inf)
+        return found
+
+    @cached_property
+    def _losses(self) -> Array:
+        """Weighted mean square of the held-out residuals, without the noise's part, by demonstration: (K, G)."""
+        squares = self._squares
+        weights = self._samples.counts / (1.0 + self._leverage) / (1.0 + self._noise / (self._variation * squares))
+        turned = self._noise * (self._held_out**2).sum(axis=2) / (squares + self._held_out.shape[2] * self._noise)
+        return self._by_demonstration(weights, self._residuals**2 - turned) / weights.sum()
+
+    @cached_property
+    def _losses_of_noise(self) -> Array:
+        """Share of the motion in the held-out residuals, both weighted by ‖u‖², by demonstration: (K, G)."""
+        squares = self._lengths**2
+        weights = self._samples.counts * squares
+        return self._by_demonstration(weights, self._residuals**2) / (weights @ squares)
+
+    def _by_demonstration(self, weights: Array, values: Array) -> Array:
+        """Weighted sums of values (K, N) over each demonstration, or each fold where there are few, (K, G)."""
+        samples = self._samples
+        few = len(np.unique(samples.groups)) < LEAST_DEMONSTRATIONS
+        return np.stack([np.bincount(samples.folds if few else samples.groups, weights * each) for each in values])
+
+    @property
+    def _squares(self) -> Array:
+        """Squared lengths of the actions (N,), of those at rest about that of rounding."""
+        return np.maximum(self._lengths**2, TINY * self._samples.energy)
+
+    def _variances(self, noise: Array) -> tuple[Array, float]:
+        """σ² of each sample and κ², by iteratively reweighted least squares on the squared residuals.
+
+        They are of the candidate with the least residuals weighted by ‖u‖². The noise given is an upper bound, since
+        constraints that change look like noise.
+        """
+        squares, counts, unit = self._squares, self._samples.counts, self._samples.energy
+        best = int((self._residuals**2 @ (counts * squares)).argmin())
+        size = np.maximum((self._held_out[best] ** 2).sum(axis=1), squares) / unit
+        design, found = np.column_stack([size * noise / squares, size]), self._residuals[best] ** 2 / unit
+        scale, least = np.full(len(found), max(float(np.median(found)), TINY)), 1e-6 * size + TINY
+        for _ in range(VARIANCE_ROUNDS):
+            weights = np.sqrt(counts / (1.0 + found / (4.0 * scale))) / scale
+            (share, variation), _ = nnls(design * weights[:, None], found * weights)
+            share = min(share, 1.0)
+            scale = np.maximum(design @ [share, variation], least)
+        return share * noise, max(float(variation), 1e-8)
+
+    @cached_property
+    def _variance(self) -> Array:
+        """Jackknife variance across the action, shape (K,)."""
+        return np.array([self._jackknife(refits - own) for own, refits in zip(*self._predictions, strict=True)])
+
+    @cached_property
+    def _bias(self) -> Array:
+        """The largest squared distance to a candidate of less bias that its variance does not explain, shape (K,)."""
+        own, refits = self._predictions
+        centred = refits - refits.mean(axis=1, keepdims=True)
+        bias = np.zeros(len(own))
+        for k, one in enumerate(self._candidates):
+            for j, other in enumerate(self._candidates):
+                if j != k and (other.softness < one.softness or other.softness == 0.0) and not self._refuted(j, k):
+                    variance = SHARE_OF_JACKKNIFE * self._jackknife(centred[k] - centred[j])
+                    bias[k] = max(bias[k], self._across(own[k] - own[j]) - variance)
+        return bias
+
+    def _refuted(self, one: int, other: int) -> bool:
+        """Whether the first is less consistent than the second where held out, by some standard errors.
+
+        With the weights of the loss, or with ‖u‖², which noise calls for and people who vary do not. Differences that
+        are less than any model's misfit say nothing.
+        """
+        gaps = (_gap(losses, one, other) for losses in (self._losses / self._samples.energy, self._losses_of_noise))
+        return any(gap > max(REFUTED * error, NEGLIGIBLE_LOSS) for gap, error in gaps)
+
+    @cached_property
+    def _predictions(self) -> tuple[Array, Array]:
+        """Of each candidate (K, n, d) and of its refits (K, R, n, d), at some of the states."""
+        views = {view: view[self._places] for view in dict.fromkeys(self._views)}
+        pairs = [(one, views[view]) for one, view in zip(self._candidates, self._views, strict=True)]
+        own = np.stack([some.predict(one.weights) for one, some in pairs])
+        refits = np.stack([[some.predict(weights) for weights in one.refits] for one, some in pairs])
+        return own, refits
+
+    def _jackknife(self, deviations: Array) -> float:
+        """``(R − 1) / R`` times the sum of the squared deviations (R, n, d) of the refits."""
+        count = len(deviations)
+        return (count - 1) / count * sum(self._across(each) for each in deviations)
+
+    def _across(self, difference: Array) -> float:
+        """Weighted mean square across the action of a difference of predictions (n, d)."""
+        directions, weights = self._directions[self._places], 1.0 / (1.0 + self._leverage[self._places])
+        squares = (difference**2).sum(axis=1) - (difference * directions).sum(axis=1) ** 2
+        return float(weights @ squares / weights.sum())
+
+
+def leverage(samples: Samples) -> Array:
+    """Leverage ``φᵀ (Σ w φ φᵀ)⁻¹ φ`` of each sample among the other folds' samples, averaged over the models, (N,)."""
+    parts = np.stack([part.moments(part.actions[:, :1], np.ones(len(part))).gram for part in samples.by_fold()])
+    whole, found = parts.sum(axis=0), np.zeros(len(samples))
+    ridge = 1e-6 * np.trace(whole, axis1=1, axis2=2)[:, None, None] / whole.shape[1] * np.eye(whole.shape[1])
+    inverses = np.linalg.pinv(whole - parts + ridge, hermitian=True)
+    for fold, inverse in enumerate(samples.centring.mT @ inverses @ samples.centring):
+        rows = samples.folds == fold
+        own = np.tensordot(samples.features[rows], inverse, axes=(1, 1))
+        found[rows] = np.einsum("nm,nmp,np->n", samples.shares[rows], own, samples.features[rows], optimize=True)
+    return np.clip(found, 0.0, 1e6)
+
+
+def _gap(losses: Array, one: int, other: int) -> tuple[float, float]:
+    """Difference of two candidates' losses (K, G), and its standard error, paired by demonstration."""
+    gap = losses[one] - losses[other]
+    return float(gap.sum()), float(gap.std(ddof=1) * np.sqrt(len(gap)))

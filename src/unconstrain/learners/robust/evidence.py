@@ -1,0 +1,180 @@
+"""What the actions show of the policy, whatever the constraints and the prior; the basis of what counts as determined.
+
+An action shows the policy along itself only. Noise adds a component along directions in which nobody ever moved; its
+expectation is subtracted. A direction that a learner may call determined must be shown by more than two
+demonstrations: constraints that one or two met, or that all had in common, may have hidden anything there.
+
+That samples look free is evidence too, but free and always held in the same way look alike. It counts along those
+directions of action space only in which there was motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.arrays import Array
+from ...risks import Quadratic, inconsistency
+from ...training import Samples
+from .constants import EIGENVALUE_STANDARD_ERRORS, LEAST_MISFIT, LEFT_OUT, MOST_PARTS
+from .noise import corrected, correlation_time, noise_by_differences
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Information on the weights in units of its variance, by parts of the data, for each of M models.
+
+    Parameters
+    ----------
+    consistent : list of Quadratic
+        −2 times the log-likelihood of the part's actions along themselves, less what noise adds to it.
+    free : ndarray, shape (K, M, P, P)
+        Information of its samples as far as they look free.
+    seen : ndarray, shape (M, d, d)
+        Projection onto the directions of action space in which there was motion.
+    error : ndarray, shape (M,)
+        Standard error of the noise that was subtracted, as a share of ``Σ w φφᵀ ⊗ I``.
+    """
+
+    consistent: list[Quadratic]
+    free: Array
+    seen: Array
+    error: Array
+
+    @property
+    def hessians(self) -> Array:
+        """Both kinds of information, shape (K, M, P, P)."""
+        return np.stack([one.hessian for one in self.consistent]) + self.free
+
+    def gradients(self, weights: Array) -> Array:
+        """Half the slope of each part's log-likelihood at some weights (M, P), shape (K, M, P)."""
+        return np.stack([one.linear - np.einsum("mij,mj->mi", one.hessian, weights) for one in self.consistent])
+
+
+def shown(samples: Samples, policy: Array, variance: float, free: Array) -> Evidence:
+    """The evidence of all samples.
+
+    Parameters
+    ----------
+    samples : Samples
+    policy : ndarray, shape (N, d)
+        Predictions, from which the residuals' variance is taken.
+    variance : float
+        Of the residuals per action coordinate.
+    free : ndarray, shape (N,)
+        Probability that each sample was free.
+    """
+    noise = _noise(samples, variance)
+    time = _time(samples, policy, noise)
+    unit, parts = _residual(samples, policy, noise, time), parts_of(samples)
+    seen = _seen(samples, parts, noise, time)
+    consistent, as_free, free = [], [], _of_free_demonstrations(samples, free)
+    for part in range(int(parts.max()) + 1):
+        rows = parts == part
+        some = samples[rows]
+        ones = np.ones(len(some))
+        weighted, plain = (some.moments(some.actions, by) for by in ((some.actions**2).sum(axis=1), ones))
+        consistent.append((1.0 / unit) * inconsistency(corrected(weighted, plain, noise)))
+        as_free.append(_as_free(some, free[rows] / (max(variance, noise) * time), noise, seen))
+    error = EIGENVALUE_STANDARD_ERRORS * noise * np.sqrt(2.0 * time / np.maximum(samples.sizes, 1.0)) / unit
+    return Evidence(consistent, np.stack(as_free), seen, error)
+
+
+def _as_free(samples: Samples, precision: Array, noise: float, seen: Array) -> Array:
+    """Information ``Σ w φφᵀ ⊗ Q`` of free samples, (M, P, P), where Q is ``seen``.
+
+    Of demonstrations only that moved along all of Q: one that did not looks the same if it was held.
+    """
+    d, p = samples.actions.shape[1], samples.features.shape[1]
+    whole, rank = 0.0, np.einsum("maa->m", seen)
+
+    def spans(moved: Array) -> Array:
+        return np.asarray(np.einsum("mab,ab->m", seen, moved) > rank - 0.5, dtype=np.float64)
+
+    for group in np.unique(samples.groups):
+        rows = samples.groups == group
+        moved = _moved(samples.actions[rows], samples.counts[rows], noise)
+        gram = samples[rows].moments(np.ones((rows.sum(), 1)), precision[rows]).gram
+        whole = whole + np.einsum("m,mij,mkl->mikjl", spans(moved), gram, seen)
+    return np.asarray(whole).reshape(-1, p * d, p * d)
+
+
+def _moved(actions: Array, counts: Array, noise: float) -> Array:
+    """Projection onto the directions in which there was motion beyond the noise, (d, d)."""
+    values, axes = np.linalg.eigh((actions.T * counts) @ actions / counts.sum())
+    basis = axes[:, values > noise * (1.0 + EIGENVALUE_STANDARD_ERRORS * np.sqrt(2.0 / counts.sum()))]
+    return np.asarray(basis @ basis.T)
+
+
+def _of_free_demonstrations(samples: Samples, free: Array) -> Array:
+    """The probability of being free, and zero where most of a demonstration was not: there it may be chance."""
+    of_group, counts = (np.bincount(samples.groups, samples.counts * one) for one in (free, np.ones(len(free))))
+    return np.asarray(free * (of_group > 0.5 * counts)[samples.groups])
+
+
+def parts_of(samples: Samples) -> NDArray[np.intp]:
+    """What is left out together, (N,): demonstrations, or the folds where these are many or there is only one."""
+    few = 1 <= samples.groups.max() < MOST_PARTS or samples.folds.max() < LEFT_OUT
+    return samples.groups if few else samples.folds
+
+
+def surely(parts: Array, least: float) -> Array:
+    """Orthonormal basis, (P, S), of what K symmetric matrices (K, P, P) exceed in sum, whichever two are left out.
+
+    Successively without every two: eigenvectors whose eigenvalues are then up to ``least`` are given up.
+    """
+    whole, basis = parts.sum(axis=0), np.eye(parts.shape[1])
+    for left_out in combinations(range(len(parts)), min(LEFT_OUT, len(parts))):
+        rest = basis.T @ (whole - sum(parts[part] for part in left_out)) @ basis
+        if not _exceeds(rest, least):
+            values, axes = np.linalg.eigh(rest)
+            basis = basis @ axes[:, values > least]
+    return basis
+
+
+def _exceeds(matrix: Array, least: float) -> bool:
+    """Whether all eigenvalues are above some number."""
+    try:
+        np.linalg.cholesky(matrix - least * np.eye(len(matrix)))
+    except np.linalg.LinAlgError:
+        return False
+    return True
+
+
+def _seen(samples: Samples, parts: NDArray[np.intp], noise: float, time: float) -> Array:
+    """Projection onto the directions in which there was motion in each model's field, (M, d, d)."""
+    counted, d = samples.counts[:, None] * samples.memberships, samples.actions.shape[1]
+    squares = []
+    for part in range(int(parts.max()) + 1):
+        mine, u = counted[parts == part], samples.actions[parts == part]
+        white = noise * mine.sum(axis=0)[:, None, None] * np.eye(d)
+        squares.append(np.einsum("nm,na,nb->mab", mine, u, u, optimize=True) - white)
+    least = noise * (1.0 + EIGENVALUE_STANDARD_ERRORS * np.sqrt(2.0 * time * np.maximum(samples.sizes, 1.0)))
+    bases = (surely(np.stack(squares)[:, model], float(at)) for model, at in enumerate(least))
+    return np.stack([basis @ basis.T for basis in bases])
+
+
+def _noise(samples: Samples, variance: float) -> float:
+    """Variance of the noise on each coordinate, at least that of the least misfit."""
+    found = min(variance, noise_by_differences(samples.actions, samples.groups))
+    return max(found, LEAST_MISFIT**2 * samples.energy)
+
+
+def _residuals(samples: Samples, policy: Array, noise: float) -> Array:
+    return np.asarray((samples.actions * (samples.actions - policy)).sum(axis=1) - policy.shape[1] * noise)
+
+
+def _time(samples: Samples, policy: Array, noise: float) -> float:
+    return correlation_time(_residuals(samples, policy, noise)[:, None], samples.groups)
+
+
+def _residual(samples: Samples, policy: Array, noise: float, time: float) -> Array:
+    """Mean square of ρ times the statistical inefficiency, (M,): that of the misfit has at most P values."""
+    d, counts = samples.actions.shape[1], samples.counts / samples.counts.sum()
+    white = noise * float(counts @ (policy**2).sum(axis=1)) + 2 * d * noise**2
+    chance = 1.0 + EIGENVALUE_STANDARD_ERRORS * np.sqrt(2.0 * time / len(samples))
+    misfit = max(float(counts @ _residuals(samples, policy, noise) ** 2) - chance * white, 0.0)
+    return time * white + np.maximum(time, samples.sizes / (d * samples.features.shape[1])) * misfit
