@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -20,9 +21,15 @@ from .experiments.trials import LABELS, Progress, Result
 Table = Callable[[Sequence[str], Sequence[Sequence[str]]], None]
 """Prints a head and rows."""
 
-TITLES = {"constraint": "constr.", "theta_max": "θmax", "ninc": "norm. incon."} | {
-    name: LABELS[name] for name in ("nupe", "ncpe")
-}
+TITLES = {
+    "constraint": "constr.",
+    "theta_max": "θmax",
+    "ninc": "norm. incon.",
+    "to_safe": "/ safe",
+    "worst_to_safe": "worst",
+    "behind": "> 1.1",
+    "to_best": "/ best",
+} | {name: LABELS[name] for name in ("nupe", "ncpe")}
 """Short enough for a terminal."""
 
 
@@ -52,8 +59,24 @@ def reproduce(
     kept = (journal,) if experiment in experiments.JOURNALED else ()
     with progress_bar(experiment) as progress:
         result = module.run(settings, workers, progress, *kept)
-    if deliver(result, module.headlines(result), out, table) and kept:
+    said = [*module.headlines(result), *_beside(experiment, Path(out))]
+    if deliver(result, said, out, table) and kept:
         journal.finish()
+
+
+def _beside(experiment: str, folder: Path) -> list[str]:
+    """What another experiment that belongs to this one found, where its result is in the folder."""
+    other = experiments.BESIDE.get(experiment)
+    if other is None:
+        return []
+    path, module = folder / f"{other}.json", experiments.find(other)
+    if not path.is_file():
+        return [f"{other}: no {path}; 'unconstrain reproduce {other} --out {folder}' adds its lines here"]
+    try:
+        result = Result.from_json(json.loads(path.read_text(encoding="utf-8")), module.Settings)
+        return [f"{other}, {line}" for line in module.headlines(result)]
+    except (KeyError, TypeError, ValueError):
+        return [f"{other}: {path} is of another version; reproduce it again"]
 
 
 def demo(out: str, table: Table, *, real: bool, download: bool, plate: tuple[float, ...] | None, seed: int) -> None:

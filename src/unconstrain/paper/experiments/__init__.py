@@ -9,11 +9,14 @@ from ...base.errors import SettingError
 
 __all__ = ["NAMES", "find"]
 
-NAMES = ("table1", "figure4", "figure5", "table2", "washing", "regimes")
+NAMES = ("table1", "figure4", "figure5", "table2", "washing", "regimes", "recorded")
 """What can be reproduced."""
 
-JOURNALED = ("table1", "figure5", "table2", "regimes")
+JOURNALED = ("table1", "figure5", "table2", "regimes", "recorded")
 """Those whose trials are kept as they finish, so that an interrupted run goes on."""
+
+BESIDE = {"recorded": "regimes"}
+"""Whose result is shown again with that of another, where it lies in the same folder: together they judge a learner."""
 
 
 def find(name: str) -> ModuleType:

@@ -130,12 +130,10 @@ def trial(
             "inconsistency": policy.with_learner(uc.Inconsistency()),
             PAPER: policy.with_learner(uc.Hybrid(settings.alpha)),
             "hybrid, auto": policy.with_learner(uc.Hybrid(alpha="auto")),
+            "noise-corrected": policy.with_learner(uc.NoiseCorrected()),
+            "likelihood": policy.with_learner(uc.Likelihood()),
         }
         of_noise: dict[str, tuple[float, ...]] = {method: _errors(one, test) for method, one in learnt.items()}
-        chosen, judged = policy.solution_, learnt["direct"]
-        for method in ("noise-corrected", "likelihood"):  # what the default learner chose from
-            judged.solution_ = replace(chosen, weights=chosen.candidates[method])
-            of_noise[method] = _errors(judged, test)
         of_noise[DEFAULT] = (*_errors(policy, test), *_knowledge(policy, noisy, test))
         of_noise[ORACLE] = _oracle(policy, test, settings.thresholds)
         of_noise[KNOWN] = _knowing(policy, noisy, test)
@@ -280,7 +278,7 @@ def _is_free(demo: uc.Demonstration) -> Array:
 
 def _oracle(policy: uc.Policy, test: Sequence[uc.Demonstration], count: int) -> tuple[float, float, float]:
     """The best point of the paper's path, one threshold for all models, chosen by the truth."""
-    whole = policy.training_.folds.whole
+    whole = _centred(policy.training_.model, policy.moments_)
     path = lexicographic_path(inconsistency(whole), standard_risk(whole))
     return _best(policy, test, [path.at(path.split(threshold)) for threshold in (0.0, *np.logspace(-10, 0, count))])
 
@@ -308,7 +306,7 @@ def _knowing(
         for b in range(a):  # weights must not be negative, and eᵀ N e is not
             mixed = 0.5 * (along(axes[a] + axes[b]).gram - alone[a] - alone[b])
             hessian[:, :, a, :, b] = hessian[:, :, b, :, a] = mixed
-    whole = policy.training_.folds.whole
+    whole = _centred(model, policy.moments_)
     linear = vec(_centred(model, gather(features, np.einsum("nab,nb->na", N, actions), members)).cross)
     error = Quadratic(hessian.reshape(-1, p * d, p * d), linear, whole.energy)
     minima = softened_minima(error, standard_risk(whole), _SOFTNESSES)
@@ -340,10 +338,10 @@ def _best(policy: uc.Policy, test: Sequence[uc.Demonstration], found: Sequence[A
 
 def _policy(system: str) -> uc.Policy:
     if system == "arm":
-        return uc.LocallyLinearPolicy(3.0, 0.7, validation=uc.Folds())
+        return uc.LocallyLinearPolicy(3.0, 0.7, learner=uc.Hybrid(), validation=uc.Folds())
     settings = toy.ToySettings()
     grid = uc.NormalisedRBF.grid(-settings.reach, settings.reach, settings.per_axis, width=settings.width)
-    return uc.ParametricPolicy(grid, validation=uc.Folds(by="demonstration"))
+    return uc.ParametricPolicy(grid, uc.Hybrid(), uc.Folds(by="demonstration"))
 
 
 def _planar(

@@ -51,6 +51,12 @@ class Result:
         """Settings and rows as plain values."""
         return {"name": self.name, "settings": asdict(self.settings), "rows": self.rows, **self.tables}
 
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any], settings: Callable[..., DataClass]) -> Result:
+        """What :meth:`to_json` gave, without the details; ``settings`` is the type of the experiment's."""
+        tables = {name: table for name, table in values.items() if name not in ("name", "settings", "rows")}
+        return cls(values["name"], settings(**values["settings"]), values["rows"], tables=tables)
+
 
 def run_trials(
     trial: Callable[..., Any],

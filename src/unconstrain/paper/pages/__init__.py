@@ -14,7 +14,7 @@ import numpy as np
 
 from ...base import files
 from ..experiments.trials import Result
-from . import figure4, figure5, plain, regimes, table1, table2, washing
+from . import figure4, figure5, plain, recorded, regimes, table1, table2, washing
 
 __all__ = ["page", "write"]
 
@@ -26,6 +26,7 @@ _PAGES = {
     "table2": table2.page,
     "washing": washing.page,
     "regimes": regimes.page,
+    "recorded": recorded.page,
 }
 
 

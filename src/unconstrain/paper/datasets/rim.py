@@ -1,13 +1,11 @@
-"""Recordings of others, fetched on request: nothing is downloaded without being asked for.
+"""The wiping of a car rim by a robot that is led by hand.
 
-The car-rim wiping was recorded at LASA, EPFL, in 2019 and published with the code of N. Figueroa and A. Billard,
-arXiv:1710.10060. Its licence is SimPL-2.0 (copyleft), which is why it does not come with this package.
+Recorded at LASA, EPFL, in 2019 and published with the code of N. Figueroa and A. Billard, arXiv:1710.10060. Its
+licence is SimPL-2.0 (copyleft), which is why it does not come with this package.
 """
 
 from __future__ import annotations
 
-import hashlib
-import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,17 +14,14 @@ import numpy as np
 
 import unconstrain as uc
 
-from ..base.arrays import Array, require_extra
-from ..base.errors import MissingExtraError, ReadError
-
-DATA_VARIABLE = "UNCONSTRAIN_DATA"
-"""Environment variable with a folder that holds local copies."""
+from ...base.arrays import Array
+from .files import Source
 
 RIM_FILE = "demos_rim_processed_data.mat"
-RIM_URL = (
-    "https://github.com/nbfigueroa/ICSC-HMM/raw/58f6778f6d1528e5b4204d6deb5cf216b1f33946/test-data/Wiping/" + RIM_FILE
+SOURCE = Source(
+    "lasa_rim_wiping",
+    "https://github.com/nbfigueroa/ICSC-HMM/raw/58f6778f6d1528e5b4204d6deb5cf216b1f33946/test-data/Wiping/",
 )
-RIM_SHA256 = "12f53e51f09276f8f73b50b4938cb357fbe99da0e7cb5a4c1a2c28baea2fd70e"
 
 POSITION = ("x", "y", "z")
 
@@ -115,7 +110,7 @@ def load_rim_wiping(*, download: bool = False, rate: float = 20.0, centre: bool 
     A local copy is looked for in the folder named by the environment variable
     ``UNCONSTRAIN_DATA``, and there in ``lasa_rim_wiping/``; then in the cache of earlier downloads.
     """
-    recordings = _load_rim(_locate(RIM_FILE, "lasa_rim_wiping", download))
+    recordings = _load_rim(SOURCE.path(RIM_FILE, download))
     return [_cut(recordings[bout.recording], bout, rate, centre) for bout in RIM_BOUTS]
 
 
@@ -130,7 +125,6 @@ class _Track(NamedTuple):
 def _load_rim(path: Path) -> list[_Track]:
     from scipy.io import loadmat  # slow to import
 
-    _verify(path, RIM_SHA256)
     cells = loadmat(path)["proc_data"].ravel()
     return [_track(cell[0, 0]) for cell in cells]
 
@@ -168,53 +162,3 @@ def _reversed(demonstration: uc.Demonstration) -> uc.Demonstration:
         actions=-demonstration.actions[::-1],
         times=None if times is None else times[-1] - times[::-1],
     )
-
-
-def _locate(file: str, folder: str, download: bool) -> Path:
-    """Where a data file is, fetching it if allowed."""
-    local = os.environ.get(DATA_VARIABLE)
-    places = [Path(local) / file, Path(local) / folder / file] if local else []
-    cache = _cache(needed=download)
-    if cache is not None:
-        places.append(cache / file)
-    found = next((place for place in places if place.is_file()), None)
-    if found is not None:
-        return found
-    if not download or cache is None:
-        tried = ", ".join(map(str, places)) or "no folder"
-        raise ReadError(
-            f"{file} is not on this machine (looked in {tried}). Either allow the download with download=True, "
-            f"or set {DATA_VARIABLE} to a folder that holds a copy of {RIM_URL}."
-        )
-    return _fetch(RIM_URL, RIM_SHA256, file, cache)
-
-
-def _cache(*, needed: bool) -> Path | None:
-    """Folder of earlier downloads; None if nothing can have been downloaded."""
-    try:
-        return Path(require_extra("pooch", "data").os_cache("unconstrain"))
-    except MissingExtraError:
-        if needed:
-            raise
-        return None
-
-
-def _fetch(url: str, sha256: str, file: str, cache: Path) -> Path:
-    pooch = require_extra("pooch", "data")
-    try:
-        return Path(pooch.retrieve(url, known_hash=f"sha256:{sha256}", fname=file, path=cache))
-    # Wrong checksum: ValueError; no network, no space, no permission: OSError, as all of requests'.
-    except (OSError, ValueError) as error:
-        raise ReadError(
-            f"{file} could not be downloaded from {url} ({error}). "
-            f"Try again, or set {DATA_VARIABLE} to a folder that holds a copy."
-        ) from error
-
-
-def _verify(path: Path, sha256: str) -> None:
-    found = hashlib.sha256(path.read_bytes()).hexdigest()
-    if found != sha256:
-        raise ReadError(
-            f"{path}: its SHA-256 is {found}, expected {sha256}: damaged, or another version. "
-            "Remove it and download it again."
-        )

@@ -1,0 +1,11 @@
+"""Recordings of others: found, checked and, only if asked for, fetched; none comes with this package.
+
+Each loader takes ``download=True`` and keeps what it fetched, save that of the signs: nobody offers these as a plain
+file at a fixed place. Local copies are looked for in the folder named by ``UNCONSTRAIN_DATA``.
+"""
+
+from .contours import load_contour as load_contour
+from .hands import load_hand_tracks as load_hand_tracks
+from .handwriting import load_handwriting as load_handwriting
+from .rim import WipingBout as WipingBout
+from .rim import load_rim_wiping as load_rim_wiping

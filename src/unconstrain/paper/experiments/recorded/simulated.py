@@ -1,0 +1,341 @@
+"""Simulated demonstrators in situations that are unlike those of the benchmark of regimes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import unconstrain as uc
+
+from ....base.arrays import Array
+from ...systems.limit_cycle import LimitCycle
+
+Policy = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What one draw gives.
+
+    Parameters
+    ----------
+    demonstrations : list of Demonstration
+        To learn from.
+    test : list of Demonstration, optional
+        To be tested on; those to learn from if None.
+    unspoiled : list of Demonstration, optional
+        The same before something was done to it, where that is what is tested.
+    """
+
+    demonstrations: list[uc.Demonstration]
+    test: list[uc.Demonstration] | None = None
+    unspoiled: list[uc.Demonstration] | None = None
+
+
+# ------------------------------------------------------------------------------------------------- who demonstrates
+
+
+def wipe(states: Array) -> Array:
+    """Circle about the z-axis at 3 rad/s and keep to a height: velocities (N, 3) at positions (N, 3)."""
+    x, y, z = states.T
+    inward = 1.2 * (1.0 / (np.hypot(x, y) + 1e-9) - 1.0)
+    return np.column_stack([inward * x - 3.0 * y, inward * y + 3.0 * x, 0.5 * x - 1.2 * z - 0.2])
+
+
+def come_to_rest(states: Array) -> Array:
+    """A limit cycle in the plane, and a height that is kept: velocities (N, 3) at positions (N, 3)."""
+    return np.column_stack([LimitCycle()(states[:, :2]), -2.0 * states[:, 2:]])
+
+
+FOCUS = LimitCycle(rho=-0.5)
+"""The stable focus of CaPL, github.com/joaomoura24/CaPL (gen_data_2d_notask)."""
+
+
+# --------------------------------------------------------------------------------------------- what constrains them
+
+
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """A plane whose normal turns with the state: ``A = n + B x``.
+
+    Parameters
+    ----------
+    normal : ndarray, shape (d,)
+    turn : ndarray, shape (d, n)
+    """
+
+    normal: Array
+    turn: Array
+
+    def __call__(self, states: Array, times: Array) -> Array:
+        """Return A, shape (T, 1, d)."""
+        return (self.normal + states @ self.turn.T)[:, None, :]
+
+
+@dataclass(frozen=True, eq=False)
+class Wall:
+    """A wall that is only pushed against from one side: no motion into it, from where it stands.
+
+    Parameters
+    ----------
+    policy : callable
+        Which the wall stops where it points into it.
+    normal : ndarray, shape (d,)
+        Unit vector into the wall.
+    distance : float
+        Of the wall from the origin.
+    """
+
+    policy: Policy
+    normal: Array
+    distance: float
+
+    def __call__(self, states: Array, times: Array) -> Array:
+        """Return A, shape (T, 1, d), zero where nothing holds."""
+        pushed = (states @ self.normal >= self.distance) & (self.policy(states) @ self.normal > 0)
+        return (pushed[:, None] * self.normal)[:, None, :]
+
+
+def tilted(rng: np.random.Generator, count: int, degrees: float = 35.0) -> list[uc.constraints.Plane]:
+    """Planes that are tilted by up to so much about each of two axes."""
+    slopes = np.tan(np.radians(degrees)) * rng.uniform(-1, 1, (count, 2))
+    return [uc.constraints.Plane(np.append(slope, 1.0)) for slope in slopes]
+
+
+# ------------------------------------------------------------------------------------------------------ what is drawn
+
+
+def curved_hood(rng: np.random.Generator) -> Simulated:
+    """A hood that is wiped at sixteen places: the normal is a function of where the sponge is, and nothing is free.
+
+    Its radii are 2.5 and 4 times that of the circle; states are relative to the place.
+    """
+    bends = np.diag([1 / 2.5, 1 / 4.0, 0.0])
+    places = np.column_stack([rng.uniform(-1, 1, (16, 2)) * [2.5, 4.0], np.zeros(16)])
+    surfaces = [Turning(bends @ place + [0, 0, 1], bends) for place in places]
+    starts = np.column_stack([rng.uniform(-1.2, 1.2, (16, 2)), np.zeros(16)])
+    return Simulated(_with_noise(_rolled(wipe, starts, 40, 0.05, surfaces), 0.01, rng))
+
+
+def capl(rng: np.random.Generator, decibels: float) -> Simulated:
+    """CaPL's protocol without a task: one random line each, noise by the ratio to each trajectory's signal.
+
+    Forty trajectories to learn from and ten to be tested on, two seconds at 50 Hz each.
+    """
+    angles, radii = 2 * np.pi * rng.random(50), rng.random(50)
+    starts = radii[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    turned = 2 * np.pi * rng.random(50)
+    lines = [uc.constraints.Plane(np.array([np.cos(angle), np.sin(angle)])) for angle in turned]
+    demos = _rolled(FOCUS, starts, 100, 0.02, lines)
+    learnt = demos[:40]
+    noise = [10 ** (-decibels / 20) * np.sqrt((demo.actions**2).mean()) for demo in learnt]
+    return Simulated(
+        [
+            _moved(demo, size * rng.standard_normal(demo.actions.shape))
+            for demo, size in zip(learnt, noise, strict=True)
+        ],
+        demos[40:],
+    )
+
+
+def wide_kernels(rng: np.random.Generator) -> Simulated:
+    """CCL's policy demo: 500 samples anywhere, each with a line of its own, and 500 to be tested on."""
+    states = rng.uniform(-1, 1, (1000, 2))
+    policy = _ccl_cycle(states)
+    normals = rng.random((1000, 2))
+    N = uc.null_space_projection((normals / np.linalg.norm(normals, axis=1, keepdims=True))[:, None, :])
+    every = uc.Demonstration(states, uc.project(N, policy), truth=uc.Truth(policy, N))
+    return Simulated([every[:500]], [every[500:]])
+
+
+def to_rest(rng: np.random.Generator) -> Simulated:
+    """Twelve demonstrations on random planes through the state space that come to rest there; tested anywhere."""
+    planes = [uc.constraints.Plane(rng.standard_normal(3)) for _ in range(12)]
+    demos = _rolled(come_to_rest, rng.uniform(-1, 1, (12, 3)), 75, 0.04, planes)
+    return Simulated(demos, [_free(come_to_rest, rng.uniform(-0.7, 0.7, (500, 3)))])
+
+
+def one_bad_sample(rng: np.random.Generator, size: float, free: bool) -> Simulated:
+    """Of 480 actions one is wrong, by so many standard deviations of the policy."""
+    demos = _with_noise(_wiped(rng, free=free), 0.02, rng)
+    return Simulated(_spoiled(demos, 1, size, rng), unspoiled=demos)
+
+
+def bad_samples(rng: np.random.Generator, size: float, free: bool) -> Simulated:
+    """Of 480 actions five are wrong."""
+    demos = _with_noise(_wiped(rng, free=free), 0.02, rng)
+    return Simulated(_spoiled(demos, 5, size, rng), unspoiled=demos)
+
+
+def unequal_speeds(rng: np.random.Generator) -> Simulated:
+    """Each demonstration is faster or slower by a factor of its own; its logarithm has a standard deviation of 0.4."""
+    demos = _with_noise(_wiped(rng), 0.02, rng)
+    factors = np.exp(0.4 * rng.standard_normal(len(demos)))
+    return Simulated([replace(demo, actions=f * demo.actions) for demo, f in zip(demos, factors, strict=True)])
+
+
+def correlated_noise(rng: np.random.Generator) -> Simulated:
+    """Noise of 5 % that is autoregressive, 0.9 from sample to sample."""
+    from scipy.signal import lfilter
+
+    demos = _wiped(rng)
+    size = 0.05 * _spread(demos) * np.sqrt(1 - 0.9**2)
+    return Simulated(
+        [_moved(one, lfilter([size], [1, -0.9], rng.standard_normal(one.actions.shape), axis=0)) for one in demos]
+    )
+
+
+def student_noise(rng: np.random.Generator) -> Simulated:
+    """Noise of 5 % with the heavy tails of Student's distribution of three degrees of freedom."""
+    demos = _wiped(rng)
+    size = 0.05 * _spread(demos) / np.sqrt(3.0)
+    return Simulated([_moved(demo, size * rng.standard_t(3, demo.actions.shape)) for demo in demos])
+
+
+def partly_at_rest(rng: np.random.Generator, share: float) -> Simulated:
+    """Noise of so much, and demonstrators who hesitate: a third of the samples are at rest."""
+    demos = []
+    for demo in _wiped(rng):
+        still = np.arange(len(demo)) % 30 < 10
+        demos.append(replace(demo, actions=np.where(still[:, None], 0.0, demo.actions)))
+    return Simulated(_with_noise(demos, share, rng))
+
+
+def one_sided(rng: np.random.Generator) -> Simulated:
+    """A wall near the limit cycle stops what pushes into it, and nothing else; each demonstration has its own wall."""
+    flow, angles = LimitCycle(), rng.uniform(0, 2 * np.pi, 12)
+    normals = np.column_stack([np.cos(angles), np.sin(angles)])
+    walls = [Wall(flow, normal, distance) for normal, distance in zip(normals, rng.uniform(0.1, 0.6, 12), strict=True)]
+    starts = rng.uniform(-1, 1, (12, 2))
+    beyond = np.maximum((starts * normals).sum(axis=1) - [wall.distance for wall in walls], 0)
+    demos = _rolled(flow, starts - beyond[:, None] * normals, 60, 0.05, walls)
+    return Simulated(_with_noise(demos, 0.02, rng))
+
+
+def one_plane(rng: np.random.Generator) -> Simulated:
+    """A linear policy on horizontal planes at several heights: how it moves up and down is never seen."""
+    flow = rng.standard_normal((3, 3)) / np.sqrt(3) - np.eye(3)
+    plane = uc.constraints.Plane(np.array([0.0, 0.0, 1.0]))
+    demos = _rolled(lambda states: states @ flow - 0.2, rng.uniform(-1.5, 1.5, (8, 3)), 60, 0.05, [plane] * 8)
+    return Simulated(_with_noise(demos, 0.02, rng))
+
+
+def parallel_planes(rng: np.random.Generator) -> Simulated:
+    """Planes that are tilted by five degrees at most."""
+    return Simulated(_with_noise(_wiped(rng, planes=tilted(rng, 8, 5.0)), 0.02, rng))
+
+
+def turning_planes(rng: np.random.Generator) -> Simulated:
+    """Normals that turn slowly with the state, each demonstration's about its own."""
+    bends = rng.standard_normal((8, 3, 3)) * [[0.3], [0.3], [0.0]]
+    planes = [Turning(plane.normal, bend) for plane, bend in zip(tilted(rng, 8), bends, strict=True)]
+    return Simulated(_with_noise(_wiped(rng, planes=planes), 0.02, rng))
+
+
+def two_demonstrations(rng: np.random.Generator) -> Simulated:
+    """There are two demonstrations only."""
+    return Simulated(_with_noise(_wiped(rng, planes=tilted(rng, 2)), 0.02, rng))
+
+
+def many_joints(rng: np.random.Generator) -> Simulated:
+    """Fourteen joints that pull at each other on their way to a posture; each demonstration holds four combinations."""
+    pull = rng.standard_normal((14, 14)) / np.sqrt(14) - np.eye(14)
+    held = [_Rows(rows) for rows in rng.standard_normal((24, 4, 14))]
+    demos = _rolled(lambda states: states @ pull, rng.uniform(-1, 1, (24, 14)), 25, 0.08, held)
+    return Simulated(_with_noise(demos, 0.02, rng))
+
+
+def without_order(rng: np.random.Generator) -> Simulated:
+    """Demonstrations under lines that switch twice, as one heap of rows."""
+    lines = [uc.constraints.SwitchingLine.random(rng, 0.8, 2) for _ in range(20)]
+    demos = _rolled(LimitCycle(), rng.uniform(-1, 1, (20, 2)), 40, 0.02, lines)
+    return Simulated([heap(_with_noise(demos, 0.02, rng), rng)])
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Rows that are held wherever the state is."""
+
+    rows: Array
+
+    def __call__(self, states: Array, times: Array) -> Array:
+        return np.broadcast_to(self.rows, (len(states), *self.rows.shape))
+
+
+def heap(demonstrations: Sequence[uc.Demonstration], rng: np.random.Generator) -> uc.Demonstration:
+    """All rows in any order, without times."""
+    return shuffled(_joined(demonstrations), rng)
+
+
+def shuffled(demo: uc.Demonstration, rng: np.random.Generator) -> uc.Demonstration:
+    """The rows in any order, without times."""
+    return replace(demo, times=None)[rng.permutation(len(demo))]
+
+
+def _joined(demonstrations: Sequence[uc.Demonstration]) -> uc.Demonstration:
+    states, actions, _ = uc.stack(demonstrations)
+    truths = [demo.truth for demo in demonstrations if demo.truth is not None]
+    policy, N = (np.concatenate([getattr(truth, field) for truth in truths]) for field in ("policy", "projections"))
+    return uc.Demonstration(states, actions, truth=uc.Truth(policy, N))
+
+
+def _ccl_cycle(states: Array) -> Array:
+    """The limit cycle of CCL's demo."""
+    pull = 0.75 - (states**2).sum(axis=1, keepdims=True)
+    return -pull * states + np.column_stack([states[:, 1], -states[:, 0]])
+
+
+def _wiped(
+    rng: np.random.Generator, planes: Sequence[uc.constraints.Constraint] | None = None, free: bool = False
+) -> list[uc.Demonstration]:
+    """Eight demonstrations of sixty samples, or as many as there are planes, from starts on their planes."""
+    held = tilted(rng, 8) if planes is None else planes
+    starts = rng.uniform(-1.5, 1.5, (len(held), 3))
+    if free:
+        return _rolled(wipe, starts, 60, 0.05, None)
+    return _rolled(wipe, starts, 60, 0.05, held)
+
+
+def _rolled(
+    policy: Policy,
+    starts: Array,
+    steps: int,
+    dt: float,
+    constraints: Sequence[uc.constraints.Constraint] | None,
+) -> list[uc.Demonstration]:
+    return uc.rollout(policy, starts, steps, dt, constraints)
+
+
+def _free(policy: Policy, states: Array) -> uc.Demonstration:
+    actions = policy(states)
+    return uc.Demonstration(
+        states, actions, truth=uc.Truth(actions, np.tile(np.eye(actions.shape[1]), (len(states), 1, 1)))
+    )
+
+
+def _moved(demo: uc.Demonstration, by: Array) -> uc.Demonstration:
+    return replace(demo, actions=demo.actions + by)
+
+
+def _with_noise(demos: Sequence[uc.Demonstration], share: float, rng: np.random.Generator) -> list[uc.Demonstration]:
+    """Normal noise on the actions, as a share of the policy's rms spread per coordinate."""
+    size = share * _spread(demos)
+    return [_moved(demo, size * rng.standard_normal(demo.actions.shape)) for demo in demos]
+
+
+def _spread(demonstrations: Sequence[uc.Demonstration]) -> float:
+    policies = np.concatenate([demo.truth.policy for demo in demonstrations if demo.truth is not None])
+    return float(np.sqrt(policies.var(axis=0).mean()))
+
+
+def _spoiled(
+    demos: Sequence[uc.Demonstration], count: int, size: float, rng: np.random.Generator
+) -> list[uc.Demonstration]:
+    """Some actions with an error of so many times the policy's spread per coordinate."""
+    lengths = [len(demo) for demo in demos]
+    wrong = np.zeros((sum(lengths), demos[0].actions.shape[1]))
+    rows = rng.permutation(len(wrong))[:count]
+    wrong[rows] = size * _spread(demos) * rng.standard_normal((count, wrong.shape[1]))
+    return [_moved(demo, by) for demo, by in zip(demos, np.split(wrong, np.cumsum(lengths)[:-1]), strict=True)]
