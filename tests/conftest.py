@@ -47,6 +47,7 @@ ROBUST = {
 
 POLICIES = {
     "affine": lambda learner: uc.ParametricPolicy(uc.Affine(), learner),
+    "cubic": lambda learner: uc.ParametricPolicy(uc.Polynomial(3), learner),
     "grid": lambda learner: uc.ParametricPolicy(uc.NormalisedRBF.grid(-1, 1, 3), learner),
     "kmeans": lambda learner: uc.ParametricPolicy(uc.KMeansRBF(7), learner),
     "local": lambda learner: uc.LocallyLinearPolicy(variance=0.5, learner=learner),

@@ -41,13 +41,15 @@ def states(rows=30):
     [
         uc.Affine(),
         uc.Affine(np.array([0.1, 0.2]), np.array([2.0, 0.5])),
+        uc.Polynomial(3),
+        uc.Polynomial(2, np.array([0.1, 0.2]), np.array([2.0, 0.5])),
         uc.NormalisedRBF(CENTRES, 0.3),
         uc.NormalisedRBF(CENTRES, 0.3).support,
         ReceptiveFields(CENTRES, 0.3).weights,
         ReceptiveFields(CENTRES, 0.3).shares,
         ReceptiveFields(CENTRES, 0.3).support,
     ],
-    ids=["affine", "scaled", "rbf", "support", "weights", "shares", "field support"],
+    ids=["affine", "scaled", "cubic", "scaled quadratic", "rbf", "support", "weights", "shares", "field support"],
 )
 def test_features_and_fields(to, of):
     assert_same(of(to(states())), of(states()))
@@ -111,10 +113,11 @@ def test_objectives_of_sums(to):
 
 
 POLICIES = {
-    "grid": lambda: uc.ParametricPolicy(uc.NormalisedRBF.grid(-1, 1, 3)),
-    "affine": lambda: uc.ParametricPolicy(uc.Affine()),
+    "grid": lambda: uc.ParametricPolicy(uc.NormalisedRBF.grid(-1, 1, 3), uc.Hybrid()),
+    "affine": lambda: uc.ParametricPolicy(uc.Affine(), uc.Hybrid()),
+    "cubic": lambda: uc.ParametricPolicy(uc.Polynomial(3), uc.Hybrid()),
     "kmeans": uc.ParametricPolicy,
-    "local": lambda: uc.LocallyLinearPolicy(0.5),
+    "local": lambda: uc.LocallyLinearPolicy(0.5, learner=uc.Hybrid()),
 }
 
 

@@ -94,6 +94,8 @@ FAR = np.array([[0.0, 0.0], [1e3, -1e3], [1e12, 1e12], [-1e25, 0.0]])
 
 
 def assert_finite(policy, states):
+    if isinstance(policy.features_, uc.Polynomial):
+        states = np.sign(states) * np.abs(states) ** (1 / policy.features_.degree)  # whose features are as large
     assert np.isfinite(policy.solution_.weights).all()
     assert np.isfinite(policy.predict(states)).all()
     assert 0 <= policy.solution_.determined_share <= 1
@@ -156,7 +158,7 @@ def test_more_features_than_samples_fit(learner):
     assert policy.solution_.determined[0] <= 10
 
 
-@pytest.mark.parametrize("kind", ["affine", "kmeans", "local"])
+@pytest.mark.parametrize("kind", ["affine", "cubic", "kmeans", "local"])
 def test_a_state_column_that_never_moves_changes_nothing(kind, data):
     policy_of = POLICIES[kind]
     plain = policy_of(uc.Hybrid(threshold=1e-3)).fit(data.states, data.actions)
@@ -168,6 +170,12 @@ def test_a_state_column_that_never_moves_changes_nothing(kind, data):
 
 def test_far_from_all_data_predictions_stay_finite(policy, data):
     assert_finite(policy.fit(data.states, data.actions), FAR)
+
+
+def test_so_far_away_that_a_monomial_has_no_digits_left_is_refused(data):
+    policy = uc.ParametricPolicy(uc.Polynomial(3), uc.Direct()).fit(data.states, data.actions)
+    with pytest.raises(InvalidDataError, match=r"features: found .* at row 0, column 0, expected numbers up to 1e\+30"):
+        policy.predict([[1e12, 0.0]])
 
 
 def test_far_away_the_nearest_field_predicts(data):

@@ -282,8 +282,9 @@ def test_fit_says_what_it_did(files, tmp_path):
 def test_fit_says_how_the_default_learner_went(files, tmp_path):
     said = run("fit", *files, "--model", "linear", "-o", tmp_path / "p.npz").splitlines()[2]
     assert re.fullmatch(
-        r"Learnt by .*: .*\. Noise and misfit are about \S+ on each action, \d+% of the samples look free, "
-        r"and the data determined 100% of the weight directions\.",
+        r"Learnt as .*: .*\. Estimated squared error, against this: .* times for .*\. Noise and misfit are about \S+ "
+        r"on each action, and \d+% of the samples were free.*\. At least three demonstrations show \d+% of the weight "
+        r"directions\.",
         said,
     )
 
@@ -306,8 +307,8 @@ def test_much_data_is_learnt_from_sums(files, tmp_path, monkeypatch):
 
 
 def test_a_cluster_computes_no_samples(files, tmp_path):
-    said = refused("fit", *files, "--learner", "robust", "--scheduler", "tcp://nowhere:1", "-o", tmp_path / "p.npz")
-    assert "needs the samples" in said
+    learner = ("--learner", "robust", "--scheduler", "tcp://nowhere:1")  # learns from sums there
+    assert "nothing answers" in refused("fit", *files, *learner, "-o", tmp_path / "p.npz")
 
 
 @pytest.mark.parametrize("learner", cli.LEARNERS)
@@ -316,8 +317,16 @@ def test_each_model_takes_each_learner(files, tmp_path, model, learner):
     said = run("fit", *files, "--model", model, "--learner", learner, "-o", tmp_path / "p.npz")
     assert ("local models" in said) == (model == "local")
     assert ("The inconsistency determined" in said) == (learner in ("hybrid", "inconsistency"))
-    assert ("samples look free" in said) == (learner == "robust")
+    assert ("samples were free" in said) == (learner == "robust")
     assert type(storage.load(tmp_path / "p.npz").learner).__name__.lower() == learner
+
+
+@pytest.mark.parametrize(
+    ("model", "features"), [("linear", 3), ("affine", 3), ("quadratic", 6), ("cubic", 10), ("rbf", 25)]
+)
+def test_each_model_has_features_of_its_own(files, tmp_path, model, features):
+    run("fit", *files, "--model", model, "--learner", "direct", "-o", tmp_path / "p.npz")
+    assert storage.load(tmp_path / "p.npz").solution_.weights.shape == (1, 2, features)
 
 
 def test_what_is_missed_where_held_out_is_said_in_a_note(tmp_path):
@@ -395,7 +404,7 @@ def circle(tmp_path, rate=100.0):
 @pytest.mark.parametrize("how", [(), ("--differentiate",), ("--by", "central"), ("--by", "savgol", "--window", 0.1)])
 def test_velocities_are_found_from_positions(tmp_path, how):
     said = run("fit", circle(tmp_path), *how, "--model", "linear", "-o", tmp_path / "p.npz")
-    method = "central differences" if "central" in how else "savgol, 0.1 s" if 0.1 in how else "savgol, 0.25 s"
+    method = "central differences" if "central" in how else "savgol, 0.11 s" if 0.1 in how else "savgol, 0.25 s"
     assert f"x, y as states and their velocity ({method}) as actions." in said
     found_A, found_b = learnt(tmp_path / "p.npz")
     assert_allclose(found_A, [[0, -1], [1, 0]], atol=1e-3)
@@ -433,7 +442,8 @@ def test_what_was_repaired_is_said_in_a_note(tmp_path):
     ran = call("fit", pattern, "--model", "linear", "-o", tmp_path / "p.npz")
     assert ran.code == 0
     [note] = ran.err.splitlines()
-    assert note.startswith("Note: 'circle_0': 1 gap in the time stamps, the longest 3.01 s after 5.99 s; ")
+    said = "Note: clock-gap: 'circle_0', row 600: 1 gap in the time stamps, the longest 3.01 s after 5.99 s; "
+    assert note.startswith(said)
 
 
 def test_fit_writes_a_report_too(files, tmp_path):
@@ -630,7 +640,7 @@ def bad(folder, what):
     [
         (lambda at: at / "none.csv", "{at}/none.csv: no such file, expected the path of a file."),
         (lambda at: at / "none_*.csv", "{at}/none_*.csv: no such file, expected the path of a file."),
-        (lambda at: at, "{at}: a folder, expected the path of a file."),
+        (lambda at: at, "{at}: a folder without a file to read."),
         (
             lambda at: bad(at, "hole"),
             (
@@ -653,7 +663,7 @@ def bad(folder, what):
             lambda at: bad(at, "backwards"),
             (
                 "'backwards', row 7: got time -1 s after 0.3 s, expected later ones. "
-                "Sort the rows, or split the file where a new recording begins."
+                "Sort the rows (--sort), or split the file where a new recording begins."
             ),
         ),
     ],
@@ -709,7 +719,7 @@ def test_an_unknown_group_or_time_is_answered_with_the_columns_there_are(files, 
         (("--softness", "inf"), "softness: got inf, expected a number of at least 0.0."),
         (
             ("--model", "deep"),
-            "Invalid value for '--model': 'deep' is not one of 'local', 'rbf', 'linear'.",
+            "Invalid value for '--model': 'deep' is not one of 'local', 'rbf', 'auto', 'affine', 'quadratic', ",
         ),
         (
             ("--learner", "direct", "--alpha", "1"),
@@ -819,7 +829,9 @@ def test_a_rollout_that_runs_away_is_refused(policy, tmp_path):
 
 def test_a_recording_of_other_columns_is_refused_by_score(policy, tmp_path):
     write(tmp_path / "other.csv", "t,a,b", [[0, 1, 2], [1, 2, 3]])
-    assert refused("score", policy, tmp_path / "other.csv") == "'other' has no column 'x', 'y'; it has a, b."
+    assert (
+        refused("score", policy, tmp_path / "other.csv") == "'other' has no column 'x', 'y', 'vx', 'vy'; it has a, b."
+    )
 
 
 def test_actions_that_are_no_velocities_cannot_be_rolled_out(tmp_path):
@@ -1074,9 +1086,18 @@ def test_demo_says_where_it_looked_for_recordings(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+def test_inspect_says_how_a_file_was_read(tmp_path):
+    (tmp_path / "a.csv").write_text("".join(f"{k} {k % 7} {k}\n" for k in range(9)))
+    said = run("inspect", tmp_path / "a.csv")
+    assert "'a': it has no header, so its columns are called column1, column2, column3; name them" in said
+    [found] = json.loads(run("inspect", tmp_path / "a.csv", "--json"))
+    assert [note["code"] for note in found["notes"]] == ["no-header"]
+    assert "column" not in run("inspect", tmp_path / "a.csv", "--columns", "t,x,y").partition("columns:")[2]
+
+
 def test_doctor_finds_everything_that_the_tests_need():
     found = {one["what"]: one for one in json.loads(run("doctor", "--json"))}
-    assert list(found) == ["Python", "viz", "data", "arm", "sim", "onnx", "cluster", "arrays", "graphics"]
+    assert list(found) == ["Python", "viz", "data", "formats", "arm", "sim", "onnx", "cluster", "arrays", "graphics"]
     assert found["graphics"]["found"] in ("egl", "osmesa", "the system's own")
     assert all(one["mend"] == "" for one in found.values())
     assert run("doctor").rstrip().endswith("Everything is there.")
@@ -1092,7 +1113,7 @@ def test_doctor_tells_how_to_fix_what_is_missing(monkeypatch):
     fixes = {one.what: one.fix for one in doctor.examine()}
     assert fixes["viz"] == "pip install 'unconstrain[viz]'"
     assert fixes["graphics"] == "apt-get install libegl1 libegl-mesa0"
-    assert run("doctor").rstrip().endswith("2 of 9 are missing something.")
+    assert run("doctor").rstrip().endswith("2 of 10 are missing something.")
     versions["mujoco"] = None
     assert {one.what: one.found for one in doctor.examine()}["graphics"] == "needs sim"
     versions.pop("mujoco")
@@ -1106,3 +1127,22 @@ def test_demo_refuses_a_plate_that_the_arm_does_not_reach(tmp_path):
     assert refused("demo", "--plate", "10", "--out", tmp_path) == (
         "--plate: got 1 numbers, expected two, the tilts about x and y in degrees."
     )
+
+
+def test_fit_and_diagnose_name_the_sample_that_looks_wrong(tmp_path):
+    rng = np.random.default_rng(4)
+    for index in range(4):
+        time, start = 0.05 * np.arange(40), rng.uniform(0, 2 * np.pi)
+        states = np.column_stack([np.cos(start + time), np.sin(start + time)])
+        actions = np.column_stack([-states[:, 1], states[:, 0]]) + 0.01 * rng.standard_normal(states.shape)
+        actions[11] += 4.0 * (index == 2)
+        table = np.column_stack([time, states, actions])
+        np.savetxt(tmp_path / f"cup_{index}.csv", table, delimiter=",", header="time,x,y,vx,vy", comments="")
+    files = [str(path) for path in sorted(tmp_path.glob("*.csv"))]
+    columns = ["--state", "x,y", "--action", "vx,vy", "--model", "linear"]
+    said = "1 sample looks wrong beside the neighbours in time, and counted nothing: cup_2 sample 12 (0.55 s)."
+    fitted = CliRunner().invoke(cli.main, ["fit", *files, *columns, "-o", str(tmp_path / "policy.npz")])
+    assert f"Note: {said}" in fitted.stderr
+    assert said in CliRunner().invoke(cli.main, ["diagnose", *files, *columns]).stdout
+    found = json.loads(CliRunner().invoke(cli.main, ["diagnose", *files, *columns, "--json"]).stdout)
+    assert found["suspects"] == [{"demonstration": "cup_2", "sample": 12, "time": pytest.approx(0.55)}]

@@ -24,9 +24,11 @@ pytestmark = pytest.mark.filterwarnings("ignore")
 DATA = draw(samples=600, groups=7)
 WEIGHTS = np.random.default_rng(5).uniform(0, 2, 600)
 POLICIES = {
-    "kmeans": lambda: uc.ParametricPolicy(uc.KMeansRBF(7)),
-    "local": lambda: uc.LocallyLinearPolicy(0.5),
-    "by_demonstration": lambda: uc.ParametricPolicy(uc.Affine(), validation=uc.Folds(3, by="demonstration")),
+    "kmeans": lambda: uc.ParametricPolicy(uc.KMeansRBF(7), uc.Hybrid()),
+    "local": lambda: uc.LocallyLinearPolicy(0.5, learner=uc.Hybrid()),
+    "by_demonstration": lambda: uc.ParametricPolicy(
+        uc.Affine(), uc.Hybrid(), validation=uc.Folds(3, by="demonstration")
+    ),
 }
 
 
@@ -67,13 +69,13 @@ def test_chunks_of_dask_are_the_same_as_one_array(kind, rows):
 
 
 def test_it_learns_on_where_the_cluster_ended():
-    policy = cluster.fit(uc.ParametricPolicy(uc.Affine()), *chunked(50, DATA.states, DATA.actions))
+    policy = cluster.fit(uc.ParametricPolicy(uc.Affine(), uc.Hybrid()), *chunked(50, DATA.states, DATA.actions))
     policy.partial_fit(DATA.states[:10], DATA.actions[:10])
     assert policy.moments_.weight[0] == 610
 
 
 def test_a_vector_of_actions_stays_one():
-    policy = cluster.fit(uc.ParametricPolicy(uc.Affine()), *chunked(50, DATA.states, DATA.actions[:, 0]))
+    policy = cluster.fit(uc.ParametricPolicy(uc.Affine(), uc.Hybrid()), *chunked(50, DATA.states, DATA.actions[:, 0]))
     assert policy.predict(DATA.states).shape == (600,)
 
 
@@ -176,4 +178,4 @@ def test_without_dask_the_error_names_the_extra(monkeypatch):
 
 def test_a_learner_that_needs_samples_is_refused_before_anything_is_computed():
     with pytest.raises(uc.UnconstrainError, match="sums alone"):
-        uc.cluster.fit_batches(uc.ParametricPolicy(learner=uc.Robust()), [None])
+        uc.cluster.fit_batches(uc.ParametricPolicy(learner=uc.NoiseCorrected()), [None])

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 
 import numpy as np
 import onnxruntime
@@ -15,13 +16,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.exceptions import NotFittedError
+from sklearn.preprocessing import PolynomialFeatures
 
 import naive
 import unconstrain as uc
 from conftest import POLICIES
 from samples import draw
 from unconstrain.base.errors import InvalidDataError, MissingExtraError, SettingError
-from unconstrain.deployment.c99 import c_source
+from unconstrain.deployment.c99 import c_source, export_c
+from unconstrain.deployment.stepping import stepper
+from unconstrain.models import Everywhere
 
 DATA = draw(noise=0.02)
 FAR = [1.0, 3.0, 30.0, 1e3, 1e8]
@@ -75,6 +79,25 @@ def test_a_step_is_the_formula_of_the_paper(arm):
     at = states(7, 1.0, count=5)
     expected = naive.locally_linear(at, arm.fields_.centres, 2.0, matrices @ shift)
     assert_allclose([arm.step(x) for x in at], expected, atol=1e-10)
+
+
+@given(
+    seed=st.integers(0, 1000),
+    degree=st.integers(1, 5),
+    n=st.integers(1, 4),
+    width=st.sampled_from(FAR),
+    unit=st.sampled_from([1e-8, 1.0, 1e8]),
+)
+def test_a_step_of_a_polynomial_is_the_sum_of_its_monomials(seed, degree, n, width, unit):
+    rng = np.random.default_rng(seed)
+    placed = uc.Polynomial(degree).place(unit * rng.uniform(-1, 2, (20, n)))
+    monomials = PolynomialFeatures(degree).fit(np.zeros((1, n)))
+    order = sorted(range(monomials.n_output_features_), key=lambda term: tuple(-monomials.powers_[term]))
+    weights, at = rng.standard_normal((3, len(order))), unit * rng.uniform(-width, width, (5, n))
+    step = stepper(uc.Model(placed, Everywhere()), weights[None], n)
+    terms = monomials.transform((at - placed.centre) / placed.scale)[:, order]
+    error = np.abs([step(x, None) for x in at] - terms @ weights.T)
+    assert (error <= 1e-14 * (np.abs(terms) @ np.abs(weights.T))).all()
 
 
 def test_a_step_takes_lists_and_other_kinds_of_numbers(policy):
@@ -216,6 +239,31 @@ def test_the_c_file_of_an_arm(arm, tmp_path):
         assert_same(np.stack([step(x) for x in at]), arm, at, width)
 
 
+def test_the_c_file_and_the_graph_of_a_polynomial_of_many_states(tmp_path):
+    data = draw(samples=400, policy=lambda x: np.sin(x @ np.eye(7)[::-1]) + 0.1 * x, dimensions=7)
+    there = np.column_stack([data.states[:, :6], np.full(400, 0.1)])
+    bent = uc.ParametricPolicy(uc.Polynomial(3), uc.Direct()).fit(there, data.actions)
+    step = compiled(bent, tmp_path, "bent", flags=["-Wconversion", "-Wmissing-prototypes", "-Wshadow"])
+    bent.export_onnx(tmp_path / "bent.onnx")
+    graph = session(tmp_path / "bent.onnx")
+    for width in FAR:
+        at = states(7, width)
+        allowed = 1e-14 * (np.abs(bent.features_(at)) @ np.abs(bent.solution_.weights[0].T))
+        [drawn] = graph.run(None, {"states": at})
+        for found in (np.stack([step(x) for x in at]), np.stack([bent.step(x) for x in at]), drawn):
+            assert (np.abs(found - bent.predict(at)) <= allowed).all()
+
+
+def test_the_self_test_of_a_polynomial_finds_a_wrong_digit_in_its_lowest_terms_too(tmp_path):
+    policy = POLICIES["cubic"](uc.Direct()).fit(DATA.states, DATA.actions)
+    form = policy.closed_form()
+    wrong = form.maps.copy()
+    wrong[0, 0, (form.monomials == 2).sum(axis=1) == 2] *= 1 + 1e-6  # the linear ones
+    export_c(replace(form, maps=wrong), policy, tmp_path / "wrong.c", "wrong")
+    subprocess.run(["gcc", "-std=c99", "-DWRONG_SELF_TEST", "wrong.c", "-lm", "-o", "test"], cwd=tmp_path, check=True)
+    assert subprocess.run([tmp_path / "test"], check=False, capture_output=True).returncode == 1
+
+
 def test_the_self_test_of_a_c_file_finds_a_wrong_digit(arm, tmp_path):
     form = arm.closed_form()
     at = states(7, 1.0, count=4)
@@ -278,7 +326,7 @@ def test_features_that_are_code_are_refused_with_what_can_be_exported(tmp_path, 
     with pytest.raises(SettingError) as caught:
         getattr(own, export)(tmp_path / "file")
     assert "cannot export a policy on the features circular: they are Python code" in str(caught.value)
-    assert "Affine, NormalisedRBF or KMeansRBF" in str(caught.value)
+    assert "Affine, Polynomial, NormalisedRBF or KMeansRBF" in str(caught.value)
 
 
 class Reversed:

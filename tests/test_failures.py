@@ -13,7 +13,7 @@ from unconstrain.training import Batch, is_typical
 DATA = draw(samples=120, groups=6)
 POLICIES = {
     "of samples": uc.LocallyLinearPolicy(learner=uc.NoiseCorrected()),
-    "hybrid": uc.ParametricPolicy(uc.KMeansRBF(5)),
+    "hybrid": uc.ParametricPolicy(uc.KMeansRBF(5), uc.Hybrid()),
 }
 
 
@@ -148,6 +148,7 @@ def test_states_that_never_spread_are_learnt_from_all_the_same():
 
 
 @pytest.mark.parametrize("learner", [uc.Robust(), uc.Likelihood(), uc.NoiseCorrected(), uc.Segments(), "robust"])
+@pytest.mark.filterwarnings("ignore:row-order")
 def test_speed_is_weighed_once_wherever_it_comes_from(learner, tmp_path):
     path = tmp_path / "a.csv"
     rows = "\n".join(",".join(map(repr, map(float, row))) for row in np.hstack([DATA.states, DATA.actions]))
@@ -196,7 +197,7 @@ class TestWhenAStreamIsTypical:
         assert not typical(np.ones((999, 2)), newest=1)
 
     def test_waiting_samples_are_held_once_and_never_stored(self, tmp_path):
-        policy = uc.ParametricPolicy(uc.Affine()).partial_fit(DATA.states[:5], DATA.actions[:5])
+        policy = uc.ParametricPolicy(uc.Affine(), uc.Hybrid()).partial_fit(DATA.states[:5], DATA.actions[:5])
         uc.save(policy, tmp_path / "waiting.npz")
         assert not hasattr(uc.load(tmp_path / "waiting.npz"), "_waiting")
         given = DATA.states[5:9].copy()
@@ -207,12 +208,12 @@ class TestWhenAStreamIsTypical:
         assert_allclose(policy.moments_.gram, whole.moments_.gram, atol=1e-9)
 
     def test_groups_that_only_some_waiting_batches_name_count_for_none(self):
-        policy = uc.ParametricPolicy(uc.Affine()).partial_fit(DATA.states[:5], DATA.actions[:5])
+        policy = uc.ParametricPolicy(uc.Affine(), uc.Hybrid()).partial_fit(DATA.states[:5], DATA.actions[:5])
         policy.partial_fit(DATA.states[5:], DATA.actions[5:], groups=DATA.groups[5:])
         assert policy.training_.split.by == "sample"
 
     def test_weights_of_some_waiting_batches_are_ones_elsewhere(self):
-        policy = uc.ParametricPolicy(uc.Affine()).partial_fit(DATA.states[:5], DATA.actions[:5])
+        policy = uc.ParametricPolicy(uc.Affine(), uc.Hybrid()).partial_fit(DATA.states[:5], DATA.actions[:5])
         policy.partial_fit(DATA.states[5:], DATA.actions[5:], np.full(115, 2.0))
         assert policy.moments_.weight.sum() == 5.0 + 230.0
 

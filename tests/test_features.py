@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.distance import cdist
 from scipy.special import softmax
+from sklearn.preprocessing import PolynomialFeatures
 
 import naive
-from unconstrain import Affine, KMeansRBF, NormalisedRBF
+from unconstrain import Affine, KMeansRBF, NormalisedRBF, ParametricPolicy, Polynomial
 from unconstrain.base.errors import InvalidDataError, SettingError
 from unconstrain.models.features import Placeable, shares, squared_distances
 
@@ -48,6 +49,77 @@ def test_affine_features_that_were_told_where_stay_there():
     told = Affine(centre=1.0)
     assert told.place(states()) is told
     assert isinstance(told, Placeable)
+
+
+# Polynomials
+
+
+def test_quadratic_features_are_products_of_the_state_and_one():
+    assert_array_equal(Polynomial()(np.array([[2.0, 3.0]])), [[4.0, 6.0, 2.0, 9.0, 3.0, 1.0]])
+
+
+@given(seeds, st.integers(1, 5), st.integers(1, 4))
+def test_monomials_are_those_of_scikit_learn_in_lexicographic_order(seed, degree, n):
+    there = states(seed, 10, n)
+    theirs = PolynomialFeatures(degree).fit(there)
+    order = sorted(range(theirs.n_output_features_), key=lambda term: tuple(-theirs.powers_[term]))
+    assert_allclose(Polynomial(degree)(there), theirs.transform(there)[:, order], rtol=1e-14)
+
+
+@pytest.mark.parametrize("told", [{}, {"centre": [0.5, 3.0], "scale": 2.0}])
+def test_of_degree_one_they_are_affine_features(told):
+    mine, affine = Polynomial(1, **told).place(states()), Affine(**told).place(states())
+    assert_array_equal(mine(states(1)), affine(states(1)))
+
+
+@pytest.mark.parametrize(("factor", "offset"), [(1.0, 0.0), (1e-8, 0.0), (1e8, 0.0), (1.0, 1e6)])
+def test_placed_polynomials_do_not_depend_on_the_unit(factor, offset):
+    placed = Polynomial(3).place(factor * states() + offset)
+    assert_allclose(placed(factor * states(1) + offset), Polynomial(3).place(states())(states(1)), atol=1e-6)
+
+
+def test_monomials_of_a_coordinate_that_does_not_move_are_not_blown_up():
+    table = np.column_stack([states(n=1), np.full(40, 0.1)])
+    assert np.abs(Polynomial(3).place(table)(table)).max() < 10
+
+
+def test_polynomials_that_were_told_where_stay_there():
+    placed = Polynomial(3, centre=1.0).place(states())
+    assert (placed.degree, placed.centre, placed.scale) == (3, 1.0, 1.0)
+    assert isinstance(placed, Placeable)
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+def test_a_polynomial_is_learnt_exactly_from_free_movement(degree):
+    def cubed(there):
+        return (there @ np.array([[0.3, -1.0], [0.7, 0.4]]) + 0.2) ** degree
+
+    policy = ParametricPolicy(Polynomial(degree), "direct").fit(states(), cubed(states()))
+    assert_allclose(policy.predict(3 * states(1)), cubed(3 * states(1)), atol=1e-11)
+
+
+@pytest.mark.parametrize(("degree", "most"), [(2, 61), (3, 20), (1, 1999)])
+def test_more_than_two_thousand_monomials_are_refused(degree, most):
+    assert Polynomial(degree)(np.ones((1, most))).shape[1] <= 2000
+    with pytest.raises(SettingError, match=f"degree: got {degree} for states of {most + 1} columns, which have more"):
+        Polynomial(degree)(np.ones((1, most + 1)))
+
+
+def test_wide_states_are_refused_before_any_memory_is_taken():
+    with pytest.raises(SettingError, match=r"Take a lower degree, fewer columns, or a LocallyLinearPolicy\."):
+        ParametricPolicy(Polynomial(3)).fit(np.ones((2, 8000)), np.ones((2, 2)))
+
+
+@pytest.mark.parametrize("degree", [0, -1, 1.5, "2", None])
+def test_a_degree_is_a_whole_number_above_zero(degree):
+    with pytest.raises(SettingError, match=r"degree: got .*, expected a whole number of at least 1"):
+        Polynomial(degree)
+
+
+def test_the_degree_is_a_setting_to_search_over():
+    policy = ParametricPolicy(Polynomial()).set_params(features__degree=3)
+    assert policy.get_params()["features__degree"] == 3
+    assert policy.features(states()).shape == (40, 10)
 
 
 # Normalised RBFs

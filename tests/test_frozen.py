@@ -47,5 +47,5 @@ def test_stored_policies_act_as_they_did(found, kind, learner):
     name = f"{kind}-{learner}"
     with threadpool_limits(1):
         actions = uc.load(FOLDER / f"{name}.npz")(PROBES)
-    assert_as_before(f"actions of {name}.npz", actions, found[f"{name}-actions"], EXACT)
+    assert_as_before(f"actions of {name}.npz", actions, found[f"{name}.npz"], EXACT)
     assert uc.storage.load_notes(FOLDER / f"{name}.npz") == {"recipe": {"states": ["x", "y"]}}

@@ -177,10 +177,12 @@ def test_support_tells_how_far_from_the_data_a_state_is(data):
         assert far < 1e-12
 
 
-def test_features_without_a_place_have_no_support(data):
-    policy = uc.ParametricPolicy(uc.Affine()).fit(data.states, data.actions)
-    with pytest.raises(SettingError, match=r"support: Affine has no support\(states\)"):
+@pytest.mark.parametrize("features", [uc.Affine(), uc.Polynomial()])
+def test_features_without_a_place_have_no_support_and_no_roughness(data, features):
+    policy = uc.ParametricPolicy(features).fit(data.states, data.actions)
+    with pytest.raises(SettingError, match=rf"support: {type(features).__name__} has no support\(states\)"):
         policy.support(data.states)
+    assert_array_equal(policy.training_.model.roughness(1, 6), np.zeros((1, 6, 6)))
 
 
 def test_centres_may_be_given(data):
@@ -245,7 +247,7 @@ class NoFeatures:
         (
             uc.ParametricPolicy(NoFeatures()),
             SettingError,
-            r"features: got NoFeatures\(\), expected a function of states",
+            r"features: got NoFeatures\(\), expected 'auto' or a function of states",
         ),
         (uc.ParametricPolicy(lambda x: x[:, 0]), SettingError, r"features: got an array of shape \(1,\) for 1 states"),
         (
@@ -282,7 +284,7 @@ def test_settings_that_do_not_fit_the_data_are_named(policy, error, sentence, da
         ({"y": None}, "requires y to be passed, but the target y is None"),
         ({"sample_weight": np.ones(89)}, "sample_weight: got 89 values, expected 90"),
         ({"sample_weight": -np.ones(90)}, "sample_weight: got -1.0 at row 0"),
-        ({"sample_weight": np.zeros(90)}, "sample_weight: all weights are zero, expected at least one that counts"),
+        ({"sample_weight": np.zeros(90)}, "got no sample that counts: there is none, or all weights are zero"),
         ({"groups": [1, 2]}, r"groups: got an array of shape \(2,\), expected 90"),
     ],
 )
@@ -330,7 +332,7 @@ def test_speed_power_is_a_sample_weight():
     demos = uc.rollout(LimitCycle(), [[0.1, 0.9], [0.5, -0.5], [-1.0, 0.2]], 30, 0.05)
     states, actions, groups = uc.stack(demos)
     weighted = uc.LocallyLinearPolicy().fit_demonstrations(demos, speed_power=2.0)
-    by_hand = uc.LocallyLinearPolicy().fit(states, actions, (actions**2).sum(axis=1), groups)
+    by_hand = uc.LocallyLinearPolicy(learner=uc.Hybrid()).fit(states, actions, (actions**2).sum(axis=1), groups)
     assert_allclose(weighted.predict(states), by_hand.predict(states), rtol=1e-6, atol=1e-9)
 
 

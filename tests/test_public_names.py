@@ -62,6 +62,7 @@ ROOMS = {
         "robust": "learners.robust",
         "storage": "storage",
         "systems": "paper.systems",
+        "writers": "recordings.writers",
     }.items()
 }
 

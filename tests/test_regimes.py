@@ -1,5 +1,6 @@
 """The benchmark of regimes: its rows, its summary, its page."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -84,9 +85,12 @@ def test_only_where_some_samples_are_free_and_some_not_are_they_told_apart(resul
 
 
 def test_95_percent_intervals_hold_about_that(result):
-    held = [row["coverage_mean"] for row in result.rows if row["method"] == regimes.DEFAULT]
-    assert len(held) == 4
-    assert 0.85 < min(held) < max(held) < 0.99
+    held = {noise: [] for noise in result.settings.noise}
+    for row in result.rows:
+        if row["method"] == regimes.DEFAULT:
+            held[row["noise"]].append(row["coverage_mean"])
+    assert 0.85 < min(held[0.05]) < max(held[0.05]) < 0.99
+    assert min(held[0.0]) > 0.85  # no model is trusted to be as exact as it is there
 
 
 def test_with_known_constraints_linear_policies_are_recovered():
@@ -137,6 +141,11 @@ def test_headlines_say_each_noise_level(result):
     said = regimes.headlines(result)
     assert sum(line.startswith("noise ") for line in said) == 2
     assert "95 % intervals of robust" in said[-1]
+
+
+def test_its_headlines_are_shown_beside_the_recorded_movements(result, tmp_path):
+    (tmp_path / "regimes.json").write_text(json.dumps(result.to_json()))
+    assert commands._beside("recorded", tmp_path) == [f"regimes, {line}" for line in regimes.headlines(result)]
 
 
 def test_the_page_has_a_picture_for_each_noise_and_the_numbers_of_the_summary(result, browser, tmp_path):

@@ -302,4 +302,4 @@ def test_constrained_error_is_the_naive_sum():
             w * (N @ u - N @ p) @ (N @ u - N @ p)
             for u, p, w in zip(data.actions[rows], predicted[rows], samples.memberships[rows, 0], strict=True)
         )
-    assert_allclose(constrained_error(samples, labels, 0.2)(vec(weights)), expected)
+    assert_allclose(constrained_error(samples, labels, np.full(30, 0.2**2))(vec(weights)), expected)

@@ -116,7 +116,7 @@ def test_a_loaded_policy_takes_another_learner(policy_of, learner, data, tmp_pat
 )
 def test_demonstrations_keep_their_folds_whatever_they_are_called(names, data, tmp_path):
     groups = names[data.groups]
-    policy = uc.ParametricPolicy(uc.Affine(), validation=uc.Folds(3, by="demonstration"))
+    policy = uc.ParametricPolicy(uc.Affine(), uc.Hybrid(), validation=uc.Folds(3, by="demonstration"))
     policy.fit(data.states, data.actions, groups=groups)
     loaded = saved(policy, tmp_path)
     for one in (policy, loaded):  # the same demonstrations again, in another order
@@ -125,7 +125,7 @@ def test_demonstrations_keep_their_folds_whatever_they_are_called(names, data, t
 
 
 def test_a_policy_of_one_action_stays_flat(data, tmp_path):
-    policy = uc.ParametricPolicy(uc.Affine()).fit(data.states, data.actions[:, 0])
+    policy = uc.ParametricPolicy(uc.Affine(), uc.Hybrid()).fit(data.states, data.actions[:, 0])
     loaded = saved(policy, tmp_path)
     assert loaded.predict(STATES).shape == (40,)
     assert_array_equal(loaded.predict(STATES), policy.predict(STATES))
@@ -147,7 +147,7 @@ def test_a_policy_that_has_learnt_nothing_can_be_stored(tmp_path):
 
 def test_names_of_columns_come_back(data, tmp_path):
     table = pd.DataFrame(data.states, columns=["x", "y"])
-    policy = uc.ParametricPolicy(uc.Affine()).fit(table, data.actions)
+    policy = uc.ParametricPolicy(uc.Affine(), uc.Hybrid()).fit(table, data.actions)
     loaded = saved(policy, tmp_path)
     assert list(loaded.feature_names_in_) == ["x", "y"]
     assert_array_equal(loaded.predict(table), policy.predict(table))
@@ -587,7 +587,7 @@ whole, where = np.savez_compressed, sys.argv[2]
 if where == "half": np.savez_compressed = half
 if where == "fsync": os.fsync = stop
 states = np.random.default_rng(1).uniform(-1, 1, (50, 2))
-uc.save(uc.ParametricPolicy(uc.Affine()).fit(states, 3 * states), sys.argv[1])
+uc.save(uc.ParametricPolicy(uc.Affine(), uc.Hybrid()).fit(states, 3 * states), sys.argv[1])
 """
 
 

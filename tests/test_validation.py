@@ -99,12 +99,29 @@ def test_states_far_outside_the_first_batch_still_have_a_fold():
 # Demonstrations
 
 
-def test_demonstrations_are_dealt_in_turn_as_they_are_first_seen():
-    states, groups = spread(6), ["c", "a", "c", "b", "d", "a"]
-    split = splitter(Folds(3), states, groups)
-    assert_array_equal(split.assign(states, groups), [0, 1, 0, 2, 0, 1])
-    later = ["e", "b", "a"]
-    assert_array_equal(split.seeing(later).assign(states[:3], later), [1, 2, 1])
+def test_demonstrations_at_first_look_are_dealt_in_turn():
+    states, groups = spread(60), np.arange(60) % 11
+    folds = splitter(Folds(3), states, groups).assign(states, groups)
+    assert all(np.ptp(folds[groups == name]) == 0 for name in range(11))
+    assert sorted(np.bincount([folds[groups == name][0] for name in range(11)])) == [3, 4, 4]
+
+
+def test_demonstrations_that_come_later_are_dealt_as_they_come():
+    split = splitter(Folds(3), np.array([[0.0], [1.0]]), ["b", "a"])
+    later = ["d", "c", "a", "d"]
+    folds = split.seeing(later).assign(np.zeros((4, 1)), later)
+    assert_array_equal(folds, [2, 0, split.fold_of["a"], 2])
+
+
+@given(st.permutations(range(7)), st.floats(1e-9, 1e9), st.integers(0, 2**32 - 1))
+def test_neither_order_nor_names_nor_units_deal_demonstrations_otherwise(order, unit, seed):
+    rng = np.random.default_rng(seed)
+    states, actions, groups = rng.normal(size=(28, 2)), rng.normal(size=(28, 3)), np.arange(28) % 7
+    split = Split.begin(Folds(3), FirstLook.at(Batch(states, actions, None, groups)))
+    rows = rng.permutation(28)
+    moved, named = unit * states[rows] + 5 * unit, np.array(order)[groups[rows]]
+    other = Split.begin(Folds(3), FirstLook.at(Batch(moved, unit * actions[rows], np.full(28, unit), named)))
+    assert_array_equal(other.assign(moved, named), split.assign(states, groups)[rows])
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,7 @@ from .models import ClosedForm as ClosedForm
 from .models import KMeansRBF as KMeansRBF
 from .models import Model as Model
 from .models import NormalisedRBF as NormalisedRBF
+from .models import Polynomial as Polynomial
 from .models import ReceptiveFields as ReceptiveFields
 from .models import cover as cover
 from .motion import Contained as Contained
@@ -51,6 +52,7 @@ from .recordings import prepare as prepare
 from .recordings import read as read
 from .recordings import readers as readers
 from .recordings import stack as stack
+from .recordings import writers as writers
 from .risks import Moments as Moments
 from .risks import Quadratic as Quadratic
 from .risks import action_projection as action_projection

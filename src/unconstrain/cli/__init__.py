@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -17,10 +17,11 @@ import unconstrain as uc
 from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainError
 from ..base.files import write
 from ..paper import experiments
+from .converting import convert
 from .diagnosing import diagnose
 from .fitting import MODELS, alpha_of, check_writable, default_learner, learn, learner_of, policy_of
-from .printing import Group, number, print_table, say_fit
-from .reading import complete, numbers, options_for_reading, recipe_of, roles_of, said_recipe, stream_of
+from .printing import Group, keep_codes, print_table, refuse_warnings, say_fit, say_surveys
+from .reading import complete, numbers, options_for_reading, reading_of, recipe_of, said_recipe, stream_of
 
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
 
@@ -43,50 +44,50 @@ def main() -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     """Describe each FILE: columns, rate, gaps, zero actions."""
-    recipe = recipe_of(**reading)
-    surveys, first = [], None
-    for path in uc.readers.expand(files):
-        for recording in uc.readers.read_blocks(path, whole=True, **roles_of(**reading)):
-            surveys.append(uc.preparation.survey(recording, recipe))
-            first = replace(recording, values=recording.values[:1], times=None) if first is None else first
+    recipe, first = recipe_of(**reading), list[uc.Recording]()
+
+    def recordings() -> Iterator[uc.Recording]:
+        for path in uc.readers.expand(files):
+            for recording in uc.readers.read_blocks(path, reading_of(**reading), whole=True):
+                if recording.name not in reading["leave_out"]:
+                    first[:] = first or [recording]
+                    yield recording
+
+    surveys = uc.preparation.survey_set(recordings(), recipe)
     names = uc.readers.unique_names(found.name for found in surveys)
     surveys = [replace(found, name=name) for found, name in zip(surveys, names, strict=True)]
+    keep_codes(remark.code for found in surveys for remark in found.warnings)
     if as_json:
-        click.echo(json.dumps([asdict(found) for found in surveys], indent=2))
-        return
-    rows = [
-        [
-            found.name,
-            str(found.samples),
-            number(found.duration_s, "{:.2f} s"),
-            number(found.rate_hz, "{:.1f} Hz"),
-            number(found.jitter, "{:.1%}"),
-            "; ".join(f"{gap.length:.2f} s at {gap.start:.2f} s" for gap in found.gaps[:3])
-            + (f" and {len(found.gaps) - 3} more" if len(found.gaps) > 3 else "")
-            or "none",
-            ", ".join(f"{name}: {count}" for name, count in found.missing.items()) or "none",
-            number(found.zero_actions, "{}"),
+        plain = [
+            asdict(found)
+            | {
+                "warnings": [one._asdict() for one in found.warnings],
+                "notes": [one._asdict() for one in found.notes],
+            }
+            for found in surveys
         ]
-        for found in surveys
-    ]
-    print_table(["demonstration", "samples", "length", "rate", "jitter", "gaps", "missing", "zero actions"], rows)
-    for columns in dict.fromkeys(found.columns for found in surveys):
-        click.echo(f"columns: {', '.join(columns)}")
-    for found in surveys:
-        if found.non_increasing:
-            click.echo(f"'{found.name}': time does not increase at row {found.non_increasing[0]}.")
-    if first is None:
-        raise ReadError(f"{', '.join(files)}: holds no recording.")
-    try:
-        click.echo(f"fit uses {said_recipe(complete(recipe, first))}.")
-    except UnconstrainError as error:
-        click.echo(f"fit needs to know more: {error}")
+        click.echo(json.dumps(plain, indent=2))
+    else:
+        say_surveys(surveys)
+        if not first:
+            raise ReadError(f"{', '.join(files)}: holds no recording.")
+        try:
+            click.echo(f"fit uses {said_recipe(complete(recipe, first[0]), first[0])}.")
+        except UnconstrainError as error:
+            click.echo(f"fit needs to know more: {error}")
+    refuse_warnings(reading["strict"])
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain fit wipe_*.csv --state x,y,z --differentiate -o wipe.npz")
 @options_for_reading
 @click.option("-o", "--output", required=True, type=click.Path(dir_okay=False), help="File for the policy (.npz).")
-@click.option("--model", type=click.Choice(MODELS), default="local", show_default=True, help="Model of the policy.")
+@click.option(
+    "--model",
+    type=click.Choice(MODELS),
+    default="local",
+    show_default=True,
+    help="Model of the policy; auto takes the one of least estimated error.",
+)
 @click.option("--learner", type=click.Choice(LEARNERS), help="Learner; by default robust, or hybrid on much data.")
 @click.option("--variance", type=float, help="Local: σ² of the receptive fields. By default from the data.")
 @click.option("--centres", type=click.IntRange(1), help="RBF: number of kernels, 25 by default.")
@@ -139,10 +140,11 @@ def fit(
     fitted = policy_of(model, variance, centres, **chosen)
     stream = stream_of(paths, speed_power, **reading)
     learn(fitted, stream, scheduler)
-    notes = {"recipe": stream.recipe.to_dict(), **roles_of(**reading)}
-    uc.save(fitted, output, notes)
-    click.echo(f"Learnt from {said_recipe(stream.recipe)}.")
+    notes = {"recipe": stream.recipe.to_dict(), **reading_of(**reading).roles}
+    click.echo(f"Learnt from {said_recipe(stream.recipe, stream.first)}.")
     say_fit(fitted, stream if scheduler is None else None, learner)
+    refuse_warnings(reading["strict"])
+    uc.save(fitted, output, notes)
     click.echo(f"policy: {output}")
     if report is not None:
         from ..pages.fit import policy_page
@@ -163,7 +165,7 @@ def score(policy: str, files: Sequence[str], plane: tuple[float, ...] | None, as
     """
     learnt, notes = _fitted(policy), uc.storage.load_notes(policy)
     recipe = uc.Recipe.from_dict(notes.get("recipe", {}))
-    recordings = uc.read(files, **roles_of(**notes))
+    recordings = uc.read(files, **reading_of(**notes).roles)
     demonstrations = uc.prepare(recordings, recipe)
     constraint = _plane(plane, learnt.n_outputs_, "one for each action")
 
@@ -207,7 +209,7 @@ def rollout(
     states = recipe.get("states") or [f"x{i + 1}" for i in range(len(start))]
     try:
         support = learnt.support(path.states)
-    except SettingError:  # an affine policy has no support
+    except SettingError:  # an affine or polynomial policy has no support
         support = None
     table = _csv(["t", *states, *(f"v{name}" for name in states)], path)
     if output == "-":
@@ -242,7 +244,11 @@ def export(policy: str, output: str, name: str | None) -> None:
 @click.argument("experiment", type=click.Choice(experiments.NAMES))
 @click.option("--trials", type=click.IntRange(1), help="Data sets; the paper's number by default.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of all random numbers.")
-@click.option("--only", multiple=True, help="Of regimes: a system, a constraint, or both, such as 'limit cycle, half'.")
+@click.option(
+    "--only",
+    multiple=True,
+    help="Of regimes: a system, a constraint, or both, such as 'limit cycle, half'. Of recorded: a kind of data.",
+)
 @click.option(
     "--workers", type=int, default=-1, help="Processes; one for each core by default. The numbers do not depend on it."
 )
@@ -296,6 +302,7 @@ def doctor(as_json: bool) -> None:
     click.echo("Everything is there." if not missing else f"{missing} of {len(found)} are missing something.")
 
 
+main.add_command(convert)
 main.add_command(diagnose)
 
 

@@ -13,15 +13,21 @@ import unconstrain as uc
 
 from ..base.files import write
 from .fitting import MODELS, check_writable, policy_of
-from .printing import print_table
-from .reading import complete, options_for_reading, recipe_of, roles_of, said_recipe
+from .printing import print_table, refuse_warnings, say
+from .reading import complete, options_for_reading, reading_of, recipe_of, said_recipe
 
 MOST_ROWS = 8
 
 
 @click.command(epilog="\b\nExample:\n  unconstrain diagnose wipe_*.csv --state x,y,z --by savgol -o a.html")
 @options_for_reading
-@click.option("--model", type=click.Choice(MODELS), default="local", show_default=True, help="Model of the policy.")
+@click.option(
+    "--model",
+    type=click.Choice(MODELS),
+    default="local",
+    show_default=True,
+    help="Model of the policy; auto takes the one of least estimated error.",
+)
 @click.option("--variance", type=float, help="Local: σ² of the receptive fields. By default from the data.")
 @click.option("--centres", type=click.IntRange(1), help="RBF: number of kernels, 25 by default.")
 @click.option("-o", "--report", type=click.Path(dir_okay=False), help="Also write an HTML page there.")
@@ -41,17 +47,22 @@ def diagnose(
     """
     paths = uc.readers.expand(files)
     check_writable((report,), paths)
-    recordings = uc.read(paths, **roles_of(**reading))
+    every = uc.read(paths, **reading_of(**reading).arguments)
+    recordings = [one for one in every if one.name not in reading["leave_out"]]
     recipe = complete(recipe_of(**reading), recordings[0])
     demonstrations = uc.prepare(recordings, recipe)
     policy = policy_of(model, variance, centres, learner=uc.Robust()).fit_demonstrations(demonstrations)
     found = uc.evaluation.diagnose(policy, demonstrations)
+    missed = 1.0 - policy.score(*uc.stack(demonstrations)[:2])
+    say(uc.preparation.doubts(len(demonstrations), missed), "diagnose")
+    refuse_warnings(reading["strict"])
     states = recipe.states or ()
     actions = recipe.actions or tuple(f"v{name}" for name in states)
     if as_json:
         click.echo(json.dumps(found.to_json() | {"states": states, "actions": actions}, indent=2))
     else:
-        click.echo(f"{len(demonstrations)} demonstrations, {len(found.undetermined)} samples; {said_recipe(recipe)}.")
+        used = said_recipe(recipe, recordings[0])
+        click.echo(f"{len(demonstrations)} demonstrations, {len(found.undetermined)} samples; {used}.")
         _say(found, states, actions)
     if report is not None:
         from ..pages.diagnosis import diagnosis_page

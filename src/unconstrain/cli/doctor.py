@@ -9,6 +9,7 @@ from typing import NamedTuple
 EXTRAS = {
     "viz": ("figures and reports", ("plotly", "jinja2", "matplotlib")),
     "data": ("Parquet, HDF5, public recordings", ("pyarrow", "h5py", "pooch")),
+    "formats": ("ROS and Excel files", ("rosbags", "python-calamine")),
     "arm": ("arms from URDF files", ("yourdfpy",)),
     "sim": ("wiping with contact", ("mujoco", "mink", "pillow")),
     "onnx": ("export to ONNX", ("onnx", "onnxruntime")),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,7 +12,16 @@ import unconstrain as uc
 
 from ..base.errors import SettingError
 
-MODELS = ("local", "rbf", "linear")
+MODELS: dict[str, Callable[..., uc.Policy]] = {
+    "local": lambda variance=None, **chosen: uc.LocallyLinearPolicy(variance, **chosen),
+    "rbf": lambda centres=25, **chosen: uc.ParametricPolicy(uc.KMeansRBF(centres), **chosen),
+    "auto": lambda **chosen: uc.ParametricPolicy("auto", **chosen),
+    "affine": lambda **chosen: uc.ParametricPolicy(uc.Affine(), **chosen),
+    "quadratic": lambda **chosen: uc.ParametricPolicy(uc.Polynomial(2), **chosen),
+    "cubic": lambda **chosen: uc.ParametricPolicy(uc.Polynomial(3), **chosen),
+    "linear": lambda **chosen: uc.ParametricPolicy(uc.Affine(), **chosen),  # the former name of "affine"
+}
+"""Policies by name, of settings of their own and of what every policy has: learner and validation."""
 
 MUCH = 200_000_000
 """Bytes of data above which samples are not kept in memory, and the default learner is the hybrid."""
@@ -75,13 +84,12 @@ def check_writable(outputs: Sequence[str | None], paths: Sequence[str | Path]) -
 
 def policy_of(model: str, variance: float | None, centres: int | None, **chosen: Any) -> uc.Policy:
     """Make the policy of the options."""
-    for option, value, needed in (("--variance", variance, "local"), ("--centres", centres, "rbf")):
+    for option, value, needed in (("variance", variance, "local"), ("centres", centres, "rbf")):
         if value is not None and model != needed:
-            raise SettingError(f"{option}: belongs to --model {needed}, got --model {model}.")
-    if model == "local":
-        return uc.LocallyLinearPolicy(variance, **chosen)
-    shape = uc.KMeansRBF(centres or 25) if model == "rbf" else uc.Affine()
-    return uc.ParametricPolicy(shape, **chosen)
+            raise SettingError(f"--{option}: belongs to --model {needed}, got --model {model}.")
+        if value is not None:
+            chosen[option] = value
+    return MODELS[model](**chosen)
 
 
 def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None) -> None:

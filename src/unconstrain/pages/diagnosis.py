@@ -79,6 +79,7 @@ def _tiles(found: Diagnosis, demos: list[Demonstration]) -> html.Markup:
             (f"{found.states_determined:.0%}", "of the recorded states determined"),
             (f"{found.directions_determined:.0%}", f"of {found.directions} weight directions determined"),
             (f"{found.free_share:.0%}", "of the samples free"),
+            (f"{found.undecided_share:.0%}", "of the samples free or always held in the same way"),
         ]
     )
 
@@ -155,10 +156,11 @@ def _freedom(found: Diagnosis) -> html.Markup:
 
 
 def _chosen(found: Diagnosis) -> html.Markup:
-    if not found.compared:
+    if not found.candidates:
         return html.paragraph(f"Nothing was compared with the policy, which was learnt as {found.method}.")
     rows = [
-        [name, html.number(times), "yes" if name == found.method else "no"] for name, times in found.compared.items()
+        [name, html.number(risk), "yes" if name == found.method else "no"]
+        for name, risk in sorted(found.candidates.items(), key=lambda one: one[1])
     ]
     note = html.words("diagnosis_chosen")
-    return html.table(["candidate", "held-out inconsistency, ratio", "taken"], rows, note=note)
+    return html.table(["candidate", "estimated squared error", "taken"], rows, note=note)

@@ -1,0 +1,178 @@
+"""What is determined, what is free, and how far the truth may be: what the data shows, not what the prior says."""
+
+from functools import cache
+from itertools import combinations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import unconstrain as uc
+from unconstrain.evaluation.diagnosis import diagnose, sentences
+from unconstrain.learners.robust.evidence import surely
+
+TURN = np.array([[-0.3, -1.5, 0.4], [1.5, -0.3, -0.6], [-0.4, 0.6, -0.3]])
+SHIFT = np.array([0.4, -0.3, 0.5])
+ALIKE = np.array([0.3, -0.2, 1.0])
+
+
+def wanted(states):
+    """A policy that turns about an axis of its own, so that its motion spans all three directions."""
+    return states @ TURN.T + SHIFT
+
+
+@cache
+def movements(normals, noise=0.05, seed=1):
+    """One demonstration for each normal of a plane, or without a constraint where that is None."""
+    rng = np.random.default_rng(seed)
+    demos = []
+    for index, normal in enumerate(normals):
+        constraint = None if normal is None else uc.constraints.Plane(np.array(normal))
+        demo = uc.rollout(wanted, rng.uniform(-1, 1, 3), 60, 0.05, constraint, name=f"d{index}")
+        noisy = demo.actions + noise * rng.standard_normal(demo.actions.shape)
+        demos.append(uc.Demonstration(demo.states, noisy, demo.times, name=demo.name))
+    return demos
+
+
+@cache
+def learnt(normals, noise=0.05, seed=1):
+    """An affine policy of :func:`movements`: twelve directions of the weights."""
+    return uc.ParametricPolicy(uc.Affine(), uc.Robust()).fit_demonstrations(movements(normals, noise, seed))
+
+
+def planes(count, seed=1):
+    """Normals drawn at random."""
+    return tuple(map(tuple, np.random.default_rng(seed).standard_normal((count, 3))))
+
+
+FREE = (None,) * 8
+ONE_PLANE = (tuple(ALIKE),) * 8
+BUT_ONE = (*ONE_PLANE[:3], (1.0, 0.5, -0.3), *ONE_PLANE[4:])
+
+
+def along(policy, states, normal):
+    """Error of the policy along a direction, and its standard deviation as the policy says, each (N,)."""
+    normal = normal / np.linalg.norm(normal)
+    spread = np.sqrt(np.einsum("a,nab,b->n", normal, policy.covariances(states), normal))
+    return np.abs((policy(states) - wanted(states)) @ normal), spread
+
+
+class TestDetermined:
+    def test_free_motion_in_all_directions_determines_all_and_is_called_free(self):
+        solution = learnt(FREE).solution_
+        assert solution.determined == [12]
+        assert solution.free_share > 0.9
+        assert solution.free.mean() > 0.9
+
+    def test_planes_at_random_determine_all(self):
+        solution = learnt(planes(12)).solution_
+        assert solution.determined == [12]
+        assert solution.free_share < 0.2
+
+    @pytest.mark.parametrize("noise", [0.0, 0.05, 0.1])
+    def test_what_is_normal_to_the_plane_of_all_is_not_determined_whatever_the_noise(self, noise):
+        assert 8 - (noise == 0.0) <= learnt(ONE_PLANE, noise).solution_.determined[0] <= 8
+
+    def test_nor_is_what_one_demonstration_shows_alone(self):
+        assert learnt(BUT_ONE).solution_.determined == [8]
+        tilted = tuple(map(tuple, ALIKE + np.random.default_rng(3).standard_normal((12, 3))))
+        assert learnt(tilted).solution_.determined == [12]
+
+    def test_two_demonstrations_determine_nothing_surely(self):
+        policy = learnt(planes(2))
+        assert policy.solution_.determined == [0]
+        spread = policy.uncertainty(uc.stack(movements(planes(2))).states)
+        assert (spread.undetermined > spread.from_noise).all()
+
+
+class TestFree:
+    def test_what_may_have_been_held_in_the_same_way_is_not_called_free(self):
+        solution = learnt(ONE_PLANE).solution_
+        assert solution.free_share == 0.0
+        assert solution.free.max() <= 0.5
+        assert solution.belief.undecided_share > 0.8  # though every sample looks free
+
+    def test_of_truly_free_data_next_to_nothing_is_undecided(self):
+        assert learnt(FREE).solution_.belief.undecided_share < 0.1
+
+    def test_one_recording_cannot_tell(self):
+        [demo] = movements((None,))
+        solution = uc.ParametricPolicy(uc.Affine(), uc.Robust()).fit_demonstrations([demo]).solution_
+        assert solution.free_share == 0.0
+        assert solution.free.max() <= 0.5
+
+
+class TestIntervals:
+    def test_along_what_nobody_showed_they_hold_the_truth(self):
+        states = uc.stack(movements(ONE_PLANE)).states
+        missed, spread = along(learnt(ONE_PLANE), states, ALIKE)
+        assert np.mean(missed <= 1.96 * spread) > 0.85
+        assert missed.mean() > 0.1  # there is something to hold
+
+    def test_they_are_narrow_in_the_plane_that_all_showed(self):
+        states = uc.stack(movements(ONE_PLANE)).states
+        _, across = along(learnt(ONE_PLANE), states, np.cross(ALIKE, [1.0, 0.0, 0.0]))
+        _, normal = along(learnt(ONE_PLANE), states, ALIKE)
+        assert np.median(across) < 0.05 * np.median(normal)
+
+    def test_where_determined_they_hold_the_truth_and_are_no_wider_than_they_must_be(self):
+        shares, widths = [], []
+        for seed in range(1, 7):
+            states = uc.stack(movements(planes(8, seed), 0.1, seed)).states
+            policy = learnt(planes(8, seed), 0.1, seed)
+            spread, missed = policy.uncertainty(states), np.abs(policy(states) - wanted(states))
+            known = spread.undetermined < spread.from_noise
+            shares.append(np.mean((missed <= 1.96 * spread.total)[known]) if known.any() else np.nan)
+            widths.append(np.median(spread.total) / np.sqrt(np.mean(missed**2)))
+        assert 0.8 <= np.nanmean(shares) <= 1.0
+        assert np.median(widths) < 6.0  # most of it is what is undetermined
+
+
+class TestWithoutAnyTwo:
+    def test_of_diagonal_parts_it_is_what_exceeds_without_the_two_largest(self):
+        rng = np.random.default_rng(0)
+        sizes = rng.exponential(1.0, (6, 8))
+        least = float(np.median(np.sort(sizes, axis=0)[:-2].sum(axis=0)))
+        basis = surely(np.stack([np.diag(one) for one in sizes]), least)
+        kept = np.sort(sizes, axis=0)[:-2].sum(axis=0) > least
+        assert_allclose(basis @ basis.T, np.diag(kept.astype(float)), atol=1e-12)
+
+    def test_every_rest_exceeds_along_what_is_kept(self):
+        rng = np.random.default_rng(1)
+        roots = rng.standard_normal((7, 5, 3))
+        parts = roots @ roots.swapaxes(1, 2)
+        basis = surely(parts, 2.0)
+        assert 0 < basis.shape[1] < 5
+        for left_out in combinations(range(7), 2):
+            rest = parts.sum(axis=0) - parts[list(left_out)].sum(axis=0)
+            assert np.linalg.eigvalsh(basis.T @ rest @ basis).min() > 2.0
+
+    def test_without_two_of_two_nothing_is_left(self):
+        assert surely(np.stack([np.eye(3)] * 2), 0.0).shape == (3, 0)
+
+
+class TestWords:
+    @staticmethod
+    def said(normals):
+        found = diagnose(learnt(normals), movements(normals))
+        return found, " ".join(sentences(found, ["x", "y", "z"], ["vx", "vy", "vz"]))
+
+    def test_one_plane_for_all(self):
+        found, said = self.said(ONE_PLANE)
+        assert "Nothing was ever seen along" in said
+        assert "4 of its 12 weights' directions" in said
+        assert "were free or always held in the same way" in said
+        assert "0 look free" in said
+        assert abs(np.dot(found.regions[0].direction, ALIKE) / np.linalg.norm(ALIKE)) > 0.95
+
+    def test_what_one_demonstration_shows_alone(self):
+        found, _ = self.said(BUT_ONE)
+        shown = {one.shown_by for one in found.regions}
+        assert ("d3",) in shown
+        worst = next(one for one in found.regions if one.shown_by == ("d3",))
+        assert abs(np.dot(worst.direction, ALIKE) / np.linalg.norm(ALIKE)) > 0.9
+
+    def test_free_motion(self):
+        _, said = self.said(FREE)
+        assert "held in the same way" not in said
+        assert "8 look free" in said
