@@ -5,6 +5,8 @@ Where none is named, a value was set by hand while the learners were developed o
 Shares of "the actions" are shares of their root-mean-square length.
 """
 
+import numpy as np
+
 # Noise
 
 DIFFERENCE_ORDER = 4
@@ -124,6 +126,20 @@ and 88 % under turning planes (four each, where determined); with a half 98.3, 9
 
 VARIANCE_ROUNDS = 8
 """Rounds of reweighted least squares for the two components of the residual variance."""
+
+LIKE_CONSTRAINTS = np.radians(25.0)
+"""Demonstrations whose directions of least motion are all within this angle are held out together.
+
+On ten recorded bouts of wiping under four tilts, each tilt new to what the others taught, nCPE was 0.85 times that of
+direct learning with 15, 25 and 35 degrees, and 0.98 times where bouts were held out one by one. On 30 data sets of six
+other kinds the geometric means changed by -5 to 2 %.
+"""
+
+SHARE_ALONG_HELD = 0.05
+"""A demonstration was held where less than this share of its squared motion is along the direction of least motion."""
+
+LEAST_CONSTRAINTS = 3
+"""With fewer clusters of them, demonstrations are held out one by one."""
 
 BLOCKS_IN_A_FOLD = 4
 """Stretches of consecutive samples in each fold, where demonstrations are not told apart."""

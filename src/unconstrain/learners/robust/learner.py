@@ -20,7 +20,8 @@ from .belief import solution, weak_prior
 from .candidate import Candidate
 from .choice import Comparison
 from .consistent import by_segments, noise_corrected
-from .constants import BLOCKS_IN_A_FOLD, LEAST_INFORMATIVE, LEAST_MISFIT, SPHERE_HIDDEN_BY_NOISE
+from .constants import LEAST_INFORMATIVE, LEAST_MISFIT, SPHERE_HIDDEN_BY_NOISE
+from .held_out import held_out_together
 from .likelihood import maximise
 from .noise import noise_by_differences, noise_of_each
 from .posterior import Posterior
@@ -50,7 +51,7 @@ class SampleLearner(Learner):
         return replace(found, belief=replace(found.believed, suspects=suspects))
 
     def _learnt(self, training: Training, everything: Samples) -> Solution:
-        samples = in_blocks(everything.counted)
+        samples = held_out_together(everything.counted)
         if _trivial(samples):
             found = _plain(training, samples, everything)
         else:
@@ -238,7 +239,7 @@ class Robust(_Maximising):
         first = list(_first(seen))
         keeping = {name: replace(one, batches=(), most=None) for name, one in begun.items()}
         trainings = {name: one.with_batches(first) for name, one in keeping.items()}
-        samples = {name: in_blocks(one.samples.counted) for name, one in trainings.items()}
+        samples = {name: held_out_together(one.samples.counted) for name, one in trainings.items()}
         any_ = next(iter(samples.values()))
         if _trivial(any_):
             return next(iter(samples))
@@ -257,15 +258,6 @@ def _first(batches: Iterable[Batch]) -> Iterator[Batch]:
         room -= batch.states.shape[0]
         if room <= 0:
             return
-
-
-def in_blocks(samples: Samples) -> Samples:
-    """With neighbours in the same fold where demonstrations are not told apart: they say nearly the same."""
-    if samples.groups.max() > 0:
-        return samples
-    count = min(int(samples.folds.max()) + 1, len(samples))
-    blocks = min(BLOCKS_IN_A_FOLD * count, len(samples))
-    return replace(samples, folds=np.arange(len(samples)) * blocks // len(samples) % count)
 
 
 def _most_noise(samples: Samples) -> float:
