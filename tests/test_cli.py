@@ -312,7 +312,7 @@ def test_a_cluster_computes_no_samples(files, tmp_path):
 
 
 @pytest.mark.parametrize("learner", cli.LEARNERS)
-@pytest.mark.parametrize("model", cli.MODELS)
+@pytest.mark.parametrize("model", fitting.MODELS)
 def test_each_model_takes_each_learner(files, tmp_path, model, learner):
     said = run("fit", *files, "--model", model, "--learner", learner, "-o", tmp_path / "p.npz")
     assert ("local models" in said) == (model == "local")

@@ -16,7 +16,7 @@ from unconstrain.paper import pages as report
 from unconstrain.paper.datasets.files import DATA_VARIABLE
 from unconstrain.paper.experiments import recorded
 from unconstrain.paper.experiments.recorded import judging, movements, simulated, summary
-from unconstrain.paper.experiments.recorded.sets import KINDS, RECORDED, SIMULATED, _auto_is_known, described
+from unconstrain.paper.experiments.recorded.sets import KINDS, RECORDED, SIMULATED, described
 
 FOLDERS = ("lasa_handwriting", "libras_hand", "kuleuven_contour", "lasa_rim_wiping")
 needs_movements = pytest.mark.skipif(
@@ -24,7 +24,7 @@ needs_movements = pytest.mark.skipif(
     reason=f"not all recorded movements are in {DATA}; set UNCONSTRAIN_DATA to a folder that holds them",
 )
 TWELVE = ("recorded, half free", "recorded, shuffled inside", "two demonstrations", "one plane for all")
-DRAWN = [kind for kind in KINDS if kind != "CaPL, auto" or _auto_is_known()]
+DRAWN = KINDS
 
 
 @pytest.fixture(autouse=True)

@@ -19,7 +19,7 @@ from ..base.files import write
 from ..paper import experiments
 from .converting import convert
 from .diagnosing import diagnose
-from .fitting import MODELS, alpha_of, check_writable, default_learner, learn, learner_of, policy_of
+from .fitting import alpha_of, check_writable, default_learner, learn, learner_of, options_for_model, policy_of
 from .printing import Group, keep_codes, print_table, refuse_warnings, say_fit, say_surveys
 from .reading import complete, numbers, options_for_reading, reading_of, recipe_of, said_recipe, stream_of
 
@@ -81,16 +81,8 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
 @main.command(epilog="\b\nExample:\n  unconstrain fit wipe_*.csv --state x,y,z --differentiate -o wipe.npz")
 @options_for_reading
 @click.option("-o", "--output", required=True, type=click.Path(dir_okay=False), help="File for the policy (.npz).")
-@click.option(
-    "--model",
-    type=click.Choice(MODELS),
-    default="local",
-    show_default=True,
-    help="Model of the policy; auto takes the one of least estimated error.",
-)
+@options_for_model
 @click.option("--learner", type=click.Choice(LEARNERS), help="Learner; by default robust, or hybrid on much data.")
-@click.option("--variance", type=float, help="Local: σ² of the receptive fields. By default from the data.")
-@click.option("--centres", type=click.IntRange(1), help="RBF: number of kernels, 25 by default.")
 @click.option(
     "--alpha",
     type=alpha_of,

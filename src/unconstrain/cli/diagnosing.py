@@ -12,7 +12,7 @@ import click
 import unconstrain as uc
 
 from ..base.files import write
-from .fitting import MODELS, check_writable, policy_of
+from .fitting import check_writable, options_for_model, policy_of
 from .printing import print_table, refuse_warnings, say
 from .reading import complete, options_for_reading, reading_of, recipe_of, said_recipe
 
@@ -21,15 +21,7 @@ MOST_ROWS = 8
 
 @click.command(epilog="\b\nExample:\n  unconstrain diagnose wipe_*.csv --state x,y,z --by savgol -o a.html")
 @options_for_reading
-@click.option(
-    "--model",
-    type=click.Choice(MODELS),
-    default="local",
-    show_default=True,
-    help="Model of the policy; auto takes the one of least estimated error.",
-)
-@click.option("--variance", type=float, help="Local: σ² of the receptive fields. By default from the data.")
-@click.option("--centres", type=click.IntRange(1), help="RBF: number of kernels, 25 by default.")
+@options_for_model
 @click.option("-o", "--report", type=click.Path(dir_okay=False), help="Also write an HTML page there.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def diagnose(

@@ -27,6 +27,20 @@ MUCH = 200_000_000
 """Bytes of data above which samples are not kept in memory, and the default learner is the hybrid."""
 
 
+def options_for_model(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options that choose the model of the policy."""
+    variance = "Local: σ² of the receptive fields. By default from the data."
+    command = click.option("--centres", type=click.IntRange(1), help="RBF: number of kernels, 25 by default.")(command)
+    command = click.option("--variance", type=float, help=variance)(command)
+    return click.option(
+        "--model",
+        type=click.Choice(MODELS),
+        default="local",
+        show_default=True,
+        help="Model of the policy; auto takes the one of least estimated error.",
+    )(command)
+
+
 def alpha_of(text: str) -> float | Literal["auto"]:
     """A number, or auto."""
     try:

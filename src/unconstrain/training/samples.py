@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -124,6 +126,19 @@ class Samples(Shown):
     def by_fold(self) -> list[Samples]:
         """What is held out together."""
         return [self[self.folds == fold] for fold in range(int(self.folds.max()) + 1)]
+
+    @cached_property
+    def moments_by_fold(self) -> list[Moments]:
+        """Moments of the actions, fold by fold."""
+        return [part.moments(part.actions, np.ones(len(part))) for part in self.by_fold()]
+
+    def held_out(self, refits: Sequence[Array] | Array) -> Array:
+        """What weights that were learnt without each fold (R, M, d, p) predict there, shape (N, d)."""
+        found = np.empty_like(self.actions)
+        for fold, weights in enumerate(refits):
+            rows = self.folds == fold
+            found[rows] = self[rows].predict(weights)
+        return found
 
     def _summary(self) -> tuple[str, ...]:
         sizes = self.states.shape[1], self.actions.shape[1], self.features.shape[1], self.memberships.shape[1]

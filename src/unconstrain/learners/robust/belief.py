@@ -22,12 +22,11 @@ from .constants import (
     LEFT_OUT,
     LITTLE_OPEN,
     MOST_BEYOND_SHOWN,
-    SPHERE_HIDDEN_BY_NOISE,
     UNSEEN_SPREAD,
 )
 from .evidence import Evidence, shown, surely
 from .likelihood import free_probability, mixture_of
-from .noise import noise_by_differences
+from .noise import hides_sphere, noise_by_differences
 from .posterior import Posterior, unit_information
 from .smoothness import Smoothness
 
@@ -184,8 +183,8 @@ def _as_free_as_known(belief: Belief, everything: Samples, model: Model) -> Beli
     """With no sample called free that may as well have been held, in a way that no other demonstration shows."""
     spread = belief.uncertainty(model, everything.states)
     open_, noise = (np.linalg.norm(one, axis=1) for one in (spread.undetermined, spread.from_noise))
-    d, counts = everything.actions.shape[1], everything.counts / everything.counts.sum()
-    hidden = everything.groups.max() == 0 or d * belief.noise**2 > SPHERE_HIDDEN_BY_NOISE**2 * everything.energy
+    counts = everything.counts / everything.counts.sum()
+    hidden = everything.groups.max() == 0 or hides_sphere(belief.noise**2, everything)
     little = open_ < LITTLE_OPEN * np.sqrt(everything.energy)
     known = ((open_ < noise) | little) & (not hidden)
     return replace(

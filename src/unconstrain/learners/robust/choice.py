@@ -32,6 +32,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from scipy.optimize import nnls
@@ -76,6 +77,7 @@ class Comparison:
         self._residuals = self._lengths - (self._held_out * self._directions).sum(axis=2)
         self._places = slice(None, None, -(-len(samples) // COMPARED_STATES))
         self._leverage = np.max([leverage(one) for one in dict.fromkeys(self._views)], axis=0)
+        self._weights = 1.0 / (1.0 + self._leverage[self._places])
         self._noise, self._variation = self._variances(noise)
 
     def judged(self) -> dict[str, Judged]:
@@ -161,12 +163,17 @@ class Comparison:
         own, refits = self._predictions
         centred = refits - refits.mean(axis=1, keepdims=True)
         bias = np.zeros(len(own))
-        for k, one in enumerate(self._candidates):
-            for j, other in enumerate(self._candidates):
-                if j != k and (other.softness < one.softness or other.softness == 0.0) and not self._refuted(j, k):
-                    variance = SHARE_OF_JACKKNIFE * self._jackknife(centred[k] - centred[j])
-                    bias[k] = max(bias[k], self._across(own[k] - own[j]) - variance)
+        for k, j in combinations(range(len(own)), 2):
+            shown = [one for one, by in ((k, j), (j, k)) if self._may_show(by, one)]
+            if shown:
+                variance = SHARE_OF_JACKKNIFE * self._jackknife(centred[k] - centred[j])
+                bias[shown] = np.maximum(bias[shown], self._across(own[k] - own[j]) - variance)
         return bias
+
+    def _may_show(self, one: int, other: int) -> bool:
+        """Whether the first has less bias than the second, or none towards the actions, and is not refuted by it."""
+        softness = self._candidates[one].softness
+        return (softness == 0.0 or softness < self._candidates[other].softness) and not self._refuted(one, other)
 
     def _refuted(self, one: int, other: int) -> bool:
         """Whether the first is less consistent than the second where held out, by some standard errors.
@@ -193,14 +200,13 @@ class Comparison:
 
     def _across(self, difference: Array) -> float:
         """Weighted mean square across the action of a difference of predictions (n, d)."""
-        directions, weights = self._directions[self._places], 1.0 / (1.0 + self._leverage[self._places])
-        squares = (difference**2).sum(axis=1) - (difference * directions).sum(axis=1) ** 2
-        return float(weights @ squares / weights.sum())
+        squares = (difference**2).sum(axis=1) - (difference * self._directions[self._places]).sum(axis=1) ** 2
+        return float(self._weights @ squares / self._weights.sum())
 
 
 def leverage(samples: Samples) -> Array:
     """Leverage ``φᵀ (Σ w φ φᵀ)⁻¹ φ`` of each sample among the other folds' samples, averaged over the models, (N,)."""
-    parts = np.stack([part.moments(part.actions[:, :1], np.ones(len(part))).gram for part in samples.by_fold()])
+    parts = np.stack([part.gram for part in samples.moments_by_fold])
     whole, found = parts.sum(axis=0), np.zeros(len(samples))
     ridge = 1e-6 * np.trace(whole, axis1=1, axis2=2)[:, None, None] / whole.shape[1] * np.eye(whole.shape[1])
     inverses = np.linalg.pinv(whole - parts + ridge, hermitian=True)

@@ -35,7 +35,7 @@ from .constants import (
     SOFTNESS_RANGE,
     SOFTNESS_STANDARD_ERRORS,
 )
-from .noise import corrected, correlation_time, inefficiency, noise_by_differences
+from .noise import consistency_residuals, corrected, correlation_time, inefficiency, noise_by_differences
 from .posterior import Posterior, unit_information
 from .segments import constrained_error
 from .smoothness import Smoothness
@@ -57,7 +57,7 @@ def noise_corrected(samples: Samples, noise: float | None = None) -> Candidate:
         whole = parts.corrected(used)
         softness, smoothness, unit = whole.balanced(rough, time)
         policy = samples.predict(whole.posterior(softness, smoothness.prior(unit)).weights(d))
-        time = correlation_time(_residuals(samples, policy, used)[:, None], samples.groups)
+        time = correlation_time(consistency_residuals(samples, policy, used)[:, None], samples.groups)
         if noise is None:
             variance = min(most, samples.mean(distances(samples.actions, policy).radial ** 2))
     smooth, proposed = smoothness.prior(unit), float(np.median(softness))
@@ -78,12 +78,6 @@ def noise_corrected(samples: Samples, noise: float | None = None) -> Candidate:
         smoothness,
         refits[chosen],
     )
-
-
-def _residuals(samples: Samples, policy: Array, variance: float) -> Array:
-    """ρ of each sample; see :mod:`.noise`."""
-    along = (samples.actions * (samples.actions - policy)).sum(axis=1)
-    return np.asarray(along - samples.actions.shape[1] * variance)
 
 
 def _nearest(loss: Array, distance: Array) -> int:
@@ -119,11 +113,7 @@ def by_segments(samples: Samples, labels: NDArray[np.intp], noise: Array) -> Can
         loss, taken = judged(whole.evidence, weights), judged(reduce(add, risks), weights)
         softness = np.clip(factor * loss / np.maximum(taken - loss, 1e-3 * taken + 1e-300), *SOFTNESS_RANGE)
     found = posterior(everything, softness)
-    held_out, refits = np.empty_like(samples.actions), []
-    for fold, rows in enumerate(parts):
-        rest = [i for i in everything if i != fold] or everything
-        refits.append(posterior(rest, softness).weights(d))
-        held_out[rows] = samples[rows].predict(refits[-1])
+    refits = [posterior([i for i in everything if i != fold] or everything, softness).weights(d) for fold in everything]
     best = found.weights(d)
     radial = distances(samples.actions, samples.predict(best)).radial
     residual = np.maximum(loss, 1e-12 * reduce(add, risks).constant) / np.maximum(sizes, 1e-300)
@@ -132,7 +122,7 @@ def by_segments(samples: Samples, labels: NDArray[np.intp], noise: Array) -> Can
         "segments",
         best,
         scaled(found, time * residual),
-        held_out,
+        samples.held_out(refits),
         samples.mean(radial**2),
         Smoothness.of(samples),
         np.stack(refits),
@@ -145,7 +135,7 @@ class _Folds:
     def __init__(self, samples: Samples) -> None:
         self._samples, self._parts = samples, samples.by_fold()
         self._weighted = [part.moments(part.actions, (part.actions**2).sum(axis=1)) for part in self._parts]
-        self._plain = [part.moments(part.actions, np.ones(len(part))) for part in self._parts]
+        self._plain = samples.moments_by_fold
 
     def corrected(self, variance: float, without: int | None = None) -> _Corrected:
         """Noise-corrected objectives of the whole, or without one fold."""
@@ -164,7 +154,7 @@ class _Folds:
             for k in range(len(softnesses)):
                 predicted = part.predict(refits[-1][k])
                 predictions[k, self._samples.folds == fold] = predicted
-                loss[fold, k] = part.counts @ _residuals(part, predicted, variance) ** 2 / part.counts.sum()
+                loss[fold, k] = part.counts @ consistency_residuals(part, predicted, variance) ** 2 / part.counts.sum()
         return predictions, loss, np.stack(refits, axis=1)
 
 

@@ -20,7 +20,7 @@ from ...base.arrays import Array
 from ...risks import Quadratic, inconsistency
 from ...training import Samples
 from .constants import EIGENVALUE_STANDARD_ERRORS, LEAST_MISFIT, LEFT_OUT, MOST_PARTS
-from .noise import corrected, correlation_time, noise_by_differences
+from .noise import consistency_residuals, corrected, correlation_time, inefficiency, noise_by_differences
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,12 +163,8 @@ def _noise(samples: Samples, variance: float) -> float:
     return max(found, LEAST_MISFIT**2 * samples.energy)
 
 
-def _residuals(samples: Samples, policy: Array, noise: float) -> Array:
-    return np.asarray((samples.actions * (samples.actions - policy)).sum(axis=1) - policy.shape[1] * noise)
-
-
 def _time(samples: Samples, policy: Array, noise: float) -> float:
-    return correlation_time(_residuals(samples, policy, noise)[:, None], samples.groups)
+    return correlation_time(consistency_residuals(samples, policy, noise)[:, None], samples.groups)
 
 
 def _residual(samples: Samples, policy: Array, noise: float, time: float) -> Array:
@@ -176,5 +172,5 @@ def _residual(samples: Samples, policy: Array, noise: float, time: float) -> Arr
     d, counts = samples.actions.shape[1], samples.counts / samples.counts.sum()
     white = noise * float(counts @ (policy**2).sum(axis=1)) + 2 * d * noise**2
     chance = 1.0 + EIGENVALUE_STANDARD_ERRORS * np.sqrt(2.0 * time / len(samples))
-    misfit = max(float(counts @ _residuals(samples, policy, noise) ** 2) - chance * white, 0.0)
-    return time * white + np.maximum(time, samples.sizes / (d * samples.features.shape[1])) * misfit
+    misfit = max(float(counts @ consistency_residuals(samples, policy, noise) ** 2) - chance * white, 0.0)
+    return time * white + inefficiency(time, samples) * misfit

@@ -20,10 +20,10 @@ from .belief import solution, weak_prior
 from .candidate import Candidate
 from .choice import Comparison
 from .consistent import by_segments, noise_corrected
-from .constants import LEAST_INFORMATIVE, LEAST_MISFIT, SPHERE_HIDDEN_BY_NOISE
+from .constants import LEAST_INFORMATIVE, LEAST_MISFIT
 from .held_out import held_out_together
 from .likelihood import maximise
-from .noise import noise_by_differences, noise_of_each
+from .noise import hides_sphere, noise_by_differences, noise_of_each
 from .posterior import Posterior
 from .segments import found_segments
 from .softened import softened
@@ -209,7 +209,7 @@ class Robust(_Maximising):
         if samples.groups.max() > 0:
             learnt.append(by_segments(samples, samples.groups, noise))
         likely, mixture = self._maximised(samples, training, corrected)
-        if 1.0 - mixture[-1] > LEAST_INFORMATIVE and not _hidden(likely.variance, samples):
+        if 1.0 - mixture[-1] > LEAST_INFORMATIVE and not hides_sphere(likely.variance, samples):
             learnt.append(likely)
         return Comparison(learnt, np.minimum(noise, min(most, corrected.variance)), samples)
 
@@ -295,8 +295,3 @@ def _plain(training: Training, samples: Samples, everything: Samples) -> Solutio
             undetermined=undetermined,
         ),
     )
-
-
-def _hidden(variance: float, samples: Samples) -> bool:
-    """Whether noise of a variance per coordinate hides the sphere."""
-    return samples.actions.shape[1] * variance > SPHERE_HIDDEN_BY_NOISE**2 * samples.energy

@@ -58,14 +58,13 @@ def maximise(
             best = optimum
     best = _maximise_from(thinned, best, steps - first, noise) if steps > first else best
     model = _GaussNewton(samples, samples.predict(best.weights), best.variance, best.mixture, best.smoothness)
-    whole, held_out, refits = model.posterior(), np.empty_like(samples.actions), []
-    weights = whole.weights(samples.actions.shape[1])
+    whole = model.posterior()
+    weights, refits = whole.weights(samples.actions.shape[1]), []
     for fold in range(int(samples.folds.max()) + 1):
         rest = thinned[thinned.folds != fold]
-        refits.append(
-            _maximise_from(rest, best, REFIT_STEPS, noise).weights if len(rest) and rest.energy > 0.0 else weights
-        )
-        held_out[samples.folds == fold] = samples[samples.folds == fold].predict(refits[-1])
+        moving = len(rest) and rest.energy > 0.0
+        refits.append(_maximise_from(rest, best, REFIT_STEPS, noise).weights if moving else weights)
+    held_out = samples.held_out(refits)
     found = Candidate("likelihood", weights, whole, held_out, best.variance, best.smoothness, np.stack(refits))
     return found, best.mixture
 

@@ -28,7 +28,7 @@ from scipy.stats import chi2
 from ...base.arrays import Array
 from ...risks import Moments, standard_risk
 from ...training import Samples
-from .constants import DIFFERENCE_ORDER, LEAST_AUTOCORRELATION, LEAST_DIFFERENCES, MOST_LAGS
+from .constants import DIFFERENCE_ORDER, LEAST_AUTOCORRELATION, LEAST_DIFFERENCES, MOST_LAGS, SPHERE_HIDDEN_BY_NOISE
 
 
 def noise_by_differences(actions: Array, groups: NDArray[np.intp]) -> float:
@@ -106,6 +106,17 @@ def correlation_time(residuals: Array, groups: NDArray[np.intp]) -> float:
             break
         time += 2.0 * correlation
     return time
+
+
+def consistency_residuals(samples: Samples, policy: Array, variance: float) -> Array:
+    """ρ of each sample at predictions (N, d), under noise of some variance; see above."""
+    along = (samples.actions * (samples.actions - policy)).sum(axis=1)
+    return np.asarray(along - samples.actions.shape[1] * variance)
+
+
+def hides_sphere(variance: float, samples: Samples) -> bool:
+    """Whether noise of a variance per coordinate makes free and constrained samples look the same."""
+    return bool(samples.actions.shape[1] * variance > SPHERE_HIDDEN_BY_NOISE**2 * samples.energy)
 
 
 def inefficiency(time: float, samples: Samples) -> Array:

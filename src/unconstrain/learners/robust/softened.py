@@ -18,8 +18,7 @@ _NAMES = ("direct", *(f"softened hybrid, {softness:g}" for softness in CANDIDATE
 
 def softened(samples: Samples) -> list[Candidate]:
     """Direct regression and the minima of ``E_i + s E_2`` for each softness s, the softest first."""
-    ones = np.ones(len(samples))
-    parts = [part.moments(part.actions, ones[: len(part)]) for part in samples.by_fold()]
+    parts = samples.moments_by_fold
     whole, d = total(parts), samples.actions.shape[1]
     refits = np.stack([_path(total([one for one in parts if one is not part]), d) for part in parts], axis=1)
     return [
@@ -40,10 +39,6 @@ def _path(moments: Moments, d: int) -> Array:
 def _candidate(
     name: str, softness: float, weights: Array, refits: Array, whole: Moments, samples: Samples
 ) -> Candidate:
-    held_out = np.empty_like(samples.actions)
-    for fold, without in enumerate(refits):
-        rows = samples.folds == fold
-        held_out[rows] = samples[rows].predict(without)
     radial = distances(samples.actions, samples.predict(weights)).radial
     sizes = np.maximum(whole.weight, np.finfo(float).tiny)
     consistent = inconsistency(whole)
@@ -54,7 +49,7 @@ def _candidate(
         name,
         weights,
         scaled(posterior, variance),
-        held_out,
+        samples.held_out(refits),
         samples.mean(radial**2),
         Smoothness.of(samples),
         refits,

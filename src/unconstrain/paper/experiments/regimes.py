@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 import unconstrain as uc
 
@@ -29,6 +30,7 @@ from ..systems.pendulum import Pendulum
 from . import toy
 from .journal import Journal
 from .trials import Progress, Result, row, run_trials
+from .truths import true_policy, true_projections, was_free, with_noise
 
 PLANAR = ("none", "random", "half", "quarter free", "0.1", "0.3", "0.6", "1", "1.5")
 """Constraints of the two systems in the plane. Numbers are the θ_max of eq. 20, rad; "half" and "quarter free"
@@ -157,17 +159,6 @@ def demonstrate(
     return toy.split(demos, settings.test_share, rng)
 
 
-def with_noise(
-    demonstrations: Sequence[uc.Demonstration], share: float, rng: np.random.Generator
-) -> list[uc.Demonstration]:
-    """The same with normal noise on the actions, as a share of the policy's rms spread per coordinate."""
-    policies = np.concatenate([demo.truth.policy for demo in demonstrations if demo.truth is not None])
-    size = share * float(np.sqrt(((policies - policies.mean(axis=0)) ** 2).mean()))
-    return [
-        replace(demo, actions=demo.actions + size * rng.standard_normal(demo.actions.shape)) for demo in demonstrations
-    ]
-
-
 def headlines(result: Result) -> list[str]:
     """The default learner at each noise level, in a sentence; and what else a person asks."""
     summary = {(one["method"], one["noise"]): one for one in result.tables["summary"]}
@@ -254,26 +245,21 @@ def _knowledge(
     policy: uc.Policy, training: Sequence[uc.Demonstration], test: Sequence[uc.Demonstration]
 ) -> tuple[float, float]:
     """How well free samples are told from constrained ones, and how often intervals hold the truth; NaN if unknown."""
-    free = np.concatenate([_is_free(demo) for demo in training])
     states = np.concatenate([demo.states for demo in test])
-    truth = np.concatenate([demo.truth.policy for demo in test if demo.truth is not None])
+    truth = true_policy(test)
     spread = policy.uncertainty(states)
     known = spread.undetermined < spread.from_noise
     held = np.abs(truth - policy(states)) <= 1.96 * spread.total
-    return area_under_curve(policy.solution_.free, free), float(held[known].mean()) if known.any() else np.nan
+    return area_under_curve(policy.solution_.free, was_free(training)), float(
+        held[known].mean()
+    ) if known.any() else np.nan
 
 
-def area_under_curve(scores: Array, labels: Array) -> float:
+def area_under_curve(scores: Array, labels: NDArray[np.bool_]) -> float:
     """Probability that a labelled sample scores above one that is not, ties half; NaN without one of either."""
     from sklearn.metrics import roc_auc_score
 
     return float(roc_auc_score(labels, scores)) if len(np.unique(labels)) == 2 else float("nan")
-
-
-def _is_free(demo: uc.Demonstration) -> Array:
-    assert demo.truth is not None
-    d = demo.actions.shape[1]
-    return np.abs(demo.truth.projections - np.eye(d)).max(axis=(1, 2)) < 1e-9
 
 
 def _oracle(policy: uc.Policy, test: Sequence[uc.Demonstration], count: int) -> tuple[float, float, float]:
@@ -287,7 +273,7 @@ def _knowing(
     policy: uc.Policy, training: Sequence[uc.Demonstration], test: Sequence[uc.Demonstration]
 ) -> tuple[float, float, float]:
     """The constrained error minimised with the true projections, beside as much of the risk as the truth says."""
-    N = np.concatenate([demo.truth.projections for demo in training if demo.truth is not None])
+    N = true_projections(training)
     states, actions, _ = uc.stack(training)
     model, d = policy.training_.model, actions.shape[1]
     features, members = model.design(states), model.fields.weights(states)
@@ -320,10 +306,7 @@ def _centred(model: uc.Model, moments: Moments) -> Moments:
 
 def _best(policy: uc.Policy, test: Sequence[uc.Demonstration], found: Sequence[Array]) -> tuple[float, float, float]:
     """Errors of the weights (M, P), over ``T_m φ``, that are nearest to the truth."""
-    states, truth = (
-        uc.stack(test).states,
-        np.concatenate([demo.truth.policy for demo in test if demo.truth is not None]),
-    )
+    states, truth = uc.stack(test).states, true_policy(test)
     judged = policy.with_learner(uc.Direct())
     plain = best = judged.solution_
     least = np.inf

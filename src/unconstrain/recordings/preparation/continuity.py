@@ -30,9 +30,9 @@ def continuous(states: Array, recipe: Recipe) -> Array:
     if not groups or not len(states):
         return states
     smooth, known = states.copy(), recipe.states or ()
-    for names, mend in groups:
+    for names, repair in groups:
         columns = [_place(name, known) for name in names]
-        smooth[:, columns] = mend(smooth[:, columns])
+        smooth[:, columns] = repair(smooth[:, columns])
     return smooth
 
 

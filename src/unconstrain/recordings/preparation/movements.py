@@ -38,9 +38,9 @@ MOST_SAMPLES = 1e8
 
 
 class PreparationWarning(UserWarning):
-    """Something about a recording that its owner should know: not what it seems, or mended on the way.
+    """Something about a recording that its owner should know: not what it seems, or repaired on the way.
 
-    ``code`` names the kind of what is not as it seems, and is empty for what was mended.
+    ``code`` names the kind of what is not as it seems, and is empty for what was repaired.
     """
 
     def __init__(self, message: str, code: str = "") -> None:
@@ -277,7 +277,7 @@ def _prepare(recording: Recording, recipe: Recipe) -> tuple[Demonstration, list[
     else:
         piece, notes = _without_repeats(_Piece(*_sorted(times, states, actions, recipe)), recording.name)
         pieces = _split(_without_glitches(piece._replace(states=continuous(piece.states, recipe)), recipe), recipe)
-        (times, states, actions), more = _mend(pieces, recipe, recording.name)
+        (times, states, actions), more = _repair(pieces, recipe, recording.name)
         notes += more
     if actions is None:
         raise SettingError(
@@ -346,7 +346,7 @@ def _without_glitches(piece: _Piece, recipe: Recipe) -> _Piece:
     return piece.at(keep)
 
 
-def _mend(pieces: list[_Piece], recipe: Recipe, name: str) -> tuple[_Piece, list[str]]:
+def _repair(pieces: list[_Piece], recipe: Recipe, name: str) -> tuple[_Piece, list[str]]:
     """Differentiate and resample the pieces, and join them."""
     notes: list[str] = []
     if recipe.differentiate is not None:

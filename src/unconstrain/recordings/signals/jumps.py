@@ -58,15 +58,15 @@ def glitches(values: Array) -> list[Glitch]:
 
 def repaired(values: Array, found: list[Glitch]) -> Array:
     """Put straight lines in the place of glitches, shape (T, n)."""
-    mended = values.copy()
+    smooth = values.copy()
     rows = np.arange(len(values))
     for column in {glitch.column for glitch in found}:
         bad: NDArray[np.bool_] = np.zeros(len(values), dtype=bool)
         for glitch in found:
             if glitch.column == column:
                 bad[glitch.start : glitch.stop] = True
-        mended[bad, column] = np.interp(rows[bad], rows[~bad], values[~bad, column])
-    return mended
+        smooth[bad, column] = np.interp(rows[bad], rows[~bad], values[~bad, column])
+    return smooth
 
 
 def seams(values: Array) -> list[int]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import unconstrain as uc
 
-from ....base.arrays import Array
+from ..truths import true_policy, true_projections, was_free
 from .sets import RECORDED, DataSet, draw
 
 DEFAULT = "robust"
@@ -102,20 +102,16 @@ def knowledge(policy: uc.Policy, data: DataSet, free: uc.Policy) -> dict[str, fl
     truth = free(states) if data.recorded else true_policy(data.test)
     held = np.abs(truth - policy(states)) <= HELD_WITHIN * spread.total
     known = spread.undetermined < spread.from_noise
-    was_free, moves = _is_free(data), _projections(data).diagonal(axis1=1, axis2=2).max(axis=0) > 1e-9
+    free_samples = was_free(data.demonstrations)
+    moves = true_projections(data.demonstrations).diagonal(axis1=1, axis2=2).max(axis=0) > 1e-9
     return {
         "determined": policy.solution_.determined_share,
         "known": float(known.mean()),
         "held": _mean(held[known]),
         "held_hidden": _mean(held[:, ~moves]),
-        "said_free": _mean(policy.solution_.free[~was_free]),
-        "told_free": _mean(policy.solution_.free[was_free]),
+        "said_free": _mean(policy.solution_.free[~free_samples]),
+        "told_free": _mean(policy.solution_.free[free_samples]),
     }
-
-
-def true_policy(demonstrations: list[uc.Demonstration]) -> Array:
-    """The truth at all samples, shape (N, d)."""
-    return np.concatenate([demo.truth.policy for demo in demonstrations if demo.truth is not None])
 
 
 def _learners(data: DataSet) -> dict[str, uc.Learner]:
@@ -126,16 +122,6 @@ def _cost(data: DataSet, error: float) -> float | None:
     if data.unspoiled is None:
         return None
     return error / uc.nupe(data.fit(uc.Robust(), data.unspoiled), data.test)
-
-
-def _projections(data: DataSet) -> Array:
-    return np.concatenate([demo.truth.projections for demo in data.demonstrations if demo.truth is not None])
-
-
-def _is_free(data: DataSet) -> NDArray[np.bool_]:
-    N = _projections(data)
-    free: NDArray[np.bool_] = np.abs(N - np.eye(N.shape[1])).max(axis=(1, 2)) < 1e-9
-    return free
 
 
 def _mean(values: NDArray[Any]) -> float | None:

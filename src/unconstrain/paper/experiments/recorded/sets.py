@@ -182,7 +182,7 @@ def listed(seed: int, only: Sequence[str] = (), at_most: int = 20) -> list[tuple
     for kind in only:
         if kind not in KINDS:
             raise SettingError(f"only: got {kind!r}, expected one of {', '.join(KINDS)}.")
-    kinds = only or [kind for kind in KINDS if kind != "CaPL, auto" or _auto_is_known()]
+    kinds = only or KINDS
     recorded = any(kind in RECORDED for kind in kinds)
     classes = [movement.title for movement in movements(seed == REPORT_SEED)] if recorded else []
     found: list[tuple[str, str]] = []
@@ -190,15 +190,6 @@ def listed(seed: int, only: Sequence[str] = (), at_most: int = 20) -> list[tuple
         names = classes if kind in RECORDED else _numbered(SIMULATED[kind], at_most)
         found += [(kind, name) for name in names[:at_most]]
     return found
-
-
-def _auto_is_known() -> bool:
-    states = np.random.default_rng(0).standard_normal((40, 2))
-    try:
-        _auto_policy().set_params(learner="direct").fit(states, states)
-    except SettingError:
-        return False
-    return True
 
 
 def _numbered(kind: _Kind, count: int) -> list[str]:

@@ -11,6 +11,7 @@ import unconstrain as uc
 
 from ....base.arrays import Array
 from ...systems.limit_cycle import LimitCycle
+from ..truths import spread, with_noise
 
 Policy = Callable[[Array], Array]
 
@@ -116,7 +117,7 @@ def curved_hood(rng: np.random.Generator) -> Simulated:
     places = np.column_stack([rng.uniform(-1, 1, (16, 2)) * [2.5, 4.0], np.zeros(16)])
     surfaces = [Turning(bends @ place + [0, 0, 1], bends) for place in places]
     starts = np.column_stack([rng.uniform(-1.2, 1.2, (16, 2)), np.zeros(16)])
-    return Simulated(_with_noise(_rolled(wipe, starts, 40, 0.05, surfaces), 0.01, rng))
+    return Simulated(with_noise(_rolled(wipe, starts, 40, 0.05, surfaces), 0.01, rng))
 
 
 def capl(rng: np.random.Generator, decibels: float) -> Simulated:
@@ -159,19 +160,19 @@ def to_rest(rng: np.random.Generator) -> Simulated:
 
 def one_bad_sample(rng: np.random.Generator, size: float, free: bool) -> Simulated:
     """Of 480 actions one is wrong, by so many standard deviations of the policy."""
-    demos = _with_noise(_wiped(rng, free=free), 0.02, rng)
+    demos = with_noise(_wiped(rng, free=free), 0.02, rng)
     return Simulated(_spoiled(demos, 1, size, rng), unspoiled=demos)
 
 
 def bad_samples(rng: np.random.Generator, size: float, free: bool) -> Simulated:
     """Of 480 actions five are wrong."""
-    demos = _with_noise(_wiped(rng, free=free), 0.02, rng)
+    demos = with_noise(_wiped(rng, free=free), 0.02, rng)
     return Simulated(_spoiled(demos, 5, size, rng), unspoiled=demos)
 
 
 def unequal_speeds(rng: np.random.Generator) -> Simulated:
     """Each demonstration is faster or slower by a factor of its own; its logarithm has a standard deviation of 0.4."""
-    demos = _with_noise(_wiped(rng), 0.02, rng)
+    demos = with_noise(_wiped(rng), 0.02, rng)
     factors = np.exp(0.4 * rng.standard_normal(len(demos)))
     return Simulated([replace(demo, actions=f * demo.actions) for demo, f in zip(demos, factors, strict=True)])
 
@@ -181,7 +182,7 @@ def correlated_noise(rng: np.random.Generator) -> Simulated:
     from scipy.signal import lfilter
 
     demos = _wiped(rng)
-    size = 0.05 * _spread(demos) * np.sqrt(1 - 0.9**2)
+    size = 0.05 * spread(demos) * np.sqrt(1 - 0.9**2)
     return Simulated(
         [_moved(one, lfilter([size], [1, -0.9], rng.standard_normal(one.actions.shape), axis=0)) for one in demos]
     )
@@ -190,7 +191,7 @@ def correlated_noise(rng: np.random.Generator) -> Simulated:
 def student_noise(rng: np.random.Generator) -> Simulated:
     """Noise of 5 % with the heavy tails of Student's distribution of three degrees of freedom."""
     demos = _wiped(rng)
-    size = 0.05 * _spread(demos) / np.sqrt(3.0)
+    size = 0.05 * spread(demos) / np.sqrt(3.0)
     return Simulated([_moved(demo, size * rng.standard_t(3, demo.actions.shape)) for demo in demos])
 
 
@@ -200,7 +201,7 @@ def partly_at_rest(rng: np.random.Generator, share: float) -> Simulated:
     for demo in _wiped(rng):
         still = np.arange(len(demo)) % 30 < 10
         demos.append(replace(demo, actions=np.where(still[:, None], 0.0, demo.actions)))
-    return Simulated(_with_noise(demos, share, rng))
+    return Simulated(with_noise(demos, share, rng))
 
 
 def one_sided(rng: np.random.Generator) -> Simulated:
@@ -211,7 +212,7 @@ def one_sided(rng: np.random.Generator) -> Simulated:
     starts = rng.uniform(-1, 1, (12, 2))
     beyond = np.maximum((starts * normals).sum(axis=1) - [wall.distance for wall in walls], 0)
     demos = _rolled(flow, starts - beyond[:, None] * normals, 60, 0.05, walls)
-    return Simulated(_with_noise(demos, 0.02, rng))
+    return Simulated(with_noise(demos, 0.02, rng))
 
 
 def one_plane(rng: np.random.Generator) -> Simulated:
@@ -219,24 +220,24 @@ def one_plane(rng: np.random.Generator) -> Simulated:
     flow = rng.standard_normal((3, 3)) / np.sqrt(3) - np.eye(3)
     plane = uc.constraints.Plane(np.array([0.0, 0.0, 1.0]))
     demos = _rolled(lambda states: states @ flow - 0.2, rng.uniform(-1.5, 1.5, (8, 3)), 60, 0.05, [plane] * 8)
-    return Simulated(_with_noise(demos, 0.02, rng))
+    return Simulated(with_noise(demos, 0.02, rng))
 
 
 def parallel_planes(rng: np.random.Generator) -> Simulated:
     """Planes that are tilted by five degrees at most."""
-    return Simulated(_with_noise(_wiped(rng, planes=tilted(rng, 8, 5.0)), 0.02, rng))
+    return Simulated(with_noise(_wiped(rng, planes=tilted(rng, 8, 5.0)), 0.02, rng))
 
 
 def turning_planes(rng: np.random.Generator) -> Simulated:
     """Normals that turn slowly with the state, each demonstration's about its own."""
     bends = rng.standard_normal((8, 3, 3)) * [[0.3], [0.3], [0.0]]
     planes = [Turning(plane.normal, bend) for plane, bend in zip(tilted(rng, 8), bends, strict=True)]
-    return Simulated(_with_noise(_wiped(rng, planes=planes), 0.02, rng))
+    return Simulated(with_noise(_wiped(rng, planes=planes), 0.02, rng))
 
 
 def two_demonstrations(rng: np.random.Generator) -> Simulated:
     """There are two demonstrations only."""
-    return Simulated(_with_noise(_wiped(rng, planes=tilted(rng, 2)), 0.02, rng))
+    return Simulated(with_noise(_wiped(rng, planes=tilted(rng, 2)), 0.02, rng))
 
 
 def many_joints(rng: np.random.Generator) -> Simulated:
@@ -244,14 +245,14 @@ def many_joints(rng: np.random.Generator) -> Simulated:
     pull = rng.standard_normal((14, 14)) / np.sqrt(14) - np.eye(14)
     held = [_Rows(rows) for rows in rng.standard_normal((24, 4, 14))]
     demos = _rolled(lambda states: states @ pull, rng.uniform(-1, 1, (24, 14)), 25, 0.08, held)
-    return Simulated(_with_noise(demos, 0.02, rng))
+    return Simulated(with_noise(demos, 0.02, rng))
 
 
 def without_order(rng: np.random.Generator) -> Simulated:
     """Demonstrations under lines that switch twice, as one heap of rows."""
     lines = [uc.constraints.SwitchingLine.random(rng, 0.8, 2) for _ in range(20)]
     demos = _rolled(LimitCycle(), rng.uniform(-1, 1, (20, 2)), 40, 0.02, lines)
-    return Simulated([heap(_with_noise(demos, 0.02, rng), rng)])
+    return Simulated([heap(with_noise(demos, 0.02, rng), rng)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -319,17 +320,6 @@ def _moved(demo: uc.Demonstration, by: Array) -> uc.Demonstration:
     return replace(demo, actions=demo.actions + by)
 
 
-def _with_noise(demos: Sequence[uc.Demonstration], share: float, rng: np.random.Generator) -> list[uc.Demonstration]:
-    """Normal noise on the actions, as a share of the policy's rms spread per coordinate."""
-    size = share * _spread(demos)
-    return [_moved(demo, size * rng.standard_normal(demo.actions.shape)) for demo in demos]
-
-
-def _spread(demonstrations: Sequence[uc.Demonstration]) -> float:
-    policies = np.concatenate([demo.truth.policy for demo in demonstrations if demo.truth is not None])
-    return float(np.sqrt(policies.var(axis=0).mean()))
-
-
 def _spoiled(
     demos: Sequence[uc.Demonstration], count: int, size: float, rng: np.random.Generator
 ) -> list[uc.Demonstration]:
@@ -337,5 +327,5 @@ def _spoiled(
     lengths = [len(demo) for demo in demos]
     wrong = np.zeros((sum(lengths), demos[0].actions.shape[1]))
     rows = rng.permutation(len(wrong))[:count]
-    wrong[rows] = size * _spread(demos) * rng.standard_normal((count, wrong.shape[1]))
+    wrong[rows] = size * spread(demos) * rng.standard_normal((count, wrong.shape[1]))
     return [_moved(demo, by) for demo, by in zip(demos, np.split(wrong, np.cumsum(lengths)[:-1]), strict=True)]

@@ -32,7 +32,7 @@ class Flip(NamedTuple):
     option: str
     width: int
     rows: Callable[[Array], list[int]]
-    mend: Callable[[Array], Array]
+    repair: Callable[[Array], Array]
     found: Sequence[int] = ()
 
 
@@ -123,7 +123,7 @@ class Subject:
         smooth = self.states.copy()
         for start, flip in self.flips.items():
             columns = slice(start, start + flip.width)
-            smooth[:, columns] = flip.mend(smooth[:, columns])
+            smooth[:, columns] = flip.repair(smooth[:, columns])
         return smooth
 
     @cached_property
