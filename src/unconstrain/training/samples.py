@@ -88,13 +88,13 @@ class Samples(Shown):
         return float(self.counts @ values / self.counts.sum())
 
     def predict(self, weights: Array) -> Array:
-        """What models of these weights (M, d, p), over ``T_m φ``, predict, shape (N, d)."""
+        """What models of these weights (..., M, d, p), over ``T_m φ``, predict, shape (..., N, d)."""
         plain = weights @ self.centring
-        models, d, p = plain.shape
-        if models == 1:
-            return self.features @ plain[0].T
-        each = self.features @ plain.reshape(models * d, p).T
-        return np.einsum("nm,nmd->nd", self.shares, each.reshape(-1, models, d))
+        *policies, models, d, p = plain.shape
+        of_model = np.moveaxis(plain.reshape(-1, models, d, p), 0, 1)
+        each = (self.features @ of_model.reshape(-1, p).T).reshape(len(self), models, -1)
+        blended = each if models == 1 else self.shares[:, None, :] @ each
+        return np.moveaxis(blended.reshape(len(self), -1, d), 0, 1).reshape(*policies, len(self), d)
 
     def moments(self, actions: Array, weights: Array) -> Moments:
         """Moments of any actions (N, d) at these features, each sample weighted (N,)."""
@@ -133,11 +133,11 @@ class Samples(Shown):
         return [part.moments(part.actions, np.ones(len(part))) for part in self.by_fold()]
 
     def held_out(self, refits: Sequence[Array] | Array) -> Array:
-        """What weights that were learnt without each fold (R, M, d, p) predict there, shape (N, d)."""
-        found = np.empty_like(self.actions)
+        """What weights that were learnt without each fold (R, ..., M, d, p) predict there, shape (..., N, d)."""
+        found = np.empty((*np.shape(refits)[1:-3], *self.actions.shape))
         for fold, weights in enumerate(refits):
             rows = self.folds == fold
-            found[rows] = self[rows].predict(weights)
+            found[..., rows, :] = self[rows].predict(weights)
         return found
 
     def _summary(self) -> tuple[str, ...]:

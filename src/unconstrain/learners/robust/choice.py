@@ -17,7 +17,9 @@ Softened hybrids (eq. 6 with ``E_i + s E_2``) have the less bias the smaller
 their softness s; s is infinite for direct regression, and zero for learners
 that minimise an error of consistency alone. A candidate j that is less
 consistent than k where held out, beyond chance, shows no bias of k; nor does
-one that is so by the residuals weighted by ‖u‖², as under noise alone.
+one that is so by the residuals weighted by ‖u‖², as under noise alone. One
+that is more consistent than k, beyond chance, shows bias whatever its
+softness, unless its own variance is a good part of the motion.
 
 Residuals have the variance ``‖π‖² (σ² / ‖u‖² + κ²)`` under any constraint:
 noise of variance σ² turns the direction of a slow action, and people vary by
@@ -35,6 +37,7 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from ...base.arrays import Array
@@ -45,7 +48,9 @@ from .candidate import Candidate
 from .constants import (
     COMPARED_STATES,
     LEAST_DEMONSTRATIONS,
+    MOST_VARIANCE,
     NEGLIGIBLE_LOSS,
+    NEGLIGIBLE_RATIO,
     REFUTED,
     SHARE_OF_JACKKNIFE,
     TIED,
@@ -171,18 +176,22 @@ class Comparison:
         return bias
 
     def _may_show(self, one: int, other: int) -> bool:
-        """Whether the first has less bias than the second, or none towards the actions, and is not refuted by it."""
+        """Whether the first has less bias, or refutes the second and varies little, and is not refuted by it."""
         softness = self._candidates[one].softness
-        return (softness == 0.0 or softness < self._candidates[other].softness) and not self._refuted(one, other)
+        if self._refuted[one, other]:
+            return False
+        less = softness == 0.0 or softness < self._candidates[other].softness
+        known = self._variance[one] <= MOST_VARIANCE * self._samples.energy
+        return bool(less or (known and self._refuted[other, one]))
 
-    def _refuted(self, one: int, other: int) -> bool:
-        """Whether the first is less consistent than the second where held out, by some standard errors.
+    @cached_property
+    def _refuted(self) -> NDArray[np.bool_]:
+        """Whether each is less consistent than each other where held out, beyond chance, (K, K).
 
         With the weights of the loss, or with ‖u‖², which noise calls for and people who vary do not. Differences that
-        are less than any model's misfit say nothing.
+        are less than any model's misfit say nothing unless one loss is a multiple of the other.
         """
-        gaps = (_gap(losses, one, other) for losses in (self._losses / self._samples.energy, self._losses_of_noise))
-        return any(gap > max(REFUTED * error, NEGLIGIBLE_LOSS) for gap, error in gaps)
+        return np.asarray(_beyond_chance(self._losses / self._samples.energy) | _beyond_chance(self._losses_of_noise))
 
     @cached_property
     def _predictions(self) -> tuple[Array, Array]:
@@ -190,7 +199,7 @@ class Comparison:
         views = {view: view[self._places] for view in dict.fromkeys(self._views)}
         pairs = [(one, views[view]) for one, view in zip(self._candidates, self._views, strict=True)]
         own = np.stack([some.predict(one.weights) for one, some in pairs])
-        refits = np.stack([[some.predict(weights) for weights in one.refits] for one, some in pairs])
+        refits = np.stack([some.predict(one.refits) for one, some in pairs])
         return own, refits
 
     def _jackknife(self, deviations: Array) -> float:
@@ -200,7 +209,7 @@ class Comparison:
 
     def _across(self, difference: Array) -> float:
         """Weighted mean square across the action of a difference of predictions (n, d)."""
-        squares = (difference**2).sum(axis=1) - (difference * self._directions[self._places]).sum(axis=1) ** 2
+        squares = np.vecdot(difference, difference) - np.vecdot(difference, self._directions[self._places]) ** 2
         return float(self._weights @ squares / self._weights.sum())
 
 
@@ -215,6 +224,14 @@ def leverage(samples: Samples) -> Array:
         own = np.tensordot(samples.features[rows], inverse, axes=(1, 1))
         found[rows] = np.einsum("nm,nmp,np->n", samples.shares[rows], own, samples.features[rows], optimize=True)
     return np.clip(found, 0.0, 1e6)
+
+
+def _beyond_chance(losses: Array) -> NDArray[np.bool_]:
+    """Whether each candidate's loss (K, G) is larger than each other's, by some standard errors and not negligibly."""
+    gaps, whole = losses[:, None] - losses, losses.sum(axis=1)
+    gap, error = gaps.sum(axis=2), gaps.std(axis=2, ddof=1) * np.sqrt(losses.shape[1])
+    large = (gap > NEGLIGIBLE_LOSS) | (whole[:, None] > NEGLIGIBLE_RATIO * np.maximum(whole, 1e-9))
+    return np.asarray(large & (gap > REFUTED * error))
 
 
 def _gap(losses: Array, one: int, other: int) -> tuple[float, float]:

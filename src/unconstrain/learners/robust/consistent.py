@@ -145,16 +145,14 @@ class _Folds:
 
     def held_out(self, softnesses: Sequence[float], smooth: Quadratic, variance: float) -> tuple[Array, Array, Array]:
         """For K softnesses, cross-validated predictions (K, N, d); by R folds, mean square of ρ (R, K), and weights."""
-        predictions = np.empty((len(softnesses), *self._samples.actions.shape))
-        loss, refits = np.empty((len(self._parts), len(softnesses))), []
-        for fold, part in enumerate(self._parts):
+        samples, refits = self._samples, []
+        for fold in range(len(self._parts)):
             rest = self.corrected(variance, without=fold)
             found = softened_minima(rest.consistent + smooth, rest.risk, softnesses)
-            refits.append(unvec(np.moveaxis(found, -1, 0), part.actions.shape[1]))
-            for k in range(len(softnesses)):
-                predicted = part.predict(refits[-1][k])
-                predictions[k, self._samples.folds == fold] = predicted
-                loss[fold, k] = part.counts @ consistency_residuals(part, predicted, variance) ** 2 / part.counts.sum()
+            refits.append(unvec(np.moveaxis(found, -1, 0), samples.actions.shape[1]))
+        predictions, sizes = samples.held_out(np.stack(refits)), np.bincount(samples.folds, samples.counts)
+        squares = [samples.counts * consistency_residuals(samples, each, variance) ** 2 for each in predictions]
+        loss = np.column_stack([np.bincount(samples.folds, each) / sizes for each in squares])
         return predictions, loss, np.stack(refits, axis=1)
 
 

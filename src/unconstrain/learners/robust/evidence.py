@@ -126,19 +126,22 @@ def surely(parts: Array, least: float) -> Array:
 
     Successively without every two: eigenvectors whose eigenvalues are then up to ``least`` are given up.
     """
-    whole, basis = parts.sum(axis=0), np.eye(parts.shape[1])
-    for left_out in combinations(range(len(parts)), min(LEFT_OUT, len(parts))):
-        rest = basis.T @ (whole - sum(parts[part] for part in left_out)) @ basis
-        if not _exceeds(rest, least):
-            values, axes = np.linalg.eigh(rest)
+    left_out = np.array(list(combinations(range(len(parts)), min(LEFT_OUT, len(parts)))))
+    rests, basis = parts.sum(axis=0) - parts[left_out].sum(axis=1), np.eye(parts.shape[1])
+    if _exceed(rests, least):
+        return basis
+    for rest in rests:
+        inner = basis.T @ rest @ basis
+        if not _exceed(inner, least):
+            values, axes = np.linalg.eigh(inner)
             basis = basis @ axes[:, values > least]
     return basis
 
 
-def _exceeds(matrix: Array, least: float) -> bool:
-    """Whether all eigenvalues are above some number."""
+def _exceed(matrices: Array, least: float) -> bool:
+    """Whether all eigenvalues of all matrices (..., P, P) are above some number."""
     try:
-        np.linalg.cholesky(matrix - least * np.eye(len(matrix)))
+        np.linalg.cholesky(matrices - least * np.eye(matrices.shape[-1]))
     except np.linalg.LinAlgError:
         return False
     return True

@@ -1,6 +1,10 @@
 """Maximum a posteriori policy under the mixture model of :mod:`.sphere`, by expectation maximisation."""
 
-from collections.abc import Sequence
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import reduce
+from operator import add
 from typing import NamedTuple
 
 import numpy as np
@@ -60,13 +64,22 @@ def maximise(
     model = _GaussNewton(samples, samples.predict(best.weights), best.variance, best.mixture, best.smoothness)
     whole = model.posterior()
     weights, refits = whole.weights(samples.actions.shape[1]), []
-    for fold in range(int(samples.folds.max()) + 1):
+    for fold, start in enumerate(_without_each_fold(thinned, best)):
         rest = thinned[thinned.folds != fold]
         moving = len(rest) and rest.energy > 0.0
-        refits.append(_maximise_from(rest, best, REFIT_STEPS, noise).weights if moving else weights)
+        refits.append(_maximise_from(rest, start, REFIT_STEPS, noise).weights if moving else weights)
     held_out = samples.held_out(refits)
     found = Candidate("likelihood", weights, whole, held_out, best.variance, best.smoothness, np.stack(refits))
     return found, best.mixture
+
+
+def _without_each_fold(samples: Samples, best: _Optimum) -> Iterator[_Optimum]:
+    """One step from the optimum of all without each fold, from sums that all folds share."""
+    model = _GaussNewton(samples, samples.predict(best.weights), best.variance, best.mixture, best.smoothness)
+    parts = [model.posterior(samples.folds == fold) for fold in range(int(samples.folds.max()) + 1)]
+    for fold in range(len(parts)):
+        rest = reduce(add, (part for other, part in enumerate(parts) if other != fold or len(parts) == 1))
+        yield best._replace(weights=rest.weights(samples.actions.shape[1]))
 
 
 def mixture_of(samples: Samples, policy: Array, steps: int = 20) -> tuple[float, Array]:
@@ -113,7 +126,8 @@ def _floored(samples: Samples, variance: float) -> float:
 def _m_step(samples: Samples, policy: Array, place: Distances, found: Responsibilities) -> tuple[float, Array]:
     """Residual variance and mixing proportions, given the responsibilities."""
     counts, free, d = samples.counts, found.free, samples.actions.shape[1]
-    squares = (1.0 - free) * place.radial**2 + free * ((samples.actions - policy) ** 2).sum(axis=1)
+    off = samples.actions - policy
+    squares = (1.0 - free) * place.radial**2 + free * np.vecdot(off, off)
     return float(counts @ squares / (counts @ (1.0 - free + d * free))), counts @ found.components / counts.sum()
 
 
@@ -176,9 +190,9 @@ class _GaussNewton:
         # Residuals and constraints are autocorrelated in time, so n samples carry the information of fewer.
         along = correlation_time(place.radial[:, None], samples.groups)
         across = correlation_time(np.sqrt(tangential)[:, None] * place.turn, samples.groups)
-        size = np.linalg.norm(place.normal, axis=1)
+        size = np.sqrt(np.vecdot(place.normal, place.normal))
         normal = place.normal / np.maximum(size, 1e-300)[:, None]
-        target = (place.radial + (place.normal * self.policy).sum(axis=1)) / np.maximum(size, 1e-300)
+        target = (place.radial + np.vecdot(place.normal, self.policy)) / np.maximum(size, 1e-300)
         radial = (1.0 - free) * size**2 / (noise * along)
         at_end, turned = free / (noise * along), tangential / across
         points = turned[:, None] * (self.policy + place.turn) + at_end[:, None] * samples.actions

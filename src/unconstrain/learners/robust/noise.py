@@ -95,13 +95,13 @@ def correlation_time(residuals: Array, groups: NDArray[np.intp]) -> float:
     float
         At least 1.
     """
-    energy = float((residuals**2).sum(axis=1).mean()) if len(residuals) else 0.0
+    energy = float(np.vecdot(residuals, residuals).mean()) if len(residuals) else 0.0
     time = 1.0
     for lag in range(1, min(MOST_LAGS, len(residuals) - 1) + 1):
         same = groups[lag:] == groups[:-lag]
         if energy <= 0.0 or not same.any():
             break
-        correlation = float((residuals[lag:] * residuals[:-lag]).sum(axis=1)[same].mean()) / energy
+        correlation = float(np.vecdot(residuals[lag:], residuals[:-lag])[same].mean()) / energy
         if correlation <= LEAST_AUTOCORRELATION:
             break
         time += 2.0 * correlation
@@ -110,7 +110,7 @@ def correlation_time(residuals: Array, groups: NDArray[np.intp]) -> float:
 
 def consistency_residuals(samples: Samples, policy: Array, variance: float) -> Array:
     """ρ of each sample at predictions (N, d), under noise of some variance; see above."""
-    along = (samples.actions * (samples.actions - policy)).sum(axis=1)
+    along = np.vecdot(samples.actions, samples.actions - policy)
     return np.asarray(along - samples.actions.shape[1] * variance)
 
 

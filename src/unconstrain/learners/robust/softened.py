@@ -20,12 +20,11 @@ def softened(samples: Samples) -> list[Candidate]:
     """Direct regression and the minima of ``E_i + s E_2`` for each softness s, the softest first."""
     parts = samples.moments_by_fold
     whole, d = total(parts), samples.actions.shape[1]
-    refits = np.stack([_path(total([one for one in parts if one is not part]), d) for part in parts], axis=1)
+    refits = np.stack([_path(total([one for one in parts if one is not part]), d) for part in parts])
+    learnt = zip(_path(whole, d), samples.held_out(refits), np.moveaxis(refits, 1, 0), strict=True)
     return [
-        _candidate(name, softness, weights, without, whole, samples)
-        for name, softness, weights, without in zip(
-            _NAMES, (np.inf, *CANDIDATE_SOFTNESSES), _path(whole, d), refits, strict=True
-        )
+        _candidate(name, softness, *found, whole, samples)
+        for name, softness, found in zip(_NAMES, (np.inf, *CANDIDATE_SOFTNESSES), learnt, strict=True)
     ]
 
 
@@ -37,7 +36,7 @@ def _path(moments: Moments, d: int) -> Array:
 
 
 def _candidate(
-    name: str, softness: float, weights: Array, refits: Array, whole: Moments, samples: Samples
+    name: str, softness: float, weights: Array, held_out: Array, refits: Array, whole: Moments, samples: Samples
 ) -> Candidate:
     radial = distances(samples.actions, samples.predict(weights)).radial
     sizes = np.maximum(whole.weight, np.finfo(float).tiny)
@@ -49,7 +48,7 @@ def _candidate(
         name,
         weights,
         scaled(posterior, variance),
-        samples.held_out(refits),
+        held_out,
         samples.mean(radial**2),
         Smoothness.of(samples),
         refits,

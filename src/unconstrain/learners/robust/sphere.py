@@ -59,14 +59,14 @@ class Responsibilities(NamedTuple):
 
 def distances(actions: Array, policy: Array) -> Distances:
     """Residuals of the actions (N, d) on the spheres of the policy's predictions (N, d)."""
-    lengths = np.linalg.norm(policy, axis=1)
+    lengths = np.sqrt(np.vecdot(policy, policy))
     from_middle = actions - 0.5 * policy
-    reach = np.linalg.norm(from_middle, axis=1)
+    reach = np.sqrt(np.vecdot(from_middle, from_middle))
     along = policy / (lengths + _TINY)[:, None]
     normal = 0.5 * (from_middle / (reach + _TINY)[:, None] + along)
-    speed = np.linalg.norm(actions, axis=1)
+    speed = np.sqrt(np.vecdot(actions, actions))
     turn = actions * (lengths / (speed + _TINY))[:, None]
-    turn = turn - along * (turn * along).sum(axis=1, keepdims=True)
+    turn = turn - along * np.vecdot(turn, along)[:, None]
     return Distances(reach - 0.5 * lengths, normal, turn, lengths)
 
 
@@ -84,7 +84,8 @@ def e_step(actions: Array, policy: Array, place: Distances, variance: float, mix
         Mixing proportions: of each spread, and of the uniform component.
     """
     d = actions.shape[1]
-    along = np.maximum(((actions - policy) ** 2).sum(axis=1) - place.radial**2, 0.0)
+    off = actions - policy
+    along = np.maximum(np.vecdot(off, off) - place.radial**2, 0.0)
     radial = -0.5 * place.radial**2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
     variances = variance + np.square(ANGULAR_SPREADS) * place.lengths[:, None] ** 2
     spread = -0.5 * along[:, None] / variances - 0.5 * (d - 1) * np.log(2.0 * np.pi * variances)
