@@ -17,7 +17,7 @@ from unconstrain.learners.robust.constants import ANGULAR_SPREADS
 from unconstrain.learners.robust.likelihood import exceeds_error
 from unconstrain.learners.robust.noise import corrected, correlation_time, noise_by_differences
 from unconstrain.learners.robust.posterior import Posterior
-from unconstrain.learners.robust.segments import change_points, constrained_error, found_segments, projection_of
+from unconstrain.learners.robust.segments import change_points, found_segments, projection_of, projections_of
 from unconstrain.learners.robust.smoothness import Smoothness
 from unconstrain.learners.robust.sphere import distances, e_step
 from unconstrain.learners.thresholds import within_errors
@@ -302,4 +302,5 @@ def test_constrained_error_is_the_naive_sum():
             w * (N @ u - N @ p) @ (N @ u - N @ p)
             for u, p, w in zip(data.actions[rows], predicted[rows], samples.memberships[rows, 0], strict=True)
         )
-    assert_allclose(constrained_error(samples, labels, np.full(30, 0.2**2))(vec(weights)), expected)
+    N = projections_of(data.actions, labels, np.full(30, 0.2**2))
+    assert_allclose(samples.constrained(N)(vec(weights)), expected)

@@ -220,7 +220,11 @@ def _pack(value: Any, arrays: dict[str, np.ndarray[Any, Any]]) -> Any:
             f"code. Known are {', '.join(sorted(_KNOWN))}; add a dataclass of your own with storage.register."
         )
     parts = (
-        {field.name: getattr(value, field.name) for field in fields(value) if field.init}
+        {
+            field.name: getattr(value, field.name)
+            for field in fields(value)
+            if field.init and field.metadata.get("stored", True)
+        }
         if is_dataclass(value)
         else value.__getstate__()
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
@@ -105,12 +106,27 @@ class Samples(Shown):
         """``Σ w ‖v − π̃‖²`` for targets v (N, d), without the sums that it does not need."""
         counted = (self.counts * weights)[:, None] * self.memberships
         d, p = targets.shape[1], self.features.shape[1]
-        gram = _sum_of_products(counted, self.features, self.features)
-        cross = _sum_of_products(counted, self.features, targets)
-        gram = self.centring @ gram @ self.centring.swapaxes(1, 2)
+        gram, cross = self._gram(counted), _sum_of_products(counted, self.features, targets)
         linear = (self.centring @ cross).reshape(len(gram), p * d)
         hessian = np.einsum("mij,kl->mikjl", gram, np.eye(d)).reshape(-1, p * d, p * d)
         return Quadratic(hessian, linear, counted.T @ (targets**2).sum(axis=1))
+
+    def constrained(self, projections: Array) -> Quadratic:
+        """``Σ w ‖N (u − π̃)‖²`` with a projection N of each sample, (N, d, d)."""
+        counted = self.counts[:, None] * self.memberships
+        d, p = self.actions.shape[1], self.features.shape[1]
+        hessian = np.empty((len(self.centring), p, d, p, d))
+        for a, b in combinations_with_replacement(range(d), 2):
+            hessian[:, :, a, :, b] = hessian[:, :, b, :, a] = self._gram(counted * projections[:, a, b, None])
+        left = np.einsum("nab,nb->na", projections, self.actions)
+        linear = self.centring @ _sum_of_products(counted, self.features, left)
+        flat = hessian.reshape(-1, p * d, p * d)
+        return Quadratic(flat, linear.reshape(-1, p * d), counted.T @ np.vecdot(left, left))
+
+    def _gram(self, weights: Array) -> Array:
+        """``Σ w φφᵀ`` in features ``T_m φ``, with weights (N, M): shape (M, p, p)."""
+        gram = _sum_of_products(weights, self.features, self.features)
+        return np.asarray(self.centring @ gram @ self.centring.mT)
 
     @property
     def suspects(self) -> NDArray[np.intp]:
@@ -151,4 +167,5 @@ def _sum_of_products(weights: Array, one: Array, other: Array) -> Array:
     if weights.shape[1] == 1:
         return ((one * weights).T @ other)[None]
     products = one[:, :, None] * other[:, None, :]
-    return (weights.T @ products.reshape(len(one), -1)).reshape(-1, *products.shape[1:])
+    flat = products.reshape(len(one), one.shape[1] * other.shape[1])
+    return (weights.T @ flat).reshape(-1, *products.shape[1:])

@@ -74,7 +74,7 @@ class Comparison:
     """
 
     def __init__(self, candidates: Sequence[Candidate], noise: Array, samples: Samples | Sequence[Samples]) -> None:
-        self._candidates = candidates
+        self._candidates, self.noise = candidates, noise
         self._views = [samples] * len(candidates) if isinstance(samples, Samples) else list(samples)
         self._samples = samples = self._views[0]
         self._directions, self._lengths = unit_actions(samples.actions)
@@ -104,6 +104,12 @@ class Comparison:
             k for k, risk in enumerate(self.risks) if risk <= self.risks[best] + TIED * _gap(self._losses, k, best)[1]
         ]
         return max((self._candidates[k] for k in near), key=lambda one: one.softness)
+
+    @property
+    def as_consistent(self) -> list[Candidate]:
+        """The candidates after the first that are not less consistent than it, beyond chance, where held out."""
+        pairs = ((one, _gap(self._losses, k, 0)) for k, one in enumerate(self._candidates))
+        return [one for one, (gap, error) in pairs if one is not self._candidates[0] and gap <= REFUTED * error]
 
     @cached_property
     def risks(self) -> Array:

@@ -37,7 +37,7 @@ from .constants import (
 )
 from .noise import consistency_residuals, corrected, correlation_time, inefficiency, noise_by_differences
 from .posterior import Posterior, unit_information
-from .segments import constrained_error
+from .segments import projections_of
 from .smoothness import Smoothness
 from .sphere import distances
 
@@ -95,18 +95,27 @@ def by_segments(samples: Samples, labels: NDArray[np.intp], noise: Array) -> Can
     Predictions are cross-validated by fold, except for the projections: each is from all samples of its segment.
     ``noise`` (N,) is the variance on each action coordinate, one number for each segment.
     """
+    projections = projections_of(samples.actions, labels, noise)
+    errors = [part.constrained(projections[samples.folds == fold]) for fold, part in enumerate(samples.by_fold())]
+    return least_error("segments", samples, errors)
+
+
+def least_error(name: str, samples: Samples, errors: Sequence[Quadratic], odds: float = 1.0) -> Candidate:
+    """Minimise the sum of an error over the folds, with a prior of standard risk.
+
+    The prior's softness is the error missed over the risk missed beside it, times the unit-information factor, by
+    fixed-point iteration; ``odds`` is the number of coordinates beside the error over the number in it.
+    """
     d, ones = samples.actions.shape[1], np.ones(len(samples))
-    parts = [samples.folds == fold for fold in range(int(samples.folds.max()) + 1)]
-    errors = [constrained_error(samples[rows], labels[rows], noise[rows]) for rows in parts]
-    risks = [samples[rows].risk(samples.actions[rows], ones[rows]) for rows in parts]
-    sizes = samples.sizes
-    factor = unit_information(d * samples.features.shape[1], sizes)
+    risks = [part.risk(part.actions, ones[: len(part)]) for part in samples.by_fold()]
+    sizes, everything = samples.sizes, list(range(len(errors)))
+    factor = odds * unit_information(d * samples.features.shape[1], sizes)
 
     def posterior(of: list[int], softness: Array) -> Posterior:
         error, risk = (reduce(add, (one[i] for i in of)) for one in (errors, risks))
         return Posterior(error, softness * risk)
 
-    everything, softness = list(range(len(parts))), np.full(len(sizes), FIRST_SOFTNESS)
+    softness = np.full(len(sizes), FIRST_SOFTNESS)
     for _ in range(BALANCE_STEPS):
         whole = posterior(everything, softness)
         weights = vec(whole.weights(d))
@@ -119,7 +128,7 @@ def by_segments(samples: Samples, labels: NDArray[np.intp], noise: Array) -> Can
     residual = np.maximum(loss, 1e-12 * reduce(add, risks).constant) / np.maximum(sizes, 1e-300)
     time = correlation_time(radial[:, None], samples.groups)
     return Candidate(
-        "segments",
+        name,
         best,
         scaled(found, time * residual),
         samples.held_out(refits),

@@ -192,3 +192,34 @@ LEAST_SMOOTH_MISFIT = 0.005
 
 With 1.5 %, 95 % intervals held the truth of affine policies 97 to 100 % of the time, with this one 92 to 100 %.
 """
+
+# Known Jacobians
+
+MISFITS_OF_JACOBIAN = (0.005, 0.02, 0.05, 0.1)
+"""Misfits τ of a known Jacobian that are tried, as shares of the actions; kinds that come out alike are tried once."""
+
+HELD_VARIANCES = 2.0
+"""A combination of rows was held if the variance along it is below so many times that of noise and misfit."""
+
+NOISE_OF_KIND = 0.25
+MISFIT_OF_KIND = 9.0
+"""A demonstration is of a kind if the variance along its rows exceeds the noise's by less than this share and four
+standard errors, and the misfit's, thrice the standard deviation."""
+
+LEAST_OF_KIND = 5
+LEAST_SHARE_OF_KIND = 0.1
+"""Demonstrations of a kind, at least, and as a share of all."""
+
+KIND_TRIES = 40
+"""Triples of demonstrations from which each kind is sought."""
+
+MOST_KINDS = 4
+
+SAMPLES_OF_KIND = 20
+"""Samples of a demonstration, about, by which it is compared with a kind."""
+
+FREE_OF_KINDS = 3.0
+"""A demonstration of no kind was free if it misses the policy by less than so many times what those of a kind miss."""
+
+ROUNDS_OF_KINDS = 3
+"""Rounds of policy and free demonstrations, each from the other."""

@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -22,6 +22,7 @@ from .choice import Comparison
 from .consistent import by_segments, noise_corrected
 from .constants import LEAST_INFORMATIVE, LEAST_MISFIT
 from .held_out import held_out_together
+from .kinematics import Jacobian, with_jacobian
 from .likelihood import maximise
 from .noise import hides_sphere, noise_by_differences, noise_of_each
 from .posterior import Posterior
@@ -185,8 +186,13 @@ class Robust(_Maximising):
     ----------
     steps, most : int
         See :class:`Likelihood`.
+    jacobian : callable, optional
+        Jacobian J of a task, states (N, n) to (N, r, d), such as that of a robot's hand. A candidate then is the policy
+        of least constrained error under ``A = Λ J``, with Λ and its rank from the demonstrations; see
+        :mod:`unconstrain.learners.robust.held_rows`. It is not stored with a policy.
     """
 
+    jacobian: Jacobian | None = field(default=None, metadata={"stored": False})
     needs_samples: ClassVar[bool] = False
     uses_samples: ClassVar[bool] = True
 
@@ -202,7 +208,7 @@ class Robust(_Maximising):
         return compared.best, {"candidates": compared.judged()}
 
     def compared(self, samples: Samples, training: Training) -> Comparison:
-        """All candidates."""
+        """All candidates; those that use the Jacobian if they are as consistent as the best that does not, or more."""
         corrected, most = noise_corrected(samples), _most_noise(samples)
         noise = noise_of_each(samples.actions, samples.groups, most)
         learnt = [*softened(samples), corrected]
@@ -211,7 +217,12 @@ class Robust(_Maximising):
         likely, mixture = self._maximised(samples, training, corrected)
         if 1.0 - mixture[-1] > LEAST_INFORMATIVE and not hides_sphere(likely.variance, samples):
             learnt.append(likely)
-        return Comparison(learnt, np.minimum(noise, min(most, corrected.variance)), samples)
+        least = min(most, corrected.variance)
+        found = Comparison(learnt, np.minimum(noise, least), samples)
+        if self.jacobian is None:
+            return found
+        beside = Comparison([found.best, *with_jacobian(samples, self.jacobian, least)], found.noise, samples)
+        return Comparison([*learnt, *beside.as_consistent], found.noise, samples)
 
     def suited(self, begun: Mapping[str, Training], seen: Iterable[Batch] | None) -> str:
         """The name of the model in which the policy of least estimated error is learnt.

@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array
-from ...risks import Quadratic
-from ...training import Samples
 from .constants import LEAST_SEGMENT, SEGMENT_SIGNAL_TO_NOISE
 
 
@@ -91,26 +89,19 @@ def found_segments(actions: Array, groups: NDArray[np.intp], noise: float) -> ND
     return np.cumsum(starts) - 1
 
 
-def constrained_error(samples: Samples, labels: NDArray[np.intp], noise: Array) -> Quadratic:
-    """``Σ w ‖N̂ u − N̂ π̃‖²`` with the projection N̂ estimated from each segment's actions.
+def projections_of(actions: Array, labels: NDArray[np.intp], noise: Array) -> Array:
+    """The projection N̂ of each sample's segment, (N, d, d), estimated from the segment's actions.
 
     Parameters
     ----------
-    samples : Samples
+    actions : ndarray, shape (N, d)
     labels : ndarray of int, shape (N,)
         Segment of each sample.
     noise : ndarray, shape (N,)
         Variance of the noise on each action coordinate, one number for each segment.
     """
-    d, p = samples.actions.shape[1], samples.features.shape[1]
-    models = samples.memberships.shape[1]
-    whole = Quadratic(np.zeros((models, p * d, p * d)), np.zeros((models, p * d)), np.zeros(models))
+    found = np.empty((len(actions), actions.shape[1], actions.shape[1]))
     for label in np.unique(labels):
         rows = labels == label
-        segment = samples[rows]
-        projection = projection_of(segment.actions, float(np.sqrt(noise[rows][0])))
-        risk = segment.risk(segment.actions @ projection, np.ones(len(segment)))
-        blocks = risk.hessian.reshape(models, p, d, p, d)
-        hessian = np.einsum("miajb,bc->miajc", blocks, projection).reshape(models, p * d, p * d)
-        whole = whole + Quadratic(hessian, risk.linear, risk.constant)
-    return whole
+        found[rows] = projection_of(actions[rows], float(np.sqrt(noise[rows][0])))
+    return found

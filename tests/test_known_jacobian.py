@@ -1,0 +1,127 @@
+"""The default learner with the Jacobian of a task: which of its rows were held is found, and used where it explains."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import unconstrain as uc
+from unconstrain.learners.robust.held_rows import UNKNOWN, HeldRows
+from unconstrain.learners.robust.noise import noise_by_differences
+from unconstrain.paper.systems.arm import Arm
+
+ARM = Arm.from_dh([1.0, 0.8, 0.6], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [2.0, 2.0, 2.0])
+"""Three joints in a plane; of its hand's six coordinates, x, y and the turn about z can move."""
+
+
+def planar(states):
+    """Jacobian of x and y of the hand, (N, 2, 3)."""
+    return ARM.jacobian(states)[:, :2]
+
+
+def posture(states):
+    return 0.6 * (np.array([0.4, -0.5, 0.8]) - states)
+
+
+def demonstrate(held, count=24, noise=0.02, seed=1):
+    """Demonstrations from any posture, each under rows of Λ J; ``held`` is Λ of each in turn, None where free."""
+    rng = np.random.default_rng(seed)
+    starts, demos = rng.uniform(-1.5, 1.5, (count, 3)), []
+    for index, start in enumerate(starts):
+        rows = held[index % len(held)]
+        constraint = None if rows is None else (lambda x, t, rows=rows: np.asarray(rows) @ planar(x))
+        demos += uc.rollout(posture, start[None], 40, 0.08, constraint)
+    size = noise * np.sqrt(np.mean([np.mean(demo.actions**2) for demo in demos]))
+    return [
+        uc.Demonstration(demo.states, demo.actions + size * rng.standard_normal(demo.actions.shape), demo.times)
+        for demo in demos
+    ]
+
+
+def learnt(demos, jacobian):
+    return uc.LocallyLinearPolicy(learner=uc.Robust(jacobian=jacobian)).fit_demonstrations(demos)
+
+
+def error(policy, seed=9):
+    states = np.concatenate([demo.states for demo in demonstrate([None], seed=seed, noise=0.0)])
+    return float(
+        ((policy(states) - posture(states)) ** 2).sum() / ((posture(states) - posture(states).mean(0)) ** 2).sum()
+    )
+
+
+@pytest.fixture(scope="module")
+def one_row():
+    """All demonstrations hold the same oblique combination of x and y."""
+    return demonstrate([[[0.8, 0.6]]])
+
+
+def test_what_was_held_is_found_and_improves_the_policy(one_row):
+    policy, without = learnt(one_row, planar), learnt(one_row, None)
+    assert policy.solution_.method.startswith("rows of the Jacobian (within 0.5%) held: 1")
+    assert error(policy) < 0.1 * error(without)
+    assert error(policy) < 5e-3
+
+
+def test_the_rows_are_those_that_were_held_and_the_rank_is_right(one_row):
+    states, actions, groups = uc.stack(one_row)
+    _, groups = np.unique(groups, return_inverse=True)
+    for noise in (1e-6, 1e-4):
+        kinds = HeldRows(actions, planar(states), groups, noise).kinds(0.02)
+        assert [len(rows) for rows in kinds.rows] == [1]
+        direction = kinds.rows[0][0] / np.linalg.norm(kinds.rows[0][0])
+        assert abs(direction @ [0.8, 0.6]) > 0.999
+        assert (kinds.labels != UNKNOWN).all()
+
+
+def test_demonstrations_of_two_kinds_and_free_ones_are_told_apart():
+    demos = demonstrate([[[1.0, 0.0]], [[0.0, 1.0]], None], count=36)
+    states, actions, groups = uc.stack(demos)
+    _, groups = np.unique(groups, return_inverse=True)
+    kinds = HeldRows(actions, planar(states), groups, noise_by_differences(actions, groups)).kinds(0.02)
+    assert sorted(len(rows) for rows in kinds.rows) == [1, 1]
+    first, second = (kinds.labels[0], kinds.labels[1])
+    assert first != second
+    expected = np.tile([first, second, UNKNOWN], 12)
+    assert (kinds.labels == expected).all()
+    policy = learnt(demos, planar)
+    assert "of the Jacobian" in policy.solution_.method
+    assert error(policy) < 1e-4
+
+
+def test_projections_are_of_the_rows_held(one_row):
+    states, actions, groups = uc.stack(one_row)
+    _, groups = np.unique(groups, return_inverse=True)
+    kinds = HeldRows(actions, planar(states), groups, 1e-6).kinds(0.02)
+    N = kinds.projections(planar(states), groups)
+    truth = uc.constraints.JacobianRows(lambda x: np.array([[0.8, 0.6]]) @ planar(x), (0,))(
+        states, np.zeros(len(states))
+    )
+    assert_allclose(N @ N, N, atol=1e-12)
+    leak = (truth @ N)[:, 0]
+    assert np.linalg.norm(leak, axis=1).mean() < 0.02 * np.linalg.norm(truth[:, 0], axis=1).mean()
+
+
+@pytest.mark.parametrize("case", ["free", "wrong kinematics"])
+def test_where_the_jacobian_explains_nothing_the_result_is_as_without(case, one_row):
+    if case == "free":
+        demos, jacobian = demonstrate([None]), planar
+    else:
+        demos, jacobian = one_row, lambda states: planar(np.roll(states, 1, axis=1) + 1.0)
+    known, without = learnt(demos, jacobian), learnt(demos, None)
+    assert error(known) < 1.01 * error(without)
+
+
+def test_a_jacobian_of_another_shape_is_refused(one_row):
+    with pytest.raises(
+        uc.errors.InvalidDataError, match=r"jacobian: got an array of shape \(\d+, 3\), expected \(\d+, rows, 3"
+    ):
+        learnt(one_row, lambda states: states)
+    with pytest.raises(uc.errors.InvalidDataError, match="jacobian: found NaN"):
+        learnt(one_row, lambda states: np.full((len(states), 1, 3), np.nan))
+
+
+def test_the_policy_is_stored_without_the_jacobian(one_row, tmp_path):
+    policy = learnt(one_row, planar)
+    uc.save(policy, tmp_path / "policy.npz")
+    loaded = uc.load(tmp_path / "policy.npz")
+    assert loaded.learner == uc.Robust()
+    assert_allclose(loaded(one_row[0].states), policy(one_row[0].states))
