@@ -801,7 +801,7 @@ def test_a_policy_file_that_is_not_ours_is_refused(files, tmp_path, command):
             ("--start", "1,nan"),
             "Invalid value for '--start': got '1,nan', expected finite numbers separated by commas, such as 0.1,0,-2.",
         ),
-        (("--start", "0,0", "--plane", "1,0,0"), "--plane: got 3 numbers, expected 2, as many as states."),
+        (("--start", "0,0", "--plane", "1,0,0"), "--plane: got 3 numbers, expected 2, one for each action."),
         (("--start", "0,0", "--dt", "0"), "dt: got 0.0, expected a number above 0.0."),
         (("--start", "0,0", "--steps", "0"), "Invalid value for '--steps': 0 is not in the range x>=1."),
         ((), "Missing option '--start'."),

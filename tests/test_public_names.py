@@ -60,6 +60,7 @@ ROOMS = {
         "preparation": "recordings.preparation",
         "readers": "recordings.readers",
         "robust": "learners.robust",
+        "spaces": "models.spaces",
         "storage": "storage",
         "systems": "paper.systems",
         "writers": "recordings.writers",

@@ -34,6 +34,7 @@ from .models import NormalisedRBF as NormalisedRBF
 from .models import Polynomial as Polynomial
 from .models import ReceptiveFields as ReceptiveFields
 from .models import cover as cover
+from .models import spaces as spaces
 from .motion import Contained as Contained
 from .motion import rollout as rollout
 from .paper import datasets as datasets

@@ -193,17 +193,17 @@ def rollout(
     policy: str, start: tuple[float, ...], steps: int, dt: float, plane: tuple[float, ...] | None, output: str
 ) -> None:
     """Roll POLICY out, freely or on a plane, and write it as CSV."""
-    learnt, recipe = _fitted(policy), uc.storage.load_notes(policy).get("recipe", {})
+    learnt, recipe = _fitted(policy), uc.Recipe.from_dict(uc.storage.load_notes(policy).get("recipe", {}))
     if len(start) != learnt.n_features_in_:
         raise SettingError(f"--start: got {len(start)} numbers, expected {learnt.n_features_in_}, one for each state.")
-    constraint = _plane(plane, len(start), "as many as states")
+    constraint = _plane(plane, learnt.n_outputs_, "one for each action")
     path = uc.rollout(learnt, list(start), steps, dt, constraint)
-    states = recipe.get("states") or [f"x{i + 1}" for i in range(len(start))]
+    columns = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))
     try:
         support = learnt.support(path.states)
     except SettingError:  # an affine or polynomial policy has no support
         support = None
-    table = _csv(["t", *states, *(f"v{name}" for name in states)], path)
+    table = _csv(["t", *(columns.states or ()), *columns.directions], path)
     if output == "-":
         click.echo(table, nl=False)
     else:

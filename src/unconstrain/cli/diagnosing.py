@@ -49,7 +49,7 @@ def diagnose(
     say(uc.preparation.doubts(len(demonstrations), missed), "diagnose")
     refuse_warnings(reading["strict"])
     states = recipe.states or ()
-    actions = recipe.actions or tuple(f"v{name}" for name in states)
+    actions = recipe.actions or recipe.directions
     if as_json:
         click.echo(json.dumps(found.to_json() | {"states": states, "actions": actions}, indent=2))
     else:

@@ -37,7 +37,10 @@ def numbers(text: str) -> tuple[float, ...]:
 
 
 CURES = (
-    click.option("--angle", type=names, help="State columns that are wrapped angles, such as roll,yaw."),
+    click.option("--angle", type=names, help="State columns that are angles, such as roll,yaw."),
+    click.option(
+        "--angle-unit", type=click.Choice(["rad", "deg"]), help="Unit of the angles, if the file does not say."
+    ),
     click.option(
         "--quaternion", "quaternions", multiple=True, help="Four state columns of a quaternion; several times."
     ),
@@ -127,7 +130,11 @@ def recipe_of(
         quaternions=groups_of_names(quaternions),
         rotation_vectors=groups_of_names(rotation_vectors),
         max_gap_s=max_gap,
-        **{name: others[name] for name in ("sort", "glitches", "seams", "pauses", "action_is") if name in others},
+        **{
+            name: others[name]
+            for name in ("sort", "glitches", "seams", "pauses", "action_is", "angle_unit")
+            if name in others
+        },
     )
     return recipe if window is None else replace(recipe, window_s=window)
 
@@ -139,7 +146,9 @@ def complete(recipe: uc.Recipe, recording: uc.Recording) -> uc.Recipe:
 
 def said_recipe(recipe: uc.Recipe, recording: uc.Recording) -> str:
     """A recipe in words, with the smoothing window that it makes of a recording."""
-    states = ", ".join(recipe.states or ())
+    angle = f" (an angle in {recipe.angle_unit})"
+    states = ", ".join(f"{name}{angle if name in recipe.angles else ''}" for name in recipe.states or ())
+    states += "".join(f" ({', '.join(group)} are an orientation)" for group in recipe.quaternions)
     window = uc.preparation.window_used(recipe, recording)
     smoothed = f"savgol, {window:.3g} s" if recipe.differentiate == "savgol" else "central differences"
     actions = f"their velocity ({smoothed})" if recipe.actions is None else f"{', '.join(recipe.actions)} as actions"

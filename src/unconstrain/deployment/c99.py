@@ -2,7 +2,8 @@
 
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from functools import singledispatch
 from importlib import resources
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from ..base import files
 from ..base.arrays import Array
 from ..base.errors import SettingError
-from ..models import ClosedForm
+from ..models import ClosedForm, spaces
 
 TOLERANCE = 1e-9
 """The self-test allows this share of the largest action: mathematics libraries differ in the last digit of ``exp``."""
@@ -36,9 +37,9 @@ def c_source(form: ClosedForm, name: str, states: Array, actions: Array) -> str:
     """C99 source of ``void NAME_step(const double state[n], double action[d])``.
 
     Constants are hexadecimal, so that no digit is lost. The file needs
-    nothing but ``exp`` from the standard library. With ``NAME_SELF_TEST``
-    defined, in capitals, it has a ``main`` that compares itself with the
-    given actions.
+    nothing but ``exp``, where states are angles also ``sin`` and ``cos``, from
+    the standard library. With ``NAME_SELF_TEST`` defined, in capitals, it has a
+    ``main`` that compares itself with the given actions.
 
     Parameters
     ----------
@@ -55,7 +56,10 @@ def c_source(form: ClosedForm, name: str, states: Array, actions: Array) -> str:
     """
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         raise SettingError(f"name: got {name!r}, expected a name in C: a letter, then letters, digits, underscores.")
-    n, d, models = form.sizes
+    (m, d, models), n, straight = form.sizes, states.shape[1], form.embedding.frame is None
+    defined = f"void {name}_step(const double state[{n}]"
+    if not straight:
+        defined = f"static void {name}_of_coordinates(const double state[{m}]"
     fill = {
         "name": name,
         "NAME": name.upper(),
@@ -65,6 +69,13 @@ def c_source(form: ClosedForm, name: str, states: Array, actions: Array) -> str:
         "n": str(n),
         "d": str(d),
         "models": str(models),
+        "more": "" if straight else f", {name.upper()}_COORDINATES = {m}",
+        "inputs": "STATES" if straight else "COORDINATES",
+        "needs": "exp()" if straight else "exp(), sin() and cos()",
+        "defined": f"{defined}, double action[{d}])",
+        "frame": "" if form.embedding.frame is None else _braced(form.embedding.frame),
+        "own": "\n".join(_own_coordinates(form, name)),
+        "rotation": _braced(spaces.ROTATION),
         "tests": str(len(states)),
         "origin": _braced(form.origin),
         "maps": _braced(form.maps if form.is_affine else form.maps[:, :, 0]),
@@ -76,7 +87,7 @@ def c_source(form: ClosedForm, name: str, states: Array, actions: Array) -> str:
         "test_actions": _braced(actions),
         "tolerance": float(TOLERANCE * np.abs(actions).max()).hex(),
     }
-    source = "".join(_template(part) for part in ("head", *_body(form), "self_test"))
+    source = "".join(_template(part) for part in ("head", *_body(form), *_end(form), "self_test"))
     return re.sub(r"@([a-z_]+|NAME)@", lambda found: fill[found[1]], source)
 
 
@@ -85,6 +96,39 @@ def _body(form: ClosedForm) -> tuple[str, ...]:
     if form.exponents is not None:
         return "shares", "maps" if form.is_affine else "constants"
     return ("affine",) if form.monomials is None else ("polynomial",)
+
+
+def _end(form: ClosedForm) -> tuple[str, ...]:
+    """Names of the templates between the policy of coordinates and that of states."""
+    if form.embedding.frame is None:
+        return ()
+    return "rotation", "coordinates"
+
+
+def _own_coordinates(form: ClosedForm, name: str) -> Iterator[str]:
+    """Statements that set the coordinates ``own`` of the ``state``, before they are turned."""
+    column = place = 0
+    for factor in form.embedding.space.factors:
+        columns, size, _ = factor.sizes
+        yield from _statements(factor, [f"state[{column + i}]" for i in range(columns)], place, name)
+        column, place = column + columns, place + size
+
+
+@singledispatch
+def _statements(_: spaces.Space, states: Sequence[str], place: int, _name: str) -> list[str]:
+    return [f"    own[{place + i}] = {state};" for i, state in enumerate(states)]
+
+
+@_statements.register(spaces.Circle)
+def _of_angle(space: spaces.Circle, states: Sequence[str], place: int, _name: str) -> list[str]:
+    radius = _hexadecimal(space.radius)
+    pairs = enumerate(("cos", "sin"), place)
+    return [f"    own[{i}] = {radius} * {function}({states[0]} / {radius});" for i, function in pairs]
+
+
+@_statements.register(spaces.Sphere)
+def _of_quaternion(space: spaces.Sphere, states: Sequence[str], place: int, name: str) -> list[str]:
+    return [f"    {name}_rotation({', '.join(states[i] for i in space.places)}, own + {place});"]
 
 
 def _template(part: str) -> str:
@@ -100,7 +144,7 @@ def _probes(form: ClosedForm) -> Array:
     """States for a self-test, inside and far outside, the same for the same policy."""
     drawn = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * SELF_TESTS, len(form.origin)))
     drawn[SELF_TESTS:] *= FAR ** (1 / form.degree)
-    return form.origin + form.reach * drawn
+    return form.embedding.states(form.origin + form.reach * drawn)
 
 
 def _braced(values: NDArray[Any], said: Callable[[Any], str] = _hexadecimal) -> str:

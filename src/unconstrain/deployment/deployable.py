@@ -75,7 +75,7 @@ class Deployable:
         return self.training_.model.formula(self.solution_.weights)
 
     def export_c(self, path: str | os.PathLike[str], name: str = "policy") -> None:
-        """Write the policy as one C99 file that needs only ``exp`` of the standard library.
+        """Write the policy as one C99 file that needs only ``exp`` (``sin``, ``cos``) of the standard library.
 
         It defines ``void NAME_step(const double state[n], double action[d])``
         and, with ``NAME_SELF_TEST`` (in capitals) defined, a ``main`` that

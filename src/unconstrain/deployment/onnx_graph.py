@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from functools import partial, reduce
+from functools import partial, reduce, singledispatch
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..base import files
 from ..base.arrays import Array, require_extra
-from ..models import ClosedForm
+from ..models import ClosedForm, spaces
 
 OPSET = 17
 """Of the standard operators; runtimes of 2022 know it."""
@@ -36,8 +36,9 @@ def onnx_model(form: ClosedForm) -> bytes:
     from onnx import TensorProto, checker, helper
 
     n, d, _ = form.sizes
+    columns = form.embedding.states(form.origin[None]).shape[1]
     graph = _Graph()
-    relative = graph.add("Sub", "states", graph.constant("origin", form.origin))
+    relative = graph.add("Sub", _coordinates(graph, form), graph.constant("origin", form.origin))
     if form.exponents is not None:
         exponents = graph.affine(relative, form.exponents[:, :n].T, form.exponents[:, n], "exponents")
         _blended(graph, form, relative, graph.add("Softmax", exponents, axis=-1))
@@ -49,7 +50,7 @@ def onnx_model(form: ClosedForm) -> bytes:
     made = helper.make_graph(
         graph.nodes,
         "unconstrain_policy",
-        [helper.make_tensor_value_info("states", double, ["N", n])],
+        [helper.make_tensor_value_info("states", double, ["N", columns])],
         [helper.make_tensor_value_info("actions", double, ["N", d])],
         graph.constants,
     )
@@ -58,6 +59,40 @@ def onnx_model(form: ClosedForm) -> bytes:
     )
     checker.check_model(model, full_check=True)
     return bytes(model.SerializeToString())
+
+
+def _coordinates(graph: _Graph, form: ClosedForm) -> str:
+    """Coordinates of the ``states``, which are these themselves where no angle is among them."""
+    frame, column, own = form.embedding.frame, 0, list[str]()
+    if frame is None:
+        return "states"
+    for factor in form.embedding.space.factors:
+        stop = column + factor.sizes[0]
+        own.append(_own_coordinates(factor, graph, np.arange(column, stop), f"column_{column}"))
+        column = stop
+    return graph.add("MatMul", graph.add("Concat", *own, axis=1), graph.constant("frame", frame.T))
+
+
+@singledispatch
+def _own_coordinates(_: spaces.Space, graph: _Graph, columns: NDArray[np.intp], name: str) -> str:
+    return graph.gathered(columns, name)
+
+
+@_own_coordinates.register(spaces.Circle)
+def _of_angle(space: spaces.Circle, graph: _Graph, columns: NDArray[np.intp], name: str) -> str:
+    radius = graph.constant(f"{name}_radius", np.array(space.radius))
+    quarter = graph.constant(f"{name}_quarter", np.array([np.pi / 2, 0.0]))  # runtimes lack a double cosine
+    angles = graph.add("Add", graph.add("Div", graph.gathered(columns, name), radius), quarter)
+    return graph.add("Mul", graph.add("Sin", angles), radius)
+
+
+@_own_coordinates.register(spaces.Sphere)
+def _of_quaternion(space: spaces.Sphere, graph: _Graph, columns: NDArray[np.intp], name: str) -> str:
+    first, second = columns[space.places][spaces.PAIRS.T]
+    products = graph.add("Mul", graph.gathered(first, f"{name}_first"), graph.gathered(second, f"{name}_second"))
+    length = graph.constant(f"{name}_length", np.eye(10)[:4].sum(axis=0)[:, None])
+    unit = graph.add("Div", products, graph.add("MatMul", products, length))
+    return graph.add("MatMul", unit, graph.constant(f"{name}_rotation", spaces.ROTATION.T))
 
 
 def _blended(graph: _Graph, form: ClosedForm, relative: str, shares: str) -> None:
@@ -108,6 +143,10 @@ class _Graph:
         result = to or f"{operator.lower()}_{len(self.nodes)}"
         self.nodes.append(helper.make_node(operator, inputs, [result], **settings))
         return result
+
+    def gathered(self, columns: NDArray[np.intp], name: str) -> str:
+        """Some columns of the states."""
+        return self.add("Gather", "states", self.constant(name, columns.astype(np.int64)), axis=1)
 
     def affine(self, of: str, slopes: Array, offsets: Array, name: str, to: str = "") -> str:
         parts = self.constant(f"{name}_slopes", slopes), self.constant(f"{name}_offsets", offsets)

@@ -1,6 +1,7 @@
 """One state at a time, in Python, with nothing but the arithmetic."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from threading import local
 from typing import TypeAlias
 
@@ -9,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import Array
 from ..base.errors import InvalidDataError
-from ..models import ClosedForm, Model
+from ..models import ClosedForm, Model, spaces
 
 Step: TypeAlias = Callable[[ArrayLike, Array | None], Array]
 """From a state (n,) to an action (d,), written into the second argument if that is given."""
@@ -37,13 +38,14 @@ def stepper(model: Model, weights: Array, n: int) -> Step:
     form = model.fields.formula(model.features, weights)
     if form is None:
         return _without_formula(model, weights[0], n)
+    form = replace(form, embedding=model.embedding)
     if form.exponents is not None:
         return _blended(form, form.exponents)
     return _affine(form) if form.monomials is None else _polynomial(form, form.monomials)
 
 
 def _without_formula(model: Model, weights: Array, n: int) -> Step:
-    relative, dot = _relative_to(np.zeros(n)), np.dot
+    relative, dot = _relative_to(np.zeros(n), spaces.Embedding()), np.dot
 
     def step(state: ArrayLike, out: Array | None = None) -> Array:
         row = np.empty((1, n))
@@ -55,7 +57,7 @@ def _without_formula(model: Model, weights: Array, n: int) -> Step:
 
 def _affine(form: ClosedForm) -> Step:
     n, d, _ = form.sizes
-    relative, dot = _relative_to(form.origin), np.dot
+    relative, dot = _relative_to(form.origin, form.embedding), np.dot
     whole = np.ascontiguousarray(form.maps[0])
     buffers = _PerThread(n, 0, d)
 
@@ -68,7 +70,7 @@ def _affine(form: ClosedForm) -> Step:
 
 
 def _polynomial(form: ClosedForm, monomials: NDArray[np.intp]) -> Step:
-    relative, take, multiply, dot = _relative_to(form.origin), np.take, np.multiply, np.dot
+    relative, take, multiply, dot = _relative_to(form.origin, form.embedding), np.take, np.multiply, np.dot
     whole, (first, *others) = np.ascontiguousarray(form.maps[0]), np.ascontiguousarray(monomials.T)
     buffers = _PerThread(len(form.origin), len(monomials), len(monomials))
 
@@ -85,7 +87,13 @@ def _polynomial(form: ClosedForm, monomials: NDArray[np.intp]) -> Step:
 
 def _blended(form: ClosedForm, exponents: Array) -> Step:
     n, d, models = form.sizes
-    relative, exp, dot, divide, affine = _relative_to(form.origin), np.exp, np.dot, np.divide, form.is_affine
+    relative, exp, dot, divide, affine = (
+        _relative_to(form.origin, form.embedding),
+        np.exp,
+        np.dot,
+        np.divide,
+        form.is_affine,
+    )
     # A column of ones, so that one product gives the blend and the sum of the shares.
     slopes, maps = np.ascontiguousarray(exponents), np.column_stack([form.maps.reshape(models, -1), np.ones(models)])
     buffers = _PerThread(n, models, maps.shape[1])
@@ -103,13 +111,13 @@ def _blended(form: ClosedForm, exponents: Array) -> Step:
     return step
 
 
-def _relative_to(origin: Array) -> Callable[[ArrayLike, Array], None]:
-    subtract, n = np.subtract, len(origin)
+def _relative_to(origin: Array, embedding: spaces.Embedding) -> Callable[[ArrayLike, Array], None]:
+    subtract, n, straight = np.subtract, embedding.states(origin[None]).shape[1], embedding.frame is None
 
     def relative(state: ArrayLike, out: Array) -> None:
         try:
             if len(state) == n:  # type: ignore[arg-type]  # what has no length is refused below
-                subtract(state, origin, out)
+                subtract(state if straight else embedding(np.asarray([state], np.float64))[0], origin, out)
                 return
         except (TypeError, ValueError):
             pass

@@ -250,11 +250,12 @@ def _regions(
     policy: Policy, demos: list[Demonstration], undetermined: Array, known: Array, typical: float
 ) -> tuple[Region, ...]:
     states, actions, groups = stack(demos)
-    fields = policy.fields_ if hasattr(policy, "fields_") else cover(states, choose_variance(states))
-    nearest = fields.weights(states).argmax(axis=1)
-    found = [
-        (centre, rows) for index, centre in enumerate(fields.centres) if len(rows := np.flatnonzero(nearest == index))
-    ]
+    embedding = policy.training_.model.embedding
+    seen = embedding(states)
+    fields = policy.fields_ if hasattr(policy, "fields_") else cover(seen, choose_variance(seen))
+    nearest = fields.weights(seen).argmax(axis=1)
+    centres = enumerate(embedding.states(fields.centres))
+    found = [(centre, rows) for index, centre in centres if len(rows := np.flatnonzero(nearest == index))]
     found.sort(key=lambda one: -undetermined[one[1]].max())
     worst = [int(rows[undetermined[rows].argmax()]) for _, rows in found]
     directions, along = _least_determined(policy, states[worst])

@@ -251,13 +251,13 @@ class _Spread:
     """Propagates covariances of the weights to the predictions at some states."""
 
     def __init__(self, model: Model, states: Array) -> None:
-        self._features, shares = model.design(states), model.fields.shares(states)
-        centring, p = model.centring, self._features.shape[1]
-        self._models = list(zip(shares.T, np.eye(p)[None] if centring is None else centring, strict=True))
+        self._features, shares = model.design(states), model.shares(states)
+        centring = np.eye(self._features.shape[1])[None] if model.centring is None else model.centring
+        self._models, self._regressors = list(zip(shares.T, centring, strict=True)), centring.shape[1]
 
     def of(self, covariance: Array) -> Array:
         """Standard deviation of each action coordinate, averaged over the models by their shares, shape (N, d)."""
-        p = self._features.shape[1]
+        p = self._regressors
         d = covariance.shape[1] // p
         spread = np.zeros((len(self._features), d))
         for (share, change), blocks in zip(self._models, covariance, strict=True):
@@ -270,7 +270,7 @@ class _Spread:
 
     def covariances(self, covariance: Array) -> Array:
         """Covariance of the actions, shape (N, d, d)."""
-        p = self._features.shape[1]
+        p = self._regressors
         d = covariance.shape[1] // p
         spread = self.of(covariance)
         mixed = np.zeros((len(self._features), d, d))

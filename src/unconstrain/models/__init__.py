@@ -1,5 +1,6 @@
-"""Models of a policy: features, receptive fields, and their closed form."""
+"""Models of a policy: features, receptive fields, state spaces, and their closed form."""
 
+from . import spaces
 from .features import Affine, FeatureMap, KMeansRBF, NormalisedRBF, Placeable, Polynomial
 from .formula import ClosedForm
 from .model import Model
@@ -18,4 +19,5 @@ __all__ = [
     "ReceptiveFields",
     "choose_variance",
     "cover",
+    "spaces",
 ]

@@ -1,19 +1,20 @@
 """Closed form of a fitted policy, without estimator, moments or feature map."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..base.display import Shown, counted
+from .spaces import Embedding
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ClosedForm(Shown):
     """Affine maps blended by normalised Gaussian kernels.
 
-    With ``z = x − origin``,
+    With ``z = x − origin`` in the coordinates of the state space, which are the states where those are Euclidean,
 
         ``π̃(x) = Σ_m s_m(x) (A_m z + b_m)``,  ``s_m = exp(e_m) / Σ_k exp(e_k)``,
 
@@ -25,15 +26,17 @@ class ClosedForm(Shown):
 
     Parameters
     ----------
-    origin : ndarray, shape (n,)
-    maps : ndarray, shape (M, d, n + 1), (M, d, 1) or (1, d, p)
+    origin : ndarray, shape (m,)
+    maps : ndarray, shape (M, d, m + 1), (M, d, 1) or (1, d, p)
         ``(A_m, b_m)``, or ``b_m`` alone, or factors of the monomials.
-    exponents : ndarray, shape (M, n + 1), optional
+    exponents : ndarray, shape (M, m + 1), optional
         ``(slope_m, offset_m)``; see :func:`exponents`. Without it M is 1.
-    reach : ndarray, shape (n,)
+    reach : ndarray, shape (m,)
         Extent of the data from the origin along each axis; the range of self-tests.
     monomials : ndarray of int, shape (p, degree), optional
         Monomial j is the product of the entries ``monomials[j]`` of ``(z, 1)``. Without exponents only.
+    embedding : Embedding
+        States (n,) to coordinates (m,).
     """
 
     origin: Array
@@ -41,10 +44,11 @@ class ClosedForm(Shown):
     exponents: Array | None
     reach: Array
     monomials: NDArray[np.intp] | None = None
+    embedding: Embedding = field(default_factory=Embedding)
 
     @property
     def sizes(self) -> tuple[int, int, int]:
-        """Numbers of states n, of actions d, and of models M."""
+        """Numbers of coordinates m, of actions d, and of models M."""
         return len(self.origin), self.maps.shape[1], self.maps.shape[0]
 
     @property
@@ -58,7 +62,8 @@ class ClosedForm(Shown):
         return 1 if self.monomials is None else self.monomials.shape[1]
 
     def _summary(self) -> tuple[str, ...]:
-        return tuple(map(counted, self.sizes, ("state", "action", "model")))
+        states = self.embedding.states(self.origin[None]).shape[1]
+        return tuple(map(counted, (states, *self.sizes[1:]), ("state", "action", "model")))
 
 
 def exponents(centres: Array, variance: float, origin: Array) -> Array:

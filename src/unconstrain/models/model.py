@@ -1,6 +1,6 @@
 """Model of a policy: features and receptive fields, without weights."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
@@ -12,12 +12,16 @@ from ..base.errors import SettingError
 from .features import Affine, FeatureMap, KMeansRBF, Placeable, Polynomial
 from .formula import ClosedForm
 from .receptive_fields import Everywhere, ReceptiveFields, choose_variance, cover
+from .spaces import Embedding
 
 MOST_WEIGHTS = 500
 """Models of more weights are not chosen from."""
 
 _ROWS = 4096
 """Rows that are predicted together, so that temporaries stay in cache."""
+
+_STATES = Embedding()
+"""States as they are."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -30,38 +34,47 @@ class Model(Shown):
     Parameters
     ----------
     features : FeatureMap
-        φ, states (N, n) to features (N, p).
+        φ, coordinates (N, m) to features (N, p).
     fields : ReceptiveFields or Everywhere
-        Membership of states in the M models.
+        Membership of coordinates in the M models.
+    embedding : Embedding
+        States (N, n) to coordinates (N, m): the states themselves, unless some are angles or orientations.
 
     Attributes
     ----------
-    centring : ndarray, shape (M, p, p), or None
-        ``T_m``: model m is solved in the features ``T_m φ``, for numerical accuracy; None for φ itself.
+    centring : ndarray, shape (M, p', p), or None
+        ``T_m``: model m is solved in the features ``T_m φ``, for numerical accuracy, and on a curved space along
+        its axes at the centre of the field; None for φ itself.
     """
 
     features: FeatureMap
     fields: ReceptiveFields | Everywhere
+    embedding: Embedding = _STATES
     centring: Array | None = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "centring", self.fields.centring(self.features))
+        object.__setattr__(self, "centring", self.fields.centring(self.features, self.embedding))
 
     @classmethod
     def local(
-        cls, states: Array, variance: float | None = None, at_least: float = 0.7, centres: ArrayLike | None = None
+        cls,
+        coordinates: Array,
+        variance: float | None = None,
+        at_least: float = 0.7,
+        centres: ArrayLike | None = None,
+        embedding: Embedding = _STATES,
     ) -> Self:
-        """Affine models in receptive fields over some states, on regressors of one origin (section III-D)."""
-        width = variance if variance is not None else choose_variance(states, at_least)
+        """Affine models in receptive fields over some coordinates, on regressors of one origin (section III-D)."""
+        width = variance if variance is not None else choose_variance(coordinates, at_least)
         if centres is None:
-            fields = cover(states, width, at_least)
+            fields = cover(coordinates, width, at_least)
         else:
-            fields = ReceptiveFields(as_matrix(centres, "centres"), width)
-        return cls(Affine(fields.centres.mean(axis=0), np.sqrt(width)), fields)
+            fields = ReceptiveFields(embedding(as_matrix(centres, "centres")), width)
+        return cls(Affine(fields.centres.mean(axis=0), np.sqrt(width)), fields, embedding)
 
     @classmethod
-    def to_choose_from(cls, states: Array, actions: int) -> dict[str, Self]:
-        """Affine, quadratic, cubic and RBF features over some states, and local models, by name.
+    def to_choose_from(cls, coordinates: Array, actions: int, embedding: Embedding = _STATES) -> dict[str, Self]:
+        """Affine, quadratic, cubic and RBF features over some coordinates, and local models, by name.
 
         Without those of more than :data:`MOST_WEIGHTS` weights, or more than half as many as there are numbers.
         """
@@ -71,10 +84,10 @@ class Model(Shown):
             "cubic": Polynomial(3),
             "rbf": KMeansRBF(),
         }
-        placed = {name: cls(features.place(states), Everywhere()) for name, features in every.items()}
-        most = min(MOST_WEIGHTS, states.shape[0] * actions // 2)
-        few = {name: one for name, one in placed.items() if actions * one.design(states[:1]).shape[1] <= most}
-        return {"affine": placed["affine"]} | few | {"local": cls.local(states)}
+        placed = {name: cls(one.place(coordinates), Everywhere(), embedding) for name, one in every.items()}
+        most, typical = min(MOST_WEIGHTS, coordinates.shape[0] * actions // 2), coordinates[:1]
+        few = {name: one for name, one in placed.items() if actions * one.features(typical).shape[1] <= most}
+        return {"affine": placed["affine"]} | few | {"local": cls.local(coordinates, embedding=embedding)}
 
     def design(self, states: Array) -> Array:
         """Features of states (N, n), finite, shape (N, p).
@@ -84,7 +97,7 @@ class Model(Shown):
         SettingError
             If the features are not of that shape.
         """
-        features = self.features(states)
+        features = self.features(self.embedding(states))
         if np.ndim(features) != 2 or np.shape(features)[0] != states.shape[0]:
             raise SettingError(
                 f"features: got an array of shape {tuple(np.shape(features))} for {states.shape[0]} states, "
@@ -92,10 +105,20 @@ class Model(Shown):
             )
         return as_matrix(features, "features")
 
+    def memberships(self, states: Array) -> Array:
+        """Membership of states (N, n) in each model, shape (N, M)."""
+        return self.fields.weights(self.embedding(states))
+
+    def shares(self, states: Array) -> Array:
+        """Memberships of states (N, n), normalised over the models, shape (N, M)."""
+        return self.fields.shares(self.embedding(states))
+
     def predict(self, weights: Array, states: Array) -> Array:
         """Predict with weights (M, d, p) at states (N, n), shape (N, d)."""
         blocks = [states[rows, :] for rows in slices(states, BLOCK_ROWS if is_foreign(states) else _ROWS)]
-        return namespace(states).concat([self.fields.blend(self.design(block), weights, block) for block in blocks])
+        return namespace(states).concat(
+            [self.fields.blend(self.design(block), weights, self.embedding(block)) for block in blocks]
+        )
 
     def support(self, states: Array) -> Array:
         """Support of each state by the data, from 1 to 0 far away, shape (N,).
@@ -108,7 +131,7 @@ class Model(Shown):
         measure = getattr(self.fields, "support", None) or getattr(self.features, "support", None)
         if measure is None:
             raise SettingError(f"support: {type(self.features).__name__} has no support(states).")
-        return np.asarray(measure(states))
+        return np.asarray(measure(self.embedding(states)))
 
     def roughness(self, models: int, size: int) -> Array:
         """``R_m`` (M, p, p): ``wᵀ R_m w`` is the roughness of a policy of weights w; zero where features offer none."""
@@ -131,7 +154,7 @@ class Model(Shown):
                 "linear policies, and parametric ones on Affine, Polynomial, NormalisedRBF or KMeansRBF features, or "
                 "on features that offer closed_form(weights) -> unconstrain.ClosedForm."
             )
-        return form
+        return replace(form, embedding=self.embedding)
 
     def _summary(self) -> tuple[str, ...]:
         features = getattr(self.features, "__name__", type(self.features).__name__)

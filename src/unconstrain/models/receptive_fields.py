@@ -8,6 +8,7 @@ from ..base.arrays import SMALLEST_VARIANCE, Array, as_matrix, beside, check_at_
 from ..base.errors import SettingError
 from .features import Affine, FeatureMap, Kernels, gaussian, shares, squared_distances
 from .formula import ClosedForm, exponents
+from .spaces import Embedding
 
 MOST_FIELDS = 100
 """Most fields that :func:`choose_variance` accepts before it widens them."""
@@ -38,15 +39,17 @@ class ReceptiveFields(Kernels):
             return (self.shares(states)[:, None, :] @ each)[:, 0, :]
         return np.einsum("nm,nmd->nd", self.shares(states), each)  # NumPy is slow at many small products
 
-    def centring(self, features: FeatureMap) -> Array:
-        """``T_m`` (M, p, p) that centres affine features on each field: ``T_m φ(c_m) = (0, 1)``.
+    def centring(self, features: FeatureMap, embedding: Embedding) -> Array:
+        """``T_m`` (M, p', p) that centres affine features on each field: ``T_m φ(c_m) = (0, 1)``.
 
-        Sums over common features are one product for all fields; centring each field afterwards is exact.
+        With axes J_m at the centres, ``T_m φ(x) = (J_m (x − c_m) / σ, 1)``. Sums over common features are one
+        product for all fields; centring each field afterwards is exact.
         """
-        offsets = -features(self.centres)[:, :-1]
-        models, n = offsets.shape
-        centring = np.tile(np.eye(n + 1), (models, 1, 1))
-        centring[:, :n, n] = offsets
+        axes, offsets = embedding.axes(self.centres), -features(self.centres)[:, :-1]
+        models, count, size = axes.shape
+        centring = np.zeros((models, count + 1, size + 1))
+        centring[:, :count, :size], centring[:, count, size] = axes, 1.0
+        centring[:, :count, size] = (axes @ offsets[:, :, None])[:, :, 0]
         return centring
 
     def formula(self, features: FeatureMap, weights: Array) -> ClosedForm | None:
@@ -73,7 +76,7 @@ class Everywhere:
         """Predictions of the one model with weights (1, d, p), shape (N, d)."""
         return features @ beside(weights[0].T, states)
 
-    def centring(self, features: FeatureMap) -> None:
+    def centring(self, features: FeatureMap, embedding: Embedding) -> None:
         """Features of a single model stay as they are."""
 
     def formula(self, features: FeatureMap, weights: Array) -> ClosedForm | None:

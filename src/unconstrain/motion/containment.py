@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.arrays import Array, as_matrix, check_at_least
+from ..models import spaces
 
 
 class Contained:
@@ -22,7 +23,7 @@ class Contained:
     Parameters
     ----------
     policy : callable
-        States (N, n) to velocities (N, n).
+        States (N, n) to velocities (N, n). A fitted one says by its ``space_`` which states are angles, and any may.
     states : array_like, shape (N, n)
         Where the demonstrations were.
     reach : float
@@ -49,17 +50,19 @@ class Contained:
         if speed is not None:
             check_at_least("speed", speed, 0.0, strict=True)
         shown = as_matrix(states, "states")
+        self.space_ = getattr(policy, "space_", spaces.Euclidean()).over(shown.shape[1])
         self._policy, self._reach, self._gain = policy, reach, gain
         fastest = float(np.linalg.norm(policy(shown), axis=1).max()) if speed is None else float(speed)
         self._speed = fastest or gain * reach  # of a policy that is at rest wherever anybody was
-        self._shown = KDTree(shown)
+        self._shown, self._near = shown, KDTree(self.space_.coordinates(shown))
 
     def __call__(self, states: Array) -> Array:
         """Velocities (N, n)."""
-        distance, nearest = self._shown.query(as_matrix(states, "states"))
+        states = as_matrix(states, "states")
+        distance, nearest = self._near.query(self.space_.coordinates(states))
         beyond = np.clip(distance / self._reach - 1.0, 0.0, 1.0)
         # Up to the reach, where none of this counts, the direction is allowed to vanish with the distance.
-        away = (states - self._shown.data[nearest]) / np.maximum(distance, self._reach)[:, None]
+        away = self.space_.difference(states, self._shown[nearest]) / np.maximum(distance, self._reach)[:, None]
         wanted = self._policy(states)
         outwards = np.maximum((wanted * away).sum(axis=1), 0.0)
         back = np.minimum(self._gain * distance, self._speed)

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from ..base.arrays import LARGEST, Array, as_table, check_at_least
 from ..base.errors import InvalidDataError, SettingError
 from ..constraints import Constraint, constraint_matrices
+from ..models import spaces
 from ..recordings import Demonstration, Truth
 from ..risks import null_space_projection, project
 
@@ -22,6 +23,7 @@ def rollout(
     constraint: Constraint | None = ...,
     *,
     name: str = ...,
+    space: spaces.Space | None = ...,
 ) -> Demonstration: ...
 
 
@@ -34,6 +36,7 @@ def rollout(
     constraint: Constraint | Sequence[Constraint] | None = ...,
     *,
     name: str = ...,
+    space: spaces.Space | None = ...,
 ) -> list[Demonstration]: ...
 
 
@@ -45,13 +48,14 @@ def rollout(
     constraint: Constraint | Sequence[Constraint] | None = None,
     *,
     name: str = "rollout",
+    space: spaces.Space | None = None,
 ) -> Demonstration | list[Demonstration]:
-    """Follow ``u = N(x, t) π(x)`` with Euler steps ``x ← x + dt u``.
+    """Follow ``u = N(x, t) π(x)`` with Euler steps ``x ← x + dt u``, in the state space.
 
     Parameters
     ----------
     policy : callable
-        States (K, n) to actions (K, n); a fitted policy is one.
+        States (K, n) to actions (K, n), or as many as directions in the state space; a fitted policy is one.
     start : array_like, shape (n,) or (K, n)
         Where to start; several starts run side by side.
     steps : int
@@ -62,6 +66,8 @@ def rollout(
         A(x, t), for all or one for each start. None leaves the policy free.
     name : str
         Of the demonstrations; several are numbered.
+    space : Space, optional
+        Which states are angles or orientations (:mod:`unconstrain.spaces`); by default as a fitted policy knows.
 
     Returns
     -------
@@ -80,40 +86,47 @@ def rollout(
     table, single = as_table(start, "start")
     state = table.reshape(1, -1) if single else table
     runs, n = state.shape
+    told: spaces.Space = space if space is not None else getattr(policy, "space_", spaces.Euclidean())
+    within = told.over(n)
+    d = within.sizes[2]
     if constraint is not None and not callable(constraint) and len(constraint) != runs:
         raise SettingError(f"constraint: got {len(constraint)} constraints for {runs} starts, expected one for each.")
-    shape = (runs, steps, n)
-    states, actions, wanted, projections = (np.empty(s) for s in (shape, shape, shape, (*shape, n)))
+    shape = (runs, steps, d)
+    states, actions, wanted, projections = (np.empty(s) for s in ((runs, steps, n), shape, shape, (*shape, d)))
     times = dt * np.arange(steps, dtype=np.float64)
     for step in range(steps):
         states[:, step] = state
-        wanted[:, step] = _action(policy, state)
-        projections[:, step] = _projections(constraint, state, times[step])
+        wanted[:, step] = _action(policy, state, d)
+        projections[:, step] = _projections(constraint, state, times[step], d)
         actions[:, step] = _without_rounding(project(projections[:, step], wanted[:, step]), wanted[:, step])
-        with np.errstate(over="ignore", invalid="ignore"):
-            state = state + dt * actions[:, step]
-        if not (np.abs(state) <= LARGEST).all():
-            raise InvalidDataError(
-                f"the movement left the finite numbers at step {step}: start nearer to the data or take a smaller dt."
-            )
+        state = _moved(within, state, dt * actions[:, step], step)
+    names = [name] if single else [f"{name} {k + 1}" for k in range(runs)]
     demos = [
-        Demonstration(
-            states[k], actions[k], times, Truth(wanted[k], projections[k]), name if single else f"{name} {k + 1}"
-        )
+        Demonstration(states[k], actions[k], times, Truth(wanted[k], projections[k]), names[k], within)
         for k in range(runs)
     ]
     return demos[0] if single else demos
 
 
-def _projections(constraint: Constraint | Sequence[Constraint] | None, states: Array, time: float) -> Array:
-    """What the constraint, or that of each run, leaves free, shape (K, n, n)."""
-    runs, n = states.shape
+def _moved(space: spaces.Space, states: Array, ways: Array, step: int) -> Array:
+    with np.errstate(over="ignore", invalid="ignore"):
+        moved = space.step(states, ways)
+    if not (np.abs(moved) <= LARGEST).all():
+        raise InvalidDataError(
+            f"the movement left the finite numbers at step {step}: start nearer to the data or take a smaller dt."
+        )
+    return moved
+
+
+def _projections(constraint: Constraint | Sequence[Constraint] | None, states: Array, time: float, d: int) -> Array:
+    """What the constraint, or that of each run, leaves free, shape (K, d, d)."""
+    runs = len(states)
     if constraint is None:
-        return np.broadcast_to(np.eye(n), (runs, n, n))
+        return np.broadcast_to(np.eye(d), (runs, d, d))
     now = np.full(runs, time)
     if callable(constraint):
-        return null_space_projection(constraint_matrices(constraint, states, now, n))
-    rows = [constraint_matrices(one, states[k : k + 1], now[k : k + 1], n) for k, one in enumerate(constraint)]
+        return null_space_projection(constraint_matrices(constraint, states, now, d))
+    rows = [constraint_matrices(one, states[k : k + 1], now[k : k + 1], d) for k, one in enumerate(constraint)]
     return null_space_projection(np.concatenate(rows))
 
 
@@ -123,11 +136,11 @@ def _without_rounding(actions: Array, wanted: Array) -> Array:
     return np.where(rounding, 0.0, actions)
 
 
-def _action(policy: Callable[[Array], Array], state: Array) -> Array:
+def _action(policy: Callable[[Array], Array], state: Array, d: int) -> Array:
     action = np.asarray(policy(state))
-    if action.shape != state.shape:
+    if action.shape != (len(state), d):
         raise SettingError(
             f"policy: got actions of shape {action.shape} for states of shape {state.shape}; a rollout expects "
-            "actions that are velocities of the state."
+            f"actions that are velocities of the state{'' if d == state.shape[1] else f', {d} in their space'}."
         )
     return action

@@ -19,12 +19,21 @@ from ..base.estimators import checked_states
 from ..base.parameters import Parameters
 from ..deployment import Deployable
 from ..learners import Belief, Learner, Robust, Solution, Uncertainty, named
-from ..models import FeatureMap, Model
+from ..models import FeatureMap, Model, spaces
 from ..recordings import Demonstration, stack, times_of
 from ..risks import Moments, unit_actions
 from ..training import Batch, FirstLook, Folds, Seen, Split, Training, Validation, cluster, is_typical
 
-_FITTED = ("training_", "solution_", "n_features_in_", "feature_names_in_", "n_outputs_", "_flat", "_waiting")
+_FITTED = (
+    "training_",
+    "solution_",
+    "n_features_in_",
+    "feature_names_in_",
+    "n_outputs_",
+    "_flat",
+    "_waiting",
+    "_space",
+)
 
 
 class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEstimator, ABC):
@@ -40,10 +49,12 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
 
     learner: Learner | str | None
     validation: Validation | None
+    space: spaces.Space | None = None
     training_: Training
     solution_: Solution
     n_outputs_: int
     _flat: bool
+    _space: spaces.Space
 
     @abstractmethod
     def place(self, look: FirstLook) -> Model:
@@ -80,10 +91,11 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         """
         return self._fit(named(self.learner), X, y, sample_weight, groups)
 
-    def _fit(self, learner: Learner, *batch: Any) -> Self:
+    def _fit(self, learner: Learner, *batch: Any, space: spaces.Space | None = None) -> Self:
         draft = self._draft(*_FITTED)
-        checked = draft._checked(*batch, reset=True)
-        began = draft._began(FirstLook.at(checked), learner, more=False, seen=[checked])
+        checked = draft._checked(*batch, reset=True, space=space)
+        look = FirstLook.whole([checked], draft._space)
+        began = draft._began(look, learner, more=False, seen=[checked])
         return self._become(began._learnt([checked], learner))
 
     def partial_fit(
@@ -105,8 +117,9 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         if not first and waiting is None:
             return self._become(draft._learnt([batch], learner))
         seen = batch if waiting is None else waiting.followed_by(batch)
-        draft._began(FirstLook.at(seen), learner, more=True, seen=[seen])._learnt([seen], learner)
-        enough = is_typical(seen, newest=batch.states.shape[0])
+        look = FirstLook.whole([seen], draft._space)
+        draft._began(look, learner, more=True, seen=[seen])._learnt([seen], learner)
+        enough = is_typical(seen, batch.states.shape[0], draft._space)
         draft._waiting = None if enough else deepcopy(seen)  # who gave it may use its memory again
         return self._become(draft)
 
@@ -134,10 +147,10 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         seen: Batch | None = None
         for batch in checked:
             seen = batch if seen is None else seen.followed_by(batch)
-            if is_typical(seen, newest=batch.states.shape[0]):
+            if is_typical(seen, batch.states.shape[0], draft._space):
                 break
             seen = deepcopy(seen)  # before the next batch, which may come in the same memory
-        look, first = (None, ()) if seen is None else (FirstLook.at(seen), (seen,))
+        look, first = (None, ()) if seen is None else (FirstLook.whole([seen], draft._space), (seen,))
         began = draft._began(look, learner, more=True, seen=first)
         return self._become(began._learnt(chain(first, checked), learner))
 
@@ -159,7 +172,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         seen = summed(partial(_seen, draft), parts)
         draft.__dict__.update(seen.noted)
         again = copy(draft)._each_checked(parts[0], reset=False) if together else None
-        draft._began(seen.look, learner, more=False, together=together, seen=again)
+        draft._began(seen.look and seen.look.placed, learner, more=False, together=together, seen=again)
         draft.training_ = summed(partial(_gathered, draft), parts)
         return self._become(draft._solved(learner))
 
@@ -182,7 +195,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         times, learner = times_of(demos), self._check_speed_power(speed_power)
         speed = np.linalg.norm(actions, axis=1)
         weights = (speed / speed.max()) ** speed_power if speed_power and speed.any() else None
-        return self._fit(learner, states, actions, weights, groups, times)
+        return self._fit(learner, states, actions, weights, groups, times, space=demos[0].space)
 
     def with_learner(self, learner: Learner | str) -> Self:
         """Return the same policy with another learner, from the same moments: no second pass over the data.
@@ -298,6 +311,11 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         return self.training_.model
 
     @property
+    def space_(self) -> spaces.Space:
+        """The state space, which tells straight axes from angles and orientations."""
+        return self._fitted_model().embedding.space
+
+    @property
     def features_(self) -> FeatureMap:
         """The features in use."""
         return self._fitted_model().features
@@ -333,9 +351,9 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         """Choose all that has to be chosen before the first sample is summed, in one place or in several."""
         if look is None:
             raise InvalidDataError("got no sample that counts: there is none, or all weights are zero.")
+        places = self.places(look).items()
         split = Split.begin(self.validation if self.validation is not None else Folds(), look, more)
         keep = None if learner.needs_samples else Training.MOST_KEPT if learner.uses_samples and together else 0
-        places = self.places(look).items()
         begun = {name: Training.begin(look, one, split, keep, more=more) for name, one in places}
         self.training_ = begun[next(iter(begun)) if len(begun) == 1 else Robust().suited(begun, seen)]
         return self
@@ -359,13 +377,15 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         return learner
 
     def _each_checked(self, batches: Iterable[Sequence[Any]], *, reset: bool = True) -> Iterator[Batch]:
-        return (self._checked(*batch, reset=reset and number == 0) for number, batch in enumerate(batches))
+        space = getattr(batches, "space", None)
+        return (self._checked(*one, reset=reset and number == 0, space=space) for number, one in enumerate(batches))
 
-    def _checked(self, X: ArrayLike, *rest: Any, reset: bool) -> Batch:
+    def _checked(self, X: ArrayLike, *rest: Any, reset: bool, space: spaces.Space | None = None) -> Batch:
         batch, flat = Batch.checked(checked_states(self, X, reset=reset, convert=False), *rest)
         columns = batch.actions.shape[1]
         if reset:
             self._flat, self.n_outputs_ = flat, columns
+            self._space = self.space or space or spaces.Euclidean()
         elif columns != self.n_outputs_:
             raise InvalidDataError(f"actions: got {columns} columns, expected {self.n_outputs_} as before.")
         return batch
@@ -379,7 +399,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
 
 def _seen(draft: Policy, part: Iterable[Sequence[Any]]) -> Seen:
     mine = copy(draft)
-    look = FirstLook.total(map(FirstLook.at, mine._each_checked(part)))
+    look = FirstLook.total(FirstLook.at(batch, mine._space) for batch in mine._each_checked(part))
     return Seen(look, {name: value for name, value in vars(mine).items() if name not in vars(draft)})
 
 

@@ -5,7 +5,7 @@ from typing import cast
 from numpy.typing import ArrayLike
 
 from ..learners import Learner
-from ..models import Model, ReceptiveFields
+from ..models import Model, ReceptiveFields, spaces
 from ..training import FirstLook, Validation
 from .base import Policy
 
@@ -29,6 +29,8 @@ class LocallyLinearPolicy(Policy):
         Or its name: "robust", "hybrid", "inconsistency", "direct"; :class:`~unconstrain.Robust` by default.
     validation : Folds or HeldOut, optional
         What the learner chooses its thresholds on; ten folds by default.
+    space : Space, optional
+        Which states are angles or orientations (:mod:`unconstrain.spaces`); by default as the demonstrations say.
 
     Attributes
     ----------
@@ -36,7 +38,7 @@ class LocallyLinearPolicy(Policy):
         Weights (M, d, n + 1) over ``((x − origin) / σ, 1)``, with one origin
         for all fields, and what the data determined.
     fields_ : ReceptiveFields
-        The fields in use.
+        The fields in use, among the coordinates of the state space.
     """
 
     def __init__(
@@ -46,16 +48,18 @@ class LocallyLinearPolicy(Policy):
         centres: ArrayLike | None = None,
         learner: Learner | str | None = None,
         validation: Validation | None = None,
+        space: spaces.Space | None = None,
     ) -> None:
         self.variance = variance
         self.at_least = at_least
         self.centres = centres
         self.learner = learner
         self.validation = validation
+        self.space = space
 
     def place(self, look: FirstLook) -> Model:
         """Lay fields over the states seen at first look; regressors share one origin."""
-        return Model.local(look.different, self.variance, self.at_least, self.centres)
+        return Model.local(look.states, self.variance, self.at_least, self.centres, look.embedding)
 
     @property
     def fields_(self) -> ReceptiveFields:

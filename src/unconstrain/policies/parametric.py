@@ -5,7 +5,7 @@ from typing import Literal
 
 from ..base.errors import SettingError
 from ..learners import Learner
-from ..models import Everywhere, FeatureMap, KMeansRBF, Model, Placeable
+from ..models import Everywhere, FeatureMap, KMeansRBF, Model, Placeable, spaces
 from ..training import FirstLook, Validation
 from .base import Policy
 
@@ -25,6 +25,9 @@ class ParametricPolicy(Policy):
         Or its name: "robust", "hybrid", "inconsistency", "direct"; :class:`~unconstrain.Robust` by default.
     validation : Folds or HeldOut, optional
         What the learner chooses its threshold on; ten folds by default.
+    space : Space, optional
+        Which states are angles or orientations (:mod:`unconstrain.spaces`); by default as the demonstrations say.
+        Features then see coordinates: of an angle its cosine and sine, of an orientation its rotation matrix.
 
     Attributes
     ----------
@@ -39,10 +42,12 @@ class ParametricPolicy(Policy):
         features: FeatureMap | Placeable | Literal["auto"] | None = None,
         learner: Learner | str | None = None,
         validation: Validation | None = None,
+        space: spaces.Space | None = None,
     ) -> None:
         self.features = features
         self.learner = learner
         self.validation = validation
+        self.space = space
 
     def place(self, look: FirstLook) -> Model:
         """Lay the features over the states seen at first look."""
@@ -51,10 +56,11 @@ class ParametricPolicy(Policy):
             raise SettingError(
                 f"features: got {features!r}, expected 'auto' or a function of states such as NormalisedRBF."
             )
-        return Model(features.place(look.different) if isinstance(features, Placeable) else features, Everywhere())
+        placed = features.place(look.states) if isinstance(features, Placeable) else features
+        return Model(placed, Everywhere(), look.embedding)
 
     def places(self, look: FirstLook) -> Mapping[str, Model]:
         """Models to choose from, by name."""
         if not isinstance(self.features, str) or self.features != "auto":
             return super().places(look)
-        return Model.to_choose_from(look.different, look.actions)
+        return Model.to_choose_from(look.states, look.actions, look.embedding)

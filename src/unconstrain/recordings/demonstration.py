@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Array, as_matrix, as_vector
 from ..base.display import Shown, counted, shortened
 from ..base.errors import InvalidDataError
+from ..models import spaces
 from .columns import resolve
 from .remarks import Remark
 
@@ -106,11 +107,13 @@ class Demonstration(Shown):
         Where the movement was simulated.
     name : str
         Used in messages and reports.
+    space : Space
+        Which states are angles or orientations (:mod:`unconstrain.spaces`); policies that learn from it take it.
 
     Raises
     ------
     InvalidDataError
-        If a table is ragged, empty or not finite, or the lengths differ.
+        If a table is ragged, empty or not finite, the lengths differ, or the space is not one of such states.
     """
 
     states: Array
@@ -118,11 +121,13 @@ class Demonstration(Shown):
     times: Array | None = None
     truth: Truth | None = None
     name: str = ""
+    space: spaces.Space = field(default_factory=spaces.Euclidean)
 
     def __post_init__(self) -> None:
         of = f" of '{self.name}'" if self.name else ""
         object.__setattr__(self, "states", as_matrix(self.states, f"states{of}"))
         object.__setattr__(self, "actions", as_matrix(self.actions, f"actions{of}"))
+        object.__setattr__(self, "space", self.space.over(self.states.shape[1]))
         if len(self.states) != len(self.actions):
             raise InvalidDataError(
                 f"demonstration{of}: got {len(self.states)} states and {len(self.actions)} actions, "
@@ -178,7 +183,7 @@ def stack(demonstrations: Demonstration | Sequence[Demonstration]) -> Stack:
     Raises
     ------
     InvalidDataError
-        If there is none, or they differ in the number of columns.
+        If there is none, or they differ in the number of columns or in their space.
     """
     demos = [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
     if not demos:
@@ -189,6 +194,11 @@ def stack(demonstrations: Demonstration | Sequence[Demonstration]) -> Stack:
             raise InvalidDataError(
                 f"demonstration {index} ('{demo.name}') has {demo.states.shape[1]} state and "
                 f"{demo.actions.shape[1]} action columns, expected {shape[0]} and {shape[1]} as in the first."
+            )
+        if demo.space != demos[0].space:
+            raise InvalidDataError(
+                f"demonstration {index} ('{demo.name}') is in the space {demo.space}, expected {demos[0].space} as the "
+                "first. Prepare all by one recipe."
             )
     return Stack(
         np.concatenate([demo.states for demo in demos]),

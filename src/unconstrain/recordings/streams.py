@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import BLOCK_ROWS, Array, check_at_least
 from ..base.errors import InvalidDataError
+from ..models import spaces
 from .demonstration import Demonstration, Recording, times_of
 from .preparation import Recipe, complete_recipe, prepare
 from .preparation.movements import prepare_one, warn
@@ -100,9 +101,15 @@ class Stream:
     def recipe(self) -> Recipe:
         """The recipe, completed by a look at the first recording."""
         asked = self._asked
-        if asked.states and (asked.actions or asked.differentiate) and asked.action_is != "target":
+        told = asked.angle_unit is not None or not asked.angles
+        if told and asked.states and (asked.actions or asked.differentiate) and asked.action_is != "target":
             return asked
         return complete_recipe(asked, self.first)
+
+    @property
+    def space(self) -> spaces.Space:
+        """State space, as the recipe says it."""
+        return self.recipe.space
 
     @cached_property
     def unit(self) -> float:

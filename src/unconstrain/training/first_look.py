@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array, Groups, on_host
 from ..base.errors import InvalidDataError
+from ..models import spaces
 from .batches import Batch
 from .order import content, mixed
 from .suspects import lengths_in
@@ -26,6 +27,8 @@ _STATES_PER_WEIGHT = 10
 _WIDENED = 1.2
 """A spread that the later half of small batches has not widened by more than this has settled."""
 
+_STRAIGHT = spaces.Euclidean()
+
 _MOST_WAITING = 1000
 """Samples at which nothing waits any longer."""
 
@@ -39,7 +42,7 @@ class FirstLook:
     weight, heaviest : float
         ``Σ w``, and the largest w.
     mean, scatter : ndarray, shape (n,)
-        Weighted mean of the states, and ``Σ w (x − mean)² / Σ w``.
+        Weighted mean of the states, as everywhere in here as coordinates, and ``Σ w (x − mean)² / Σ w``.
     size : ndarray, shape (n,)
         Largest absolute value of each state.
     actions : int
@@ -50,11 +53,13 @@ class FirstLook:
         Hashes of different states, ascending: the smallest of all, at most :data:`PLACING_SAMPLES`.
         So the choice depends neither on the order of the samples nor on how they come in batches.
     states : ndarray, shape (K, n)
-        Those states.
+        Those states; of a placed look in a fixed order, since repetition and order of the samples must not matter.
     lengths : ndarray, shape (K,)
         Of the longest action in each of them.
     groups : dict, optional
         The :func:`content` (n + 2,) of each demonstration by name, in the order of first appearance.
+    embedding : Embedding
+        How states became coordinates.
     """
 
     weight: float
@@ -68,25 +73,54 @@ class FirstLook:
     states: Array
     lengths: Array
     groups: dict[Hashable, Array] | None
-
-    @property
-    def different(self) -> Array:
-        """Its states in a fixed order: repetition and order of the samples must not move the features."""
-        return np.unique(self.states, axis=0)
+    embedding: spaces.Embedding
 
     @classmethod
-    def at(cls, batch: Batch) -> FirstLook | None:
-        """Look at a batch; None if it is empty but for samples of no weight."""
+    def whole(cls, batches: Iterable[Batch], space: spaces.Space) -> FirstLook | None:
+        """Look at all there is, to place features and fields by; None if it is empty but for samples of no weight."""
+        look = cls.total(cls.at(batch, space) for batch in batches)
+        return look and look.placed
+
+    @property
+    def placed(self) -> FirstLook:
+        """What to place features and fields by: coordinates do not depend on where angles begin, states on no order."""
+        look = self if self.embedding.frame is None else self._turned(self.embedding.seen_from(self.mean))
+        return replace(look, states=np.unique(look.states, axis=0))
+
+    def _turned(self, embedding: spaces.Embedding) -> FirstLook:
+        states, groups = embedding.turned(self.states), self.groups
+        if groups is not None:
+            groups = {name: np.r_[sums[0], embedding.turned(sums[1:-1]), sums[-1]] for name, sums in groups.items()}
+        return replace(
+            self,
+            mean=embedding.turned(self.mean),
+            scatter=states.var(axis=0),
+            size=np.abs(states).max(axis=0),
+            states=states,
+            groups=groups,
+            embedding=embedding,
+        )
+
+    @classmethod
+    def at(cls, batch: Batch, space: spaces.Space = _STRAIGHT) -> FirstLook | None:
+        """Look at a batch; None if it is empty but for samples of no weight.
+
+        Raises
+        ------
+        InvalidDataError
+            If the space is not one of such states.
+        """
         look: FirstLook | None = None
+        embedding = spaces.Embedding(space.over(batch.states.shape[1]))
         for block in batch.blocks():
             full = look is not None and len(look.keys) == PLACING_SAMPLES
-            further = cls._at_block(block, look.keys[-1] if look is not None and full else _ALL)
+            further = cls._at_block(block, look.keys[-1] if look is not None and full else _ALL, embedding)
             look = further if look is None else look + further
         return look
 
     @classmethod
-    def _at_block(cls, block: Batch, largest_key: np.uint64) -> FirstLook:
-        states, actions, counts = on_host(block.states), on_host(block.actions), block.counts
+    def _at_block(cls, block: Batch, largest_key: np.uint64, embedding: spaces.Embedding) -> FirstLook:
+        states, actions, counts = on_host(embedding(block.states)), on_host(block.actions), block.counts
         weight = float(counts.sum())
         columns, shares = np.ascontiguousarray(states.T), counts / weight  # sums along memory are fast
         mean = (shares * columns).sum(axis=1)
@@ -105,6 +139,7 @@ class FirstLook:
             states[first],
             _largest_at(keys, every, fastest * lengths_in(fastest or 1.0, actions)),
             None if block.groups is None else _contents(block.groups, states, actions, counts),
+            embedding,
         )
 
     def __add__(self, other: FirstLook) -> FirstLook:
@@ -140,6 +175,7 @@ class FirstLook:
             np.concatenate([self.states, other.states])[first],
             _largest_at(keys, every, np.concatenate([self.lengths, other.lengths])),
             None if self.groups is None else _added(self.groups, other.groups or {}),
+            self.embedding,
         )
 
     @staticmethod
@@ -151,7 +187,7 @@ class FirstLook:
         return whole
 
 
-def is_typical(seen: Batch, newest: int) -> bool:
+def is_typical(seen: Batch, newest: int, space: spaces.Space = _STRAIGHT) -> bool:
     """Whether what was seen of a stream so far is enough to place features and fields on, and to deal folds by.
 
     It is if the newest samples alone have ten different states for each weight of an affine model. Where they are
@@ -162,7 +198,7 @@ def is_typical(seen: Batch, newest: int) -> bool:
     enough = _STATES_PER_WEIGHT * (seen.states.shape[1] + 1)
     if count >= _MOST_WAITING or _different(seen, count - newest, count) >= enough:
         return True
-    whole, half = FirstLook.at(seen), FirstLook.at(seen.at(np.arange(count // 2)))
+    whole, half = (FirstLook.at(seen.at(np.arange(part)), space) for part in (count, count // 2))
     if whole is None or half is None or len(whole.keys) < enough:
         return False
     return bool((whole.scatter <= _WIDENED**2 * half.scatter).all())

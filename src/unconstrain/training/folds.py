@@ -9,9 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array, Groups, check_at_least
+from ..base.arrays import Array, Groups, check_at_least, on_host
 from ..base.errors import SettingError
 from ..base.parameters import Parameters
+from ..models import spaces
 from .first_look import FirstLook, in_order
 from .order import by_content, mixed
 
@@ -122,6 +123,8 @@ class Split:
         A state in the midst of those at first look, and how far they spread.
     fold_of : mapping
         Fold of each demonstration seen so far, by name.
+    embedding : Embedding
+        States to the coordinates that origin and scale are in.
     """
 
     validation: Validation
@@ -129,6 +132,7 @@ class Split:
     origin: Array
     scale: Array
     fold_of: Mapping[Hashable, int] = field(default_factory=dict)
+    embedding: spaces.Embedding = field(default_factory=spaces.Embedding)
 
     @classmethod
     def begin(cls, validation: Validation, look: FirstLook, more: bool = False) -> Split:
@@ -148,7 +152,7 @@ class Split:
         spread = np.sqrt(look.scatter)
         # A coordinate that has not moved yet may do so later; its size is all that is known of it.
         scale = np.where(spread > 1e-9 * look.size, spread, np.where(look.size > 0, look.size, 1.0))
-        split = cls(validation, by, look.mean, scale)
+        split = cls(validation, by, look.mean, scale, embedding=look.embedding)
         if by == "sample" or not look.groups:
             return split
         names = list(look.groups)
@@ -180,7 +184,8 @@ class Split:
     def assign(self, states: Array, groups: Groups | None) -> NDArray[np.intp]:
         """Folds of some samples, shape (N,), whose demonstrations have been seen."""
         if self.by == "sample":
-            return self.validation.deal(_scatter((states - self.origin) / self.scale, self.validation.seed))
+            apart = (on_host(self.embedding(states)) - self.origin) / self.scale
+            return self.validation.deal(_scatter(apart, self.validation.seed))
         names, places = np.unique(np.asarray(groups), return_inverse=True)
         return np.array([self.fold_of[name] for name in names.tolist()], dtype=np.intp)[places]
 

@@ -38,9 +38,9 @@ class Samples(Shown):
         Which demonstration each sample is from.
     folds : ndarray of int, shape (N,)
         What is held out together, from 0; every number up to the largest occurs.
-    centring : ndarray, shape (M, p, p)
-        T_m, with which model m is solved in features ``T_m φ``, for the sake of rounding.
-    roughness : ndarray, shape (M, p, p)
+    centring : ndarray, shape (M, p', p)
+        T_m, with which model m is solved in regressors ``T_m φ``, for the sake of rounding.
+    roughness : ndarray, shape (M, p', p')
         Measures how rough each model's policy is, over ``T_m φ``; zero where nothing is said of it.
     places : ndarray of int, one for each sample that was given
         Where it is among these, or was before some were taken.
@@ -75,6 +75,11 @@ class Samples(Shown):
         return replace(self, **some)
 
     @property
+    def regressors(self) -> int:
+        """Number of regressors p' of each model."""
+        return self.centring.shape[1]
+
+    @property
     def sizes(self) -> Array:
         """Number of samples in each model, shape (M,)."""
         return self.counts @ self.memberships
@@ -105,7 +110,7 @@ class Samples(Shown):
     def risk(self, targets: Array, weights: Array) -> Quadratic:
         """``Σ w ‖v − π̃‖²`` for targets v (N, d), without the sums that it does not need."""
         counted = (self.counts * weights)[:, None] * self.memberships
-        d, p = targets.shape[1], self.features.shape[1]
+        d, p = targets.shape[1], self.regressors
         gram, cross = self._gram(counted), _sum_of_products(counted, self.features, targets)
         linear = (self.centring @ cross).reshape(len(gram), p * d)
         hessian = np.einsum("mij,kl->mikjl", gram, np.eye(d)).reshape(-1, p * d, p * d)
@@ -114,7 +119,7 @@ class Samples(Shown):
     def constrained(self, projections: Array) -> Quadratic:
         """``Σ w ‖N (u − π̃)‖²`` with a projection N of each sample, (N, d, d)."""
         counted = self.counts[:, None] * self.memberships
-        d, p = self.actions.shape[1], self.features.shape[1]
+        d, p = self.actions.shape[1], self.regressors
         hessian = np.empty((len(self.centring), p, d, p, d))
         for a, b in combinations_with_replacement(range(d), 2):
             hessian[:, :, a, :, b] = hessian[:, :, b, :, a] = self._gram(counted * projections[:, a, b, None])

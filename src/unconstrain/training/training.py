@@ -184,23 +184,23 @@ class Training(Shown):
         """
         given, first, places = self._distinct()
         counts, each = _summed(given.counts, places), given.at(first)
-        order, demonstrations, notes = arranged(each._replace(weights=counts))
+        order, demonstrations, notes = arranged(self._in_coordinates(each)._replace(weights=counts))
         place = np.empty_like(order)
         place[order] = np.arange(len(order))
         each, counts = each.at(order), counts[order]
-        models, p = self._sizes
-        centring, fields = self.model.centring, self.model.fields
+        model, (models, p) = self.model, self._sizes
+        centring = np.tile(np.eye(p), (models, 1, 1)) if model.centring is None else model.centring
         return Samples(
             each.states,
-            self.model.design(each.states),
+            model.design(each.states),
             each.actions,
             _proportion(counts) * counts,
-            fields.weights(each.states),
-            fields.shares(each.states),
+            model.memberships(each.states),
+            model.shares(each.states),
             demonstrations,
             self._folds_of(each, counts),
-            np.tile(np.eye(p), (models, 1, 1)) if centring is None else centring,
-            self.model.roughness(models, p),
+            centring,
+            model.roughness(models, centring.shape[1]),
             place[places],
             each.times,
             notes,
@@ -214,10 +214,13 @@ class Training(Shown):
                 "learner that needs no samples. Fit with this learner from the start."
             )
         given = reduce(Batch.followed_by, map(_on_host, self.batches))
-        return self._in_units(given), *distinct(given)
+        return self._in_units(given), *distinct(self._in_coordinates(given))
 
     def _in_units(self, batch: Batch) -> Batch:
         return batch._replace(actions=batch.actions / self.action_unit, weights=batch.counts / self.weight_unit)
+
+    def _in_coordinates(self, batch: Batch) -> Batch:
+        return batch._replace(states=self.model.embedding(batch.states))
 
     def _folds_of(self, samples: Batch, counts: Array) -> NDArray[np.intp]:
         """Fold of each sample, (N,), numbered among those that hold anything; others are with the first."""
@@ -230,13 +233,18 @@ class Training(Shown):
     @property
     def _sizes(self) -> tuple[int, int]:
         """Numbers of models M and of features p."""
-        typical = self.split.origin[None]
-        return self.model.fields.weights(typical).shape[1], self.model.design(typical).shape[1]
+        typical = self._typical
+        return self.model.memberships(typical).shape[1], self.model.design(typical).shape[1]
+
+    @property
+    def _typical(self) -> Array:
+        """A state (1, n) in the midst of all."""
+        return self.model.embedding.states(self.split.origin[None])
 
     def _summary(self) -> tuple[str, ...]:
         folds = f"{counted(len(self.gathered.parts), 'fold')} by {self.split.by}"
         kept = "sums alone" if self.batches is None else "samples kept"
-        return counted(len(self.split.origin), "state"), counted(self.actions, "action"), folds, kept
+        return counted(self._typical.shape[1], "state"), counted(self.actions, "action"), folds, kept
 
 
 def _summed(counts: Array, places: NDArray[np.intp]) -> Array:
@@ -255,7 +263,7 @@ def _on_host(batch: Batch) -> Batch:
 
 def _add(batch: Batch, model: Model, split: Split, sums: Sequence[Sums], threads: Workers) -> None:
     """Add samples to the sums of their folds."""
-    folds = split.assign(on_host(batch.states), batch.groups)
+    folds = split.assign(batch.states, batch.groups)
     # Each fold in one piece; of small integers NumPy sorts by counting.
     order = np.argsort(folds.astype(np.min_scalar_type(len(sums))), kind="stable")
     starts = np.searchsorted(folds[order], np.arange(len(sums) + 1)).tolist()
@@ -265,7 +273,7 @@ def _add(batch: Batch, model: Model, split: Split, sums: Sequence[Sums], threads
     def add(fold: Sums, start: int, stop: int) -> None:
         for rows in fold.pieces(states, start, stop):
             part = states[rows, :]
-            fold.add(model.design(part), actions[rows, :], weights[rows][:, None] * model.fields.weights(part))
+            fold.add(model.design(part), actions[rows, :], weights[rows][:, None] * model.memberships(part))
 
     ends = zip(sums, pairwise(starts), strict=True)
     calls = [partial(add, fold, start, stop) for fold, (start, stop) in ends if start < stop]

@@ -72,7 +72,7 @@ def solution(chosen: Candidate, samples: Samples, everything: Samples, model: Mo
 def weak_prior(samples: Samples) -> Quadratic:
     """Unit information of p samples, their residual along each coordinate as large as the whole action."""
     risk = samples.risk(samples.actions, np.full(len(samples), 1.0 / max(samples.energy, 1e-300)))
-    return unit_information(samples.features.shape[1], samples.sizes) * risk
+    return unit_information(samples.regressors, samples.sizes) * risk
 
 
 class _Priors:
@@ -88,7 +88,7 @@ class _Priors:
         values, axes = eigensystem(precision)
         size = np.sqrt(np.maximum(values, 1e-300))[:, None, :]
         self.axes, self.back = axes / size, (axes * size).swapaxes(1, 2)
-        d, p = samples.actions.shape[1], samples.features.shape[1]
+        d, p = samples.actions.shape[1], samples.regressors
         looser = seen + (np.eye(d) - seen) / UNSEEN_SPREAD**2
         smooth = _along(smoothness.prior().hessian, seen, p)  # symmetric: that of the roughness is gram ⊗ I
         self.precision = self.axes.swapaxes(1, 2) @ (_along(precision, looser, p) + smooth) @ self.axes
@@ -106,7 +106,7 @@ class _Told:
 
     def __init__(self, chosen: Candidate, evidence: Evidence, priors: _Priors, samples: Samples, m: int) -> None:
         self._axes, self._back = priors.axes[m], priors.back[m]
-        scale = max(samples.energy, 1e-300) * samples.sizes[m] / samples.features.shape[1]  # of Σ w φφᵀ ⊗ I
+        scale = max(samples.energy, 1e-300) * samples.sizes[m] / samples.regressors  # of Σ w φφᵀ ⊗ I
         self._least = 1.0 + float(evidence.error[m]) * scale
         parts = self._whitened(evidence.hessians[:, m])
         claimed = self._whitened(chosen.posterior.evidence.hessian[m])

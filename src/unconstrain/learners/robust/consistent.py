@@ -109,7 +109,7 @@ def least_error(name: str, samples: Samples, errors: Sequence[Quadratic], odds: 
     d, ones = samples.actions.shape[1], np.ones(len(samples))
     risks = [part.risk(part.actions, ones[: len(part)]) for part in samples.by_fold()]
     sizes, everything = samples.sizes, list(range(len(errors)))
-    factor = odds * unit_information(d * samples.features.shape[1], sizes)
+    factor = odds * unit_information(d * samples.regressors, sizes)
 
     def posterior(of: list[int], softness: Array) -> Posterior:
         error, risk = (reduce(add, (one[i] for i in of)) for one in (errors, risks))

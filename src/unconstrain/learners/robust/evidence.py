@@ -88,7 +88,7 @@ def _as_free(samples: Samples, precision: Array, noise: float, seen: Array) -> A
 
     Of demonstrations only that moved along all of Q: one that did not looks the same if it was held.
     """
-    d, p = samples.actions.shape[1], samples.features.shape[1]
+    d, p = samples.actions.shape[1], samples.regressors
     whole, rank = 0.0, np.einsum("maa->m", seen)
 
     def spans(moved: Array) -> Array:

@@ -213,4 +213,4 @@ class _GaussNewton:
         d = samples.actions.shape[1]
         away = np.maximum(((samples.actions - self.policy) ** 2).sum(axis=1) - self.place.radial**2, 0.0)
         spread = float(constrained @ away / ((constrained.sum() + 1e-9) * (d - 1))) + self.variance
-        return spread, unit_information(d * samples.features.shape[1], samples.sizes)
+        return spread, unit_information(d * samples.regressors, samples.sizes)

@@ -125,7 +125,7 @@ def inefficiency(time: float, samples: Samples) -> Array:
     Misfit is a function of the state. It is taken to have as many degrees of freedom as the model has, P, and so at
     most P independent values, however many samples there are.
     """
-    return np.maximum(time, samples.sizes / (samples.actions.shape[1] * samples.features.shape[1]))
+    return np.maximum(time, samples.sizes / (samples.actions.shape[1] * samples.regressors))
 
 
 def corrected(weighted: Moments, plain: Moments, variance: float) -> Moments:

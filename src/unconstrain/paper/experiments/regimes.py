@@ -276,7 +276,7 @@ def _knowing(
     N = true_projections(training)
     states, actions, _ = uc.stack(training)
     model, d = policy.training_.model, actions.shape[1]
-    features, members = model.design(states), model.fields.weights(states)
+    features, members = model.design(states), model.memberships(states)
 
     def along(direction: Array) -> Moments:
         """Moments with what is observed along one direction, each sample as far as its constraint leaves it."""

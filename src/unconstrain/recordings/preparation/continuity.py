@@ -1,10 +1,13 @@
 """States of angles and orientations without the jumps that are none: what a recipe names is made continuous in time."""
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from ...base.arrays import Array
 from ...base.errors import SettingError
-from ..signals.orientations import TURNS, continuous_quaternions, continuous_rotations
+from ..signals.orientations import TURNS, UNITS, continuous_quaternions, continuous_rotations
 from .recipes import Recipe
 
 
@@ -22,8 +25,9 @@ def continuous(states: Array, recipe: Recipe) -> Array:
     ndarray, shape (T, n)
         The same table where the recipe names no such column.
     """
+    unwrapped: Callable[[Array], Array] = partial(np.unwrap, period=UNITS[recipe.angle_unit or "rad"], axis=0)
     groups = [
-        *(((name,), _unwrapped) for name in recipe.angles),
+        *(((name,), unwrapped) for name in recipe.angles),
         *((names, continuous_quaternions) for names in recipe.quaternions),
         *((names, unturned) for names in recipe.rotation_vectors),
     ]
@@ -40,11 +44,6 @@ def _place(name: str, states: tuple[str, ...]) -> int:
     if name not in states:
         raise SettingError(f"got {name!r} as an angle, expected one of the states {', '.join(states)}; add it to them.")
     return states.index(name)
-
-
-def _unwrapped(angle: Array) -> Array:
-    unwrapped: Array = np.unwrap(angle, period=_turn(angle), axis=0)
-    return unwrapped
 
 
 def unturned(vectors: Array) -> Array:

@@ -284,11 +284,12 @@ def _prepare(recording: Recording, recipe: Recipe) -> tuple[Demonstration, list[
             f"'{recording.name}' has no times, which are needed to differentiate: "
             "name the time column (--time), or give its rate in samples per second (--rate)."
         )
-    demonstration = Demonstration(states, actions, times, name=recording.name)
+    demonstration = Demonstration(states, actions, times, name=recording.name, space=recipe.space)
     if recipe.trim is not None or recipe.still is not None:
         demonstration = trim(demonstration, *(recipe.trim or (0.0, 0.0)), still=recipe.still)
     if recipe.centre:
-        demonstration = replace(demonstration, states=demonstration.states - demonstration.states.mean(axis=0))
+        space, states = demonstration.space, demonstration.states
+        demonstration = replace(demonstration, states=space.relative(states, space.mean(states)))
     return demonstration, notes
 
 
@@ -361,7 +362,10 @@ def _repair(pieces: list[_Piece], recipe: Recipe, name: str) -> tuple[_Piece, li
         notes += _about_window(recipe, needed, interval)
         pieces, more = _long_enough(pieces, needed, name)
         notes += more
-        pieces = [piece._replace(actions=_velocities(piece.times, piece.states, recipe, needed)) for piece in pieces]
+        pieces = [
+            piece._replace(actions=_velocities(piece.times, recipe.space.unrolled(piece.states), recipe, needed))
+            for piece in pieces
+        ]
     if recipe.action_is == "delta":
         pieces = [_per_second(piece) for piece in pieces]
     if recipe.rate is not None:

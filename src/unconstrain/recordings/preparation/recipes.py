@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any
+from functools import reduce
+from operator import mul
+from typing import Any, NoReturn
 
 import numpy as np
 
 from ...base.arrays import Array, check_at_least
 from ...base.errors import SettingError
+from ...models import spaces
 from ..demonstration import Recording
+from ..signals.orientations import UNITS, unit_of_angles
 from .guesses import guess_actions, guess_states, positions_in
 
 METHODS = ("savgol", "central")
@@ -25,6 +29,7 @@ CHOICES = {
     "seams": ("keep", "cut"),
     "pauses": ("drop", "keep"),
     "action_is": (None, "velocity", "target", "delta"),
+    "angle_unit": (None, *UNITS),
 }
 """What the settings of few values may be."""
 
@@ -58,10 +63,13 @@ class Recipe:
     sort : bool
         Put the rows in the order of their time stamps.
     angles : tuple of str
-        State columns that are wrapped angles, radians or degrees: they are made continuous in each demonstration.
-    quaternions, rotation_vectors : tuple of tuple of str
-        Four state columns each that are a unit quaternion, three that are a rotation vector: of the numbers for the
-        same orientation those closest to the row before are taken.
+        State columns that are angles, wrapped or not: a turn more is the same state, for policies, too (``space``).
+    quaternions : tuple of tuple of str
+        Four state columns each, side by side, that are a unit quaternion, in the order w, x, y, z unless their last
+        letters say another: q and −q are the same state. Its velocity is the angular velocity in the frame of the body.
+    rotation_vectors : tuple of tuple of str
+        Three state columns each that are a rotation vector: of the numbers for the same orientation those closest to
+        the row before are taken.
     glitches : {"keep", "repair", "drop"}
         What becomes of samples far off their neighbours: a straight line in their place, or their rows are left out.
     seams : {"keep", "cut"}
@@ -71,6 +79,8 @@ class Recipe:
     action_is : {"velocity", "target", "delta"}, optional
         What the action columns are: velocities, unless it is said; states to come, so that the velocity of the states
         is learnt; or changes to the next sample, so that they are divided by the interval.
+    angle_unit : {"rad", "deg"}, optional
+        Unit of the angles. By default as the file says it, else degrees where they jump by 360, else radians.
 
     Raises
     ------
@@ -96,6 +106,7 @@ class Recipe:
     seams: str = "keep"
     pauses: str = "drop"
     action_is: str | None = None
+    angle_unit: str | None = None
 
     def __post_init__(self) -> None:
         for name in ("states", "actions"):
@@ -132,6 +143,39 @@ class Recipe:
             and all(setting is None for setting in whole)
             and all(getattr(self, name) == getattr(defaults, name) for name in others)
         )
+
+    @property
+    def space(self) -> spaces.Space:
+        """State space of the demonstrations, of a recipe that names its states.
+
+        Raises
+        ------
+        SettingError
+            If an angle or part of a quaternion is none of the states, or a quaternion is not side by side.
+        """
+        names = self.states or ()
+        starts: dict[str, spaces.Space] = {name: spaces.Circle(UNITS[self.angle_unit or "rad"]) for name in self.angles}
+        starts |= {ordered[0]: sphere for ordered, sphere in self._orientations}
+        every, column = list[spaces.Space](), 0
+        while column < len(names):
+            every.append(starts.pop(names[column], spaces.Euclidean()))
+            column += every[-1].sizes[0]
+        if starts:
+            _refuse_state(next(iter(starts)), names)
+        return reduce(mul, every) if every else spaces.Euclidean()
+
+    @property
+    def directions(self) -> tuple[str, ...]:
+        """Names for the velocities of the states: ``vx`` of x, ``wqx`` about the axis of qx."""
+        scalars = {ordered[sphere.order.index("w")] for ordered, sphere in self._orientations}
+        turning = {name for group in self.quaternions for name in group}
+        moving = [name for name in self.states or () if name not in scalars]
+        return tuple(f"{'w' if name in turning else 'v'}{name}" for name in moving)
+
+    @property
+    def _orientations(self) -> list[tuple[tuple[str, ...], spaces.Sphere]]:
+        """State columns of each quaternion, in their order, and its space."""
+        return [_in_states(group, self.states or ()) for group in self.quaternions]
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain values, ready for JSON."""
@@ -171,6 +215,8 @@ def complete_recipe(recipe: Recipe, recording: Recording) -> Recipe:
         If a column that is named does not exist; the message lists those that do.
     """
     completed = _with_columns(recipe, recording)
+    if completed.angles and completed.angle_unit is None:
+        completed = replace(completed, angle_unit=_unit(completed.angles, recording))
     if completed.actions is not None and completed.action_is == "target":
         return replace(completed, actions=None, differentiate="savgol")
     return completed
@@ -220,6 +266,32 @@ def _groups(what: str, groups: Any, width: int) -> tuple[tuple[str, ...], ...]:
         if len(group) != width:
             raise SettingError(f"{what}: got {', '.join(group)}, expected {width} columns together.")
     return named
+
+
+def _unit(angles: Sequence[str], recording: Recording) -> str:
+    """Unit of angles: as the file says it, or as their numbers look."""
+    known = [name for name in angles if name in recording.columns]
+    said = [unit for name in known if (unit := recording.units.get(name, "").lower()[:3]) in UNITS]
+    return said[0] if said else unit_of_angles(recording.select(known))
+
+
+def _in_states(group: Sequence[str], states: Sequence[str]) -> tuple[tuple[str, ...], spaces.Sphere]:
+    for name in group:
+        if name not in states:
+            _refuse_state(name, states)
+    first = min(states.index(name) for name in group)
+    ordered = tuple(states[first : first + 4])
+    letters = "".join(name[-1:].lower() for name in ordered)
+    if set(ordered) != set(group) or (letters not in spaces.ORDERS and ordered != tuple(group)):
+        raise SettingError(
+            f"quaternions: got {', '.join(group)} and the states {', '.join(states)}, expected the four columns side "
+            "by side, in the order w, x, y, z or x, y, z, w. Give the states in such an order (--state)."
+        )
+    return ordered, spaces.Sphere(letters if letters in spaces.ORDERS else spaces.ORDERS[0])
+
+
+def _refuse_state(name: str, states: Sequence[str]) -> NoReturn:
+    raise SettingError(f"got {name!r} as an angle, expected one of the states {', '.join(states)}; add it to them.")
 
 
 def _two_ends(ends: Any) -> tuple[float, float] | None:

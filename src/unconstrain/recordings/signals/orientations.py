@@ -6,8 +6,13 @@ import numpy as np
 
 from ...base.arrays import Array
 
-TURNS = (2 * np.pi, 360.0)
-"""One turn, in radians and in degrees."""
+UNITS = {"rad": 2 * np.pi, "deg": 360.0}
+"""One turn in each unit of angles."""
+
+TURNS = tuple(UNITS.values())
+
+MOST_TURNS = 16
+"""Angles that go further than so many turns in radians are degrees."""
 
 
 class Wrap(NamedTuple):
@@ -34,6 +39,13 @@ def wraps(angle: Array) -> Wrap | None:
         if rows:
             return Wrap(turn, rows)
     return None
+
+
+def unit_of_angles(angles: Array) -> str:
+    """Unit of angles (T, k): degrees where they jump by 360, or go too far to be radians."""
+    found = [wrap.turn for column in angles.T if (wrap := wraps(column[np.isfinite(column)])) is not None]
+    far = float(np.nanmax(np.ptp(angles, axis=0), initial=0.0)) > MOST_TURNS * UNITS["rad"]
+    return "deg" if UNITS["deg"] in found or (far and not found) else "rad"
 
 
 def _jumps_by(angle: Array, turn: float) -> list[int]:
