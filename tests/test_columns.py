@@ -10,6 +10,7 @@ import unconstrain as uc
 from unconstrain.base.errors import InvalidDataError, SettingError
 from unconstrain.recordings.columns import resolve
 from unconstrain.recordings.demonstration import Recording
+from unconstrain.recordings.preparation.recipes import complete_recipe
 from unconstrain.recordings.readers import Reading
 from unconstrain.recordings.readers.clocks import find_clock, read_words, seconds
 
@@ -57,7 +58,7 @@ def test_names_of_columns_mean_themselves(names):
 
 
 def complete(columns, **told):
-    return uc.preparation.complete_recipe(uc.Recipe(**told), Recording(tuple(columns), np.ones((2, len(columns)))))
+    return complete_recipe(uc.Recipe(**told), Recording(tuple(columns), np.ones((2, len(columns)))))
 
 
 def numbered(head, first=0, count=3):

@@ -19,6 +19,7 @@ from foreign import ACTIONS, STATES, STEPS, bag, lasa, lerobot, robomimic
 from recorded import DATA as RECORDED
 from recorded import needs_data
 from unconstrain.base.errors import ReadError, UnconstrainError
+from unconstrain.recordings.preparation.recipes import complete_recipe
 from unconstrain.recordings.readers import parquet, read_blocks
 from unconstrain.recordings.readers.mat5 import read_mat5
 
@@ -28,7 +29,7 @@ def names(recordings):
 
 
 def guessed(recording):
-    recipe = uc.preparation.complete_recipe(uc.Recipe(), recording)
+    recipe = complete_recipe(uc.Recipe(), recording)
     return recipe.states, recipe.actions or recipe.differentiate
 
 
@@ -184,7 +185,7 @@ def test_the_state_of_a_simulator_is_not_taken_for_that_of_the_movement(tmp_path
     recording = uc.read(robomimic(tmp_path / "a.hdf5", simulated=True))[0]
     with pytest.raises(UnconstrainError, match="--state"):
         guessed(recording)
-    told = uc.preparation.complete_recipe(uc.Recipe("states"), recording)
+    told = complete_recipe(uc.Recipe("states"), recording)
     assert (len(told.states), told.actions) == (11, ("actions1", "actions2", "actions3"))
 
 
@@ -243,7 +244,7 @@ def test_lerobot_data_sets_are_read_by_episodes(tmp_path, version, monkeypatch):
     assert [each.attributes["task"] for each in recordings] == ["wipe the table", "stir", "wipe the table"]
     states = tuple(f"observation.state.{axis}" for axis in "xyz")
     assert guessed(recordings[0]) == (states, ("action1", "action2", "action3"))
-    assert uc.preparation.complete_recipe(uc.Recipe("observation.state", "action"), recordings[0]).states == states
+    assert complete_recipe(uc.Recipe("observation.state", "action"), recordings[0]).states == states
     for recording in recordings:
         assert_array_equal(recording.select(states), STATES)
         assert_allclose(recording.times, STEPS / 30, atol=1e-6)

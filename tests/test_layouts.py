@@ -123,6 +123,7 @@ def numbered(delimiter, columns=(0, 1, 2)):
         (QUALISYS + "Frame\tTime\thand X\thand Y\n", "\t", (0, 1, 2), ("hand X", "hand Y")),
         (MOTIVE, ",", (0, 1, 2), ("Rigid Body.Hand.7.Position.X", "Rigid Body.Hand.7.Position.Y")),
         (TRC, "\t", (0, 1, 2), ("hand.X1", "hand.Y1")),
+        (TRC.replace("\t", ",")[:-1] + ",,,\n", ",", (0, 1, 2), ("hand.X1", "hand.Y1")),
         ("time,x,y\n", ",", None, ("x", "y")),
         (OPENSIM, "\t", None, ("x", "y")),
         (VICON.replace("Sub Frame", "Time").replace(",,mm", ",s,mm"), ",", (0, 1, 2), ("me:hand.X", "me:hand.Y")),

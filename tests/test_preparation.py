@@ -106,8 +106,8 @@ def test_stamps_that_cannot_be_differentiated_are_refused(times: list[float], me
 
 
 def test_an_unknown_method_lists_the_known_ones() -> None:
-    with pytest.raises(SettingError, match="differentiate: got 'kalman', expected one of savgol, central"):
-        differentiate(STEADY, circle(STEADY), "kalman")
+    with pytest.raises(SettingError, match="differentiate: got 'spline', expected one of savgol, kalman, central"):
+        differentiate(STEADY, circle(STEADY), "spline")
 
 
 # ------------------------------------------------------------------------------------------------------- resampling
@@ -177,6 +177,52 @@ def test_recorded_actions_are_taken_as_they_are() -> None:
     np.testing.assert_array_equal(demonstration.states, [[1], [3]])
     np.testing.assert_array_equal(demonstration.actions, [[2], [4]])
     assert demonstration.times is None
+
+
+def turned(unit: str = "deg", speed: str = "deg/s") -> Recording:
+    """An arm's position, an angle in degrees, and the velocities of both."""
+    angle = np.column_stack([circle(STEADY)[:, 0], 10 * circle(STEADY)[:, 1]])
+    table = np.column_stack([angle, np.gradient(angle, STEADY, axis=0)])
+    return Recording(
+        ("x", "a", "vx", "va"), table, STEADY, "arm", units={"x": "m", "a": unit, "vx": "m/s", "va": speed}
+    )
+
+
+@pytest.mark.parametrize("unit", ["deg", "Degrees", "°", "deg ", "degree"])
+@pytest.mark.parametrize("speed", ["deg/s", "°/s", "deg s^-1", "degrees per second", "deg/sec", "deg s⁻¹"])
+def test_columns_in_degrees_by_their_units_are_taken_in_radians(unit: str, speed: str) -> None:
+    recording = turned(unit, speed)
+    with pytest.warns(PreparationWarning, match="degrees: 'arm': a, va is taken in radians; --degrees none forbids it"):
+        demonstration = only(prepare(recording))
+    np.testing.assert_allclose(demonstration.states, recording.values[:, :2] * [1, np.pi / 180], rtol=1e-15)
+    np.testing.assert_allclose(demonstration.actions, recording.values[:, 2:] * [1, np.pi / 180], rtol=1e-15)
+    np.testing.assert_array_equal(recording.values, turned().values)  # they are those of the file still
+
+
+@pytest.mark.parametrize(("unit", "speed"), [("rad", "rad/s"), ("", ""), ("degC", "deg/m"), ("mm", "mm/s")])
+def test_other_units_and_none_are_left_as_they_are(unit: str, speed: str) -> None:
+    recording = turned(unit, speed)
+    demonstration = only(prepare(recording))
+    np.testing.assert_array_equal(np.hstack([demonstration.states, demonstration.actions]), recording.values)
+
+
+def test_degrees_are_told_for_files_without_units_and_forbidden_for_others() -> None:
+    bare = turned("", "")
+    told = only(prepare(bare, Recipe(states=("x", "a"), differentiate="savgol", degrees=("a",))))
+    plain = only(prepare(bare, Recipe(states=("x", "a"), differentiate="savgol")))
+    np.testing.assert_allclose(told.actions, plain.actions * [1, np.pi / 180], rtol=1e-12, atol=1e-12)
+    forbidden = only(prepare(turned(), Recipe(degrees=())))
+    np.testing.assert_array_equal(forbidden.states, bare.values[:, :2])
+    with pytest.raises(SettingError, match="degrees: got yaw, expected some of x, a, vx, va"):
+        prepare(bare, Recipe(degrees=("yaw",)))
+
+
+def test_an_angle_in_degrees_is_made_continuous_in_radians() -> None:
+    turning = np.degrees(3 * STEADY)
+    wrapped = Recording(("a",), ((turning + 180) % 360 - 180)[:, None], STEADY, "crank", units={"a": "°"})
+    with pytest.warns(PreparationWarning, match="taken in radians"):
+        demonstration = only(prepare(wrapped, Recipe(states=("a",), differentiate="savgol", angles=("a",))))
+    np.testing.assert_allclose(demonstration.actions, 3.0, rtol=1e-9)
 
 
 def test_a_recording_without_times_takes_its_rate_from_the_recipe() -> None:
@@ -421,6 +467,7 @@ names = st.text("ax_1 .,/'\"\\\n\té拭🙂", min_size=1)
         still=st.none() | st.floats(0, 1),
         centre=st.booleans(),
         max_gap_s=st.none() | st.floats(1e-3, 10),
+        degrees=st.none() | st.lists(names, max_size=2, unique=True).map(tuple),
     )
 )
 def test_a_recipe_survives_json(recipe: Recipe) -> None:

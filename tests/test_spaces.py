@@ -3,6 +3,7 @@
 import ctypes
 import shutil
 import subprocess
+from contextlib import nullcontext
 from functools import cache
 
 import array_api_strict
@@ -196,11 +197,13 @@ def test_a_speed_that_depends_on_the_angle_closes_too():
 def test_degrees_are_known_by_the_row_of_units_by_their_jumps_or_by_the_option():
     wrapped, straight = crank(3.0, 180 / np.pi), crank(0.0, 180 / np.pi)
     with_units = uc.Recording(straight.columns, straight.values, straight.times, units={"crank": "deg"})
-    asked = uc.Recipe(("crank",), differentiate="savgol", angles=("crank",), angle_unit="deg")
+    asked = uc.Recipe(("crank",), differentiate="savgol", angles=("crank",), degrees=("crank",))
     for recording, recipe in ((wrapped, CRANK), (with_units, CRANK), (straight, asked)):
-        [demonstration] = uc.prepare(recording, recipe)
-        assert demonstration.space == Circle(360.0)
-        assert_allclose(demonstration.actions, 180 / np.pi)
+        word = nullcontext() if recipe is asked else pytest.warns(match="crank is taken in radians; --degrees none")
+        with word:
+            [demonstration] = uc.prepare(recording, recipe)
+        assert demonstration.space == Circle()
+        assert_allclose(demonstration.actions, 1.0)
     assert uc.prepare(crank(0.0, wrapped=False), CRANK)[0].space == Circle()
 
 
@@ -236,8 +239,8 @@ def test_the_order_of_a_quaternion_is_that_of_its_names():
 
 def test_a_recipe_names_space_and_directions_of_its_states():
     names = ("x", "qx", "qy", "qz", "qw", "yaw")
-    recipe = uc.Recipe(names, angles=("yaw",), quaternions=(names[1:5],), angle_unit="deg")
-    assert recipe.space == Euclidean() * Sphere("xyzw") * Circle(360.0)
+    recipe = uc.Recipe(names, angles=("yaw",), quaternions=(names[1:5],))
+    assert recipe.space == Euclidean() * Sphere("xyzw") * Circle()
     assert recipe.directions == ("vx", "wqx", "wqy", "wqz", "vyaw")
     assert uc.Recipe(("x", "y")).space == Euclidean(2)
     apart = uc.Recipe(("qw", "x", "qx", "qy", "qz"), quaternions=(("qw", "qx", "qy", "qz"),))
@@ -473,7 +476,7 @@ def test_the_command_line_gives_a_policy_its_space(tmp_path):
     columns = ("--state", "x,qx,qy,qz,qw,crank", "--differentiate", *turning_columns)
     saved = tmp_path / "policy.npz"
     said = run("fit", *files, *columns, "--learner", "direct", "-o", saved)
-    assert "qw, crank (an angle in rad) (qx, qy, qz, qw are an orientation) as states" in said
+    assert "qw, crank (an angle) (qx, qy, qz, qw are an orientation) as states" in said
     assert uc.load(saved).space_ == Euclidean() * Sphere("xyzw") * Circle()
     state = np.r_[0.0, turning(Rotation.random(random_state=3), "xyzw", flips=False).values[50], 3.0]
     path = run("rollout", saved, f"--start={','.join(map(str, state))}", "--steps", "20").splitlines()

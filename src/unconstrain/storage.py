@@ -32,7 +32,7 @@ from .learners import (
     Segments,
     Solution,
 )
-from .models import Affine, Everywhere, KMeansRBF, Model, NormalisedRBF, Polynomial, ReceptiveFields, spaces
+from .models import Affine, Everywhere, KMeansRBF, Model, NormalisedRBF, Polynomial, ReceptiveFields, Scale, spaces
 from .policies import LocallyLinearPolicy, ParametricPolicy, Policy
 from .risks import FoldedMoments, Moments
 from .training import Folds, HeldOut, Split, Training
@@ -48,7 +48,7 @@ _HEADER = "header"
 _KNOWN: dict[str, type] = {
     kind.__name__: kind
     for kind in (
-        *(Affine, Everywhere, KMeansRBF, Model, NormalisedRBF, Polynomial, ReceptiveFields),
+        *(Affine, Everywhere, KMeansRBF, Model, NormalisedRBF, Polynomial, ReceptiveFields, Scale),
         *(spaces.Circle, spaces.Embedding, spaces.Euclidean, spaces.Product, spaces.Sphere),
         *(Belief, Direct, Hybrid, Inconsistency, Judged, Likelihood, NoiseCorrected, Robust, Segments, Solution),
         *(FoldedMoments, Folds, HeldOut, Moments, Split, Training),

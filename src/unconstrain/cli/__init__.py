@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -19,9 +20,18 @@ from ..base.files import write
 from ..paper import experiments
 from .converting import convert
 from .diagnosing import diagnose
-from .fitting import alpha_of, check_writable, default_learner, learn, learner_of, options_for_model, policy_of
-from .printing import Group, keep_codes, print_table, refuse_warnings, say_fit, say_surveys
-from .reading import complete, numbers, options_for_reading, reading_of, recipe_of, said_recipe, stream_of
+from .fitting import (
+    alpha_of,
+    check_writable,
+    default_learner,
+    learn,
+    learner_of,
+    options_for_model,
+    policy_of,
+    scale_of,
+)
+from .printing import Group, keep_codes, print_table, refuse_warnings, say_fit, say_scale, say_surveys
+from .reading import numbers, options_for_reading, reading_of, recipe_of, said_recipe, stream_of
 
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
 
@@ -72,7 +82,7 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
         if not first:
             raise ReadError(f"{', '.join(files)}: holds no recording.")
         try:
-            click.echo(f"fit uses {said_recipe(complete(recipe, first[0]), first[0])}.")
+            click.echo(f"fit uses {said_recipe(uc.preparation.decide(recipe, first[0])[0], first[0])}.")
         except UnconstrainError as error:
             click.echo(f"fit needs to know more: {error}")
     refuse_warnings(reading["strict"])
@@ -103,6 +113,14 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
 @click.option(
     "--hold-out", type=click.Choice(["auto", "demonstration", "sample"]), default="auto", help="Unit of a fold."
 )
+@click.option(
+    "--scale",
+    type=scale_of,
+    default="none",
+    show_default=True,
+    metavar="AUTO|NONE|A,B,...",
+    help="What counts as one of each state, such as 1000,1 for mm beside rad; auto finds it.",
+)
 @click.option("--report", type=click.Path(dir_okay=False), help="Also write an HTML report there.")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on the dask cluster of this scheduler.")
 def fit(
@@ -117,6 +135,7 @@ def fit(
     speed_power: float,
     folds: int,
     hold_out: Any,
+    scale: Any,
     report: str | None,
     scheduler: str | None,
     **reading: Any,
@@ -127,13 +146,16 @@ def fit(
     """
     paths = uc.readers.expand(files)
     check_writable((output, report), paths)
+    if scale is not None:  # is what cures them
+        warnings.filterwarnings("ignore", "mixed-units", UserWarning)
     learner = learner or default_learner(paths, scheduler, alpha, softness, speed_power)
     chosen = {"learner": learner_of(learner, alpha, softness, speed_power), "validation": uc.Folds(folds, hold_out)}
-    fitted = policy_of(model, variance, centres, **chosen)
+    fitted = policy_of(model, variance, centres, scale=scale, **chosen)
     stream = stream_of(paths, speed_power, **reading)
     learn(fitted, stream, scheduler)
     notes = {"recipe": stream.recipe.to_dict(), **reading_of(**reading).roles}
     click.echo(f"Learnt from {said_recipe(stream.recipe, stream.first)}.")
+    say_scale(fitted, stream.recipe)
     say_fit(fitted, stream if scheduler is None else None, learner)
     refuse_warnings(reading["strict"])
     uc.save(fitted, output, notes)

@@ -14,7 +14,7 @@ import unconstrain as uc
 from ..base.files import write
 from .fitting import check_writable, options_for_model, policy_of
 from .printing import print_table, refuse_warnings, say
-from .reading import complete, options_for_reading, reading_of, recipe_of, said_recipe
+from .reading import options_for_reading, reading_of, recipe_of, said_recipe
 
 MOST_ROWS = 8
 
@@ -41,8 +41,9 @@ def diagnose(
     check_writable((report,), paths)
     every = uc.read(paths, **reading_of(**reading).arguments)
     recordings = [one for one in every if one.name not in reading["leave_out"]]
-    recipe = complete(recipe_of(**reading), recordings[0])
-    demonstrations = uc.prepare(recordings, recipe)
+    asked = recipe_of(**reading)
+    demonstrations = uc.prepare(recordings, asked)
+    recipe, _ = uc.preparation.decide(asked, recordings[0])
     policy = policy_of(model, variance, centres, learner=uc.Robust()).fit_demonstrations(demonstrations)
     found = uc.evaluation.diagnose(policy, demonstrations)
     missed = 1.0 - policy.score(*uc.stack(demonstrations)[:2])

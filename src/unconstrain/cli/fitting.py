@@ -11,6 +11,7 @@ import click
 import unconstrain as uc
 
 from ..base.errors import SettingError
+from .reading import numbers
 
 MODELS: dict[str, Callable[..., uc.Policy]] = {
     "local": lambda variance=None, **chosen: uc.LocallyLinearPolicy(variance, **chosen),
@@ -47,6 +48,11 @@ def alpha_of(text: str) -> float | Literal["auto"]:
         return "auto" if text == "auto" else float(text)
     except ValueError:
         raise click.BadParameter(f"got {text!r}, expected a number or auto.") from None
+
+
+def scale_of(text: str) -> str | tuple[float, ...] | None:
+    """Numbers, auto, or None."""
+    return {"auto": "auto", "none": None}[text] if text in ("auto", "none") else numbers(text)
 
 
 def default_learner(

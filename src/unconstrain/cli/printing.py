@@ -121,6 +121,17 @@ def say_fit(policy: uc.Policy, stream: uc.Stream | None, learner: str) -> None:
         )
 
 
+def say_scale(policy: uc.Policy, recipe: uc.Recipe) -> None:
+    """Print what counts as one of each state and action, where that is not their own unit."""
+    if policy.scale_ is None:
+        return
+    states = recipe.states or ()
+    names = states if recipe.actions is None else (*states, *recipe.actions)
+    sizes = [*policy.scale_.states, *policy.scale_.actions]
+    told = ", ".join(f"{size:.4g} of {name}" for name, size in zip(names, sizes, strict=False))
+    click.echo(f"As one count {told} (--scale); noise and features are in these units, predictions as in the files.")
+
+
 def _say_suspects(rows: NDArray[np.intp], stream: uc.Stream | None) -> None:
     """Name the samples that look wrong, in a further walk if there are any."""
     if len(rows) and stream is not None:

@@ -38,9 +38,7 @@ def numbers(text: str) -> tuple[float, ...]:
 
 CURES = (
     click.option("--angle", type=names, help="State columns that are angles, such as roll,yaw."),
-    click.option(
-        "--angle-unit", type=click.Choice(["rad", "deg"]), help="Unit of the angles, if the file does not say."
-    ),
+    click.option("--degrees", type=names, help="Columns in degrees, by default as their units or jumps say; or none."),
     click.option(
         "--quaternion", "quaternions", multiple=True, help="Four state columns of a quaternion; several times."
     ),
@@ -49,7 +47,9 @@ CURES = (
     ),
     click.option(
         "--action-is",
-        type=click.Choice(["velocity", "target", "delta"]),
+        type=click.Choice(["auto", "velocity", "target", "delta"]),
+        default="auto",
+        show_default=True,
         help="What action columns hold: velocities, states to come, or changes to the next sample.",
     ),
     click.option("--pauses", type=click.Choice(["drop", "keep"]), default="drop", help="Standing still in the middle."),
@@ -78,7 +78,7 @@ def options_for_reading(command: Callable[..., Any]) -> Callable[..., Any]:
             click.option("--differentiate", is_flag=True, help="Take the velocity of the state as the action."),
             click.option(
                 "--by",
-                type=click.Choice(["savgol", "central"]),
+                type=click.Choice(["savgol", "kalman", "central"]),
                 help="How to differentiate, savgol by default; implies --differentiate.",
             ),
             click.option("--window", type=float, help="Smoothing window of savgol, seconds."),
@@ -109,6 +109,7 @@ def recipe_of(
     centre: bool = False,
     still: float | None = None,
     angle: tuple[str, ...] | None = None,
+    degrees: tuple[str, ...] | None = None,
     quaternions: Sequence[str] = (),
     rotation_vectors: Sequence[str] = (),
     max_gap: float | None = None,
@@ -127,32 +128,25 @@ def recipe_of(
         centre=centre,
         still=still,
         angles=angle or (),
+        degrees=() if degrees == ("none",) else degrees,
         quaternions=groups_of_names(quaternions),
         rotation_vectors=groups_of_names(rotation_vectors),
         max_gap_s=max_gap,
-        **{
-            name: others[name]
-            for name in ("sort", "glitches", "seams", "pauses", "action_is", "angle_unit")
-            if name in others
-        },
+        **{name: others[name] for name in ("sort", "glitches", "seams", "pauses", "action_is") if name in others},
     )
     return recipe if window is None else replace(recipe, window_s=window)
 
 
-def complete(recipe: uc.Recipe, recording: uc.Recording) -> uc.Recipe:
-    """Guess what was not said; what was said has to be there."""
-    return uc.preparation.complete_recipe(recipe, recording)
-
-
 def said_recipe(recipe: uc.Recipe, recording: uc.Recording) -> str:
     """A recipe in words, with the smoothing window that it makes of a recording."""
-    angle = f" (an angle in {recipe.angle_unit})"
-    states = ", ".join(f"{name}{angle if name in recipe.angles else ''}" for name in recipe.states or ())
+    states = ", ".join(f"{name}{' (an angle)' if name in recipe.angles else ''}" for name in recipe.states or ())
     states += "".join(f" ({', '.join(group)} are an orientation)" for group in recipe.quaternions)
     window = uc.preparation.window_used(recipe, recording)
-    smoothed = f"savgol, {window:.3g} s" if recipe.differentiate == "savgol" else "central differences"
+    ways = {"savgol": f"savgol, {window:.3g} s", "kalman": "Kalman smoother"}
+    smoothed = ways.get(recipe.differentiate or "", "central differences")
     actions = f"their velocity ({smoothed})" if recipe.actions is None else f"{', '.join(recipe.actions)} as actions"
-    return f"{states} as states and {actions}" + ("" if recipe.actions else " as actions")
+    radians = f", {', '.join(recipe.degrees)} in radians" if recipe.degrees else ""
+    return f"{states} as states and {actions}{'' if recipe.actions else ' as actions'}{radians}"
 
 
 def reading_of(**options: Any) -> uc.readers.Reading:
@@ -163,7 +157,7 @@ def reading_of(**options: Any) -> uc.readers.Reading:
 
 def stream_of(paths: Sequence[str | Path], speed_power: float, **options: Any) -> uc.Stream:
     """Files as batches to learn from, as the options say."""
-    reading, asked = reading_of(**options), recipe_of(**options)
     left_out = options.get("leave_out") or ()
-    first = uc.Stream(paths, asked, leave_out=left_out, reading=reading).first
-    return uc.Stream(paths, complete(asked, first), speed_power=speed_power, leave_out=left_out, reading=reading)
+    return uc.Stream(
+        paths, recipe_of(**options), reading=reading_of(**options), speed_power=speed_power, leave_out=left_out
+    )

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted
 
 from ..base.arrays import Array
-from ..models import ClosedForm
+from ..models import ClosedForm, Scale
 from .c99 import export_c
 from .onnx_graph import export_onnx
 from .stepping import Step, stepper
@@ -20,6 +20,7 @@ class Deployable:
     training_: Any
     solution_: Any
     n_features_in_: int
+    scale_: Scale | None
 
     @abstractmethod
     def __call__(self, states: ArrayLike) -> Array:
@@ -59,7 +60,7 @@ class Deployable:
         check_is_fitted(self, "solution_")
         # What another thread has learnt meanwhile is prepared at the next step: the solution is then another.
         solution = known["solution_"]
-        step = stepper(known["training_"].model, solution.weights, known["n_features_in_"])
+        step = stepper(known["training_"].model, solution.weights, known["n_features_in_"], known.get("scale_"))
         known["_prepared"] = solution, step
         return step
 
@@ -72,7 +73,8 @@ class Deployable:
             If the features are a callable that does not say its formula.
         """
         check_is_fitted(self, "solution_")
-        return self.training_.model.formula(self.solution_.weights)
+        form = self.training_.model.formula(self.solution_.weights)
+        return form if self.scale_ is None else self.scale_.form(form)
 
     def export_c(self, path: str | os.PathLike[str], name: str = "policy") -> None:
         """Write the policy as one C99 file that needs only ``exp`` (``sin``, ``cos``) of the standard library.

@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import Array
 from ..base.errors import InvalidDataError
-from ..models import ClosedForm, Model, spaces
+from ..models import ClosedForm, Model, Scale, spaces
 
 Step: TypeAlias = Callable[[ArrayLike, Array | None], Array]
 """From a state (n,) to an action (d,), written into the second argument if that is given."""
 
 
-def stepper(model: Model, weights: Array, n: int) -> Step:
+def stepper(model: Model, weights: Array, n: int, scale: Scale | None = None) -> Step:
     """Prepare a policy for single states.
 
     Each thread has its own buffers, made on its first call; after that only
@@ -29,6 +29,8 @@ def stepper(model: Model, weights: Array, n: int) -> Step:
     weights : ndarray, shape (M, d, p)
     n : int
         Dimension of the states.
+    scale : Scale, optional
+        Units in which model and weights are.
 
     Returns
     -------
@@ -37,20 +39,21 @@ def stepper(model: Model, weights: Array, n: int) -> Step:
     """
     form = model.fields.formula(model.features, weights)
     if form is None:
-        return _without_formula(model, weights[0], n)
-    form = replace(form, embedding=model.embedding)
+        units = scale or Scale(np.ones(n), np.ones(weights.shape[1]))
+        return _without_formula(model, units.actions[:, None] * weights[0], units.states)
+    form = replace(form, embedding=model.embedding) if scale is None else scale.form(form)
     if form.exponents is not None:
         return _blended(form, form.exponents)
     return _affine(form) if form.monomials is None else _polynomial(form, form.monomials)
 
 
-def _without_formula(model: Model, weights: Array, n: int) -> Step:
-    relative, dot = _relative_to(np.zeros(n), spaces.Embedding()), np.dot
+def _without_formula(model: Model, weights: Array, units: Array) -> Step:
+    relative, dot = _relative_to(np.zeros(len(units)), spaces.Embedding()), np.dot
 
     def step(state: ArrayLike, out: Array | None = None) -> Array:
-        row = np.empty((1, n))
+        row = np.empty((1, len(units)))
         relative(state, row[0])
-        return dot(weights, model.design(row)[0], out)
+        return dot(weights, model.design(row / units)[0], out)
 
     return step
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Array
 from ..base.errors import InvalidDataError
 from ..learners import Solution, robust
-from ..models import choose_variance, cover
+from ..models import Scale, choose_variance, cover
 from ..recordings import Demonstration, readers, stack
 
 if TYPE_CHECKING:
@@ -198,7 +198,27 @@ def diagnose(policy: Policy, demonstrations: Sequence[Demonstration]) -> Diagnos
     InvalidDataError
         If there is one action column only, no motion, or too little data to hold anything out.
     """
-    solution, demos = policy.solution_, list(demonstrations)
+    if policy.scale_ is None:
+        return _diagnosed(policy, list(demonstrations))
+    scale = policy.scale_
+    own = [replace(one, states=scale.state(one.states), actions=scale.action(one.actions)) for one in demonstrations]
+    found = _diagnosed(policy.in_own_units(), own)
+    return replace(found, regions=tuple(_in_units(region, scale) for region in found.regions))
+
+
+def _in_units(region: Region, scale: Scale) -> Region:
+    """A region in the units of the data."""
+    direction = scale.given(np.array(region.direction))
+    return replace(
+        region,
+        centre=_numbers(np.array(region.centre) * scale.states),
+        state=_numbers(np.array(region.state) * scale.states),
+        direction=_numbers(direction / np.linalg.norm(direction)),
+    )
+
+
+def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
+    solution = policy.solution_
     states, actions, groups = stack(demos)
     spread, belief = policy.uncertainty(states), solution.believed  # raises where the learner has none
     typical = _typical(actions, solution)

@@ -5,6 +5,7 @@ from .features import Affine, FeatureMap, KMeansRBF, NormalisedRBF, Placeable, P
 from .formula import ClosedForm
 from .model import Model
 from .receptive_fields import Everywhere, ReceptiveFields, choose_variance, cover
+from .scale import Scale
 
 __all__ = [
     "Affine",
@@ -17,6 +18,7 @@ __all__ = [
     "Placeable",
     "Polynomial",
     "ReceptiveFields",
+    "Scale",
     "choose_variance",
     "cover",
     "spaces",

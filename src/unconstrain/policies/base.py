@@ -3,9 +3,10 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import copy, deepcopy
+from dataclasses import replace
 from functools import partial
 from itertools import chain
-from typing import Any, Self
+from typing import Any, Literal, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,10 +20,16 @@ from ..base.estimators import checked_states
 from ..base.parameters import Parameters
 from ..deployment import Deployable
 from ..learners import Belief, Learner, Robust, Solution, Uncertainty, named
-from ..models import FeatureMap, Model, spaces
-from ..recordings import Demonstration, stack, times_of
+from ..models import FeatureMap, Model, Scale, spaces
+from ..recordings import Demonstration, noise_of, preparation, stack, times_of
 from ..risks import Moments, unit_actions
 from ..training import Batch, FirstLook, Folds, Seen, Split, Training, Validation, cluster, is_typical
+
+Asked: TypeAlias = Sequence[float] | Literal["auto"] | None
+"""A scale as it is asked for."""
+
+_LOOKED_AT = 2000
+"""Samples that are learnt from to choose among scales."""
 
 _FITTED = (
     "training_",
@@ -33,6 +40,7 @@ _FITTED = (
     "_flat",
     "_waiting",
     "_space",
+    "scale_",
 )
 
 
@@ -45,11 +53,15 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         Model, folds and sums of all samples so far, and the samples where the learner needs them.
     solution_ : Solution
         Weights (M, d, p), and what the data determined.
+    scale_ : Scale or None
+        Units in which both are; None for those of the data.
     """
 
     learner: Learner | str | None
     validation: Validation | None
     space: spaces.Space | None = None
+    scale: Asked = None
+    scale_: Scale | None = None
     training_: Training
     solution_: Solution
     n_outputs_: int
@@ -163,6 +175,10 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         """
         learner = named(self.learner)
         cluster.check_learner(learner)
+        if isinstance(self.scale, str):
+            raise SettingError(
+                f"scale: got {self.scale!r}, which looks at samples, and a cluster sends sums. Take numbers."
+            )
         if not parts:
             raise InvalidDataError("got no part to learn from, expected at least one.")
         return self._fit_parts(parts, summed, learner, together=False)
@@ -181,6 +197,8 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
     ) -> Self:
         """Learn from demonstrations, each its own group.
 
+        What is not as it seems in them, such as targets for velocities, is said in ``solution_.notes``.
+
         Parameters
         ----------
         demonstrations : Demonstration or sequence of Demonstration
@@ -192,10 +210,15 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         """
         demos = [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
         states, actions, groups = stack(demos)
-        times, learner = times_of(demos), self._check_speed_power(speed_power)
+        learner = self._check_speed_power(speed_power)
         speed = np.linalg.norm(actions, axis=1)
         weights = (speed / speed.max()) ** speed_power if speed_power and speed.any() else None
-        return self._fit(learner, states, actions, weights, groups, times, space=demos[0].space)
+        doubts = preparation.doubts_about(demos)
+        if self.scale is not None:
+            doubts.pop("mixed-units", None)  # is what it cures
+        self._fit(learner, states, actions, weights, groups, times_of(demos), noise_of(demos), space=demos[0].space)
+        self.solution_ = replace(self.solution_, notes=(*self.solution_.notes, *doubts.values()))
+        return self
 
     def with_learner(self, learner: Learner | str) -> Self:
         """Return the same policy with another learner, from the same moments: no second pass over the data.
@@ -209,6 +232,13 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         other = copy(self)
         other.learner = learner
         return other._solved(named(learner))
+
+    def in_own_units(self) -> Self:
+        """The same policy from states to actions in units of its own, those of ``scale_``."""
+        other = copy(self)
+        other.__dict__.pop("_prepared", None)
+        other.scale_ = None
+        return other
 
     # What was learnt.
 
@@ -226,8 +256,12 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
             Of the library and on the device of the states.
         """
         check_is_fitted(self, "solution_")
-        known = self.__dict__  # as it is now: another thread may put a new one in its place
-        actions = known["training_"].model.predict(known["solution_"].weights, checked_states(self, X))
+        known, states = self.__dict__, checked_states(self, X)  # as it is now: another thread may put in a new one
+        scale = known.get("scale_")
+        actions = known["training_"].model.predict(
+            known["solution_"].weights, states if scale is None else scale.state(states)
+        )
+        actions = actions if scale is None else scale.given(actions)
         return actions[:, 0] if self._flat else actions
 
     def __call__(self, states: ArrayLike) -> Array:
@@ -250,7 +284,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         missed = moved = 0.0
         for block in self._checked(X, y, sample_weight, reset=False).blocks():
             directions, lengths = unit_actions(block.actions)
-            counts, along = beside(block.counts, lengths), directions * self(block.states)
+            counts, along = beside(block.counts, lengths), directions * self._own(block.states)
             missed += float(counts @ (lengths - namespace(lengths).sum(along, axis=1)) ** 2)
             moved += float(counts @ lengths**2)
         return 1.0 - missed / moved if moved > 0 else 0.0
@@ -283,14 +317,16 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         SettingError
             If the learner does not look at samples; :class:`~unconstrain.Robust` does.
         """
-        return self._believed().uncertainty(self.training_.model, on_host(checked_states(self, X)))
+        own = self._believed().uncertainty(self.training_.model, on_host(self._within(X)))
+        return own if self.scale_ is None else Uncertainty(*map(self.scale_.given, own))
 
     def covariances(self, X: ArrayLike) -> Array:
         """Covariance of the predicted actions due to what the data does not say, shape (N, d, d).
 
         Its diagonal is the square of ``uncertainty(X).undetermined``. Raises as :meth:`uncertainty` does.
         """
-        return self._believed().covariances(self.training_.model, on_host(checked_states(self, X)))
+        own = self._believed().covariances(self.training_.model, on_host(self._within(X)))
+        return own if self.scale_ is None else own * np.multiply.outer(self.scale_.actions, self.scale_.actions)
 
     def _believed(self) -> Belief:
         check_is_fitted(self, "solution_")
@@ -304,7 +340,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         SettingError
             If neither fields nor features have a place in state space.
         """
-        return self._fitted_model().support(checked_states(self, states))
+        return self._fitted_model().support(self._within(states))
 
     def _fitted_model(self) -> Model:
         check_is_fitted(self, "solution_")
@@ -327,6 +363,39 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         return self.training_.moments
 
     # Inside.
+
+    def _own(self, states: Array) -> Array:
+        """Predictions, all in the policy's own units."""
+        return self.training_.model.predict(self.solution_.weights, states)
+
+    def _within(self, X: ArrayLike) -> Array:
+        """States in the policy's own units."""
+        states = checked_states(self, X)
+        return states if self.scale_ is None else self.scale_.state(states)
+
+    def _consistency(self, batch: Batch, scale: Array) -> float:
+        """How consistent demonstrations are with what is learnt of others in some scale."""
+        trial = self._draft(*_FITTED)
+        trial.scale, trial.learner = tuple(scale), "hybrid"
+        return trial._fit(named(trial.learner), *batch).held_out_score()
+
+    def _scaled(self, batch: Batch) -> Scale | None:
+        """The scale that was asked for, or that makes a first batch comparable; None where it is one."""
+        asked: Any = self.scale
+        auto = isinstance(asked, str) and asked == "auto"
+        curved = not isinstance(self._space, spaces.Euclidean)
+        if asked is None or (auto and curved):
+            return None
+        if curved:
+            raise SettingError(
+                f"scale: got one for states in {self._space}, expected Euclidean states, without angles."
+            )
+        if auto:
+            some = batch.at(np.unique(np.linspace(0, batch.states.shape[0] - 1, _LOOKED_AT).astype(np.intp)))
+            states, actions = (np.asarray(on_host(table), dtype=np.float64) for table in some[:2])
+            asked = Scale.comparable(states, actions, partial(self._consistency, some))
+        scale = Scale.of(asked, batch.states.shape[1], batch.actions.shape[1])
+        return None if scale.is_one else scale
 
     def _draft(self, *without: str) -> Self:
         """A copy to work on, without some of its attributes."""
@@ -386,9 +455,14 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         if reset:
             self._flat, self.n_outputs_ = flat, columns
             self._space = self.space or space or spaces.Euclidean()
+            self.scale_ = self._scaled(batch)
         elif columns != self.n_outputs_:
             raise InvalidDataError(f"actions: got {columns} columns, expected {self.n_outputs_} as before.")
-        return batch
+        if self.scale_ is None:
+            return batch
+        noise = None if batch.noise is None else self.scale_.action(batch.noise)
+        states, actions = self.scale_.state(batch.states), self.scale_.action(batch.actions)
+        return batch._replace(states=states, actions=actions, noise=noise)
 
     def __sklearn_tags__(self) -> Any:
         """Say that actions may have several columns."""

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from ..learners import Learner
 from ..models import Model, ReceptiveFields, spaces
 from ..training import FirstLook, Validation
-from .base import Policy
+from .base import Asked, Policy
 
 
 class LocallyLinearPolicy(Policy):
@@ -31,6 +31,10 @@ class LocallyLinearPolicy(Policy):
         What the learner chooses its thresholds on; ten folds by default.
     space : Space, optional
         Which states are angles or orientations (:mod:`unconstrain.spaces`); by default as the demonstrations say.
+    scale : sequence of float or "auto", optional
+        So much of each state, and of each action where they are not as many, is taken as one: ``(1000, 1)`` where
+        millimetres are beside radians. "auto" finds it where columns are unlike (:mod:`~unconstrain.models.scale`).
+        Predictions stay in the units of the data. For states without angles and orientations.
 
     Attributes
     ----------
@@ -49,6 +53,7 @@ class LocallyLinearPolicy(Policy):
         learner: Learner | str | None = None,
         validation: Validation | None = None,
         space: spaces.Space | None = None,
+        scale: Asked = None,
     ) -> None:
         self.variance = variance
         self.at_least = at_least
@@ -56,6 +61,7 @@ class LocallyLinearPolicy(Policy):
         self.learner = learner
         self.validation = validation
         self.space = space
+        self.scale = scale
 
     def place(self, look: FirstLook) -> Model:
         """Lay fields over the states seen at first look; regressors share one origin."""

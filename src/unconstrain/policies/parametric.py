@@ -7,7 +7,7 @@ from ..base.errors import SettingError
 from ..learners import Learner
 from ..models import Everywhere, FeatureMap, KMeansRBF, Model, Placeable, spaces
 from ..training import FirstLook, Validation
-from .base import Policy
+from .base import Asked, Policy
 
 
 class ParametricPolicy(Policy):
@@ -28,6 +28,10 @@ class ParametricPolicy(Policy):
     space : Space, optional
         Which states are angles or orientations (:mod:`unconstrain.spaces`); by default as the demonstrations say.
         Features then see coordinates: of an angle its cosine and sine, of an orientation its rotation matrix.
+    scale : sequence of float or "auto", optional
+        So much of each state, and of each action where they are not as many, is taken as one: ``(1000, 1)`` where
+        millimetres are beside radians. "auto" finds it where columns are unlike (:mod:`~unconstrain.models.scale`).
+        Predictions stay in the units of the data. For states without angles and orientations.
 
     Attributes
     ----------
@@ -43,11 +47,13 @@ class ParametricPolicy(Policy):
         learner: Learner | str | None = None,
         validation: Validation | None = None,
         space: spaces.Space | None = None,
+        scale: Asked = None,
     ) -> None:
         self.features = features
         self.learner = learner
         self.validation = validation
         self.space = space
+        self.scale = scale
 
     def place(self, look: FirstLook) -> Model:
         """Lay the features over the states seen at first look."""

@@ -1,7 +1,7 @@
 """From files to demonstrations: readers, preparation, batches."""
 
 from . import writers
-from .demonstration import Demonstration, Recording, Truth, stack, times_of
+from .demonstration import Demonstration, Recording, Truth, noise_of, stack, times_of
 from .preparation import Recipe, prepare
 from .readers import read
 from .streams import Stream
@@ -12,6 +12,7 @@ __all__ = [
     "Recording",
     "Stream",
     "Truth",
+    "noise_of",
     "preparation",
     "prepare",
     "read",

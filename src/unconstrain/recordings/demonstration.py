@@ -109,6 +109,8 @@ class Demonstration(Shown):
         Used in messages and reports.
     space : Space
         Which states are angles or orientations (:mod:`unconstrain.spaces`); policies that learn from it take it.
+    noise : float or array_like, shape (d,), optional
+        Standard deviation of the noise on the actions, on each or on all; None where it is not known.
 
     Raises
     ------
@@ -122,6 +124,7 @@ class Demonstration(Shown):
     truth: Truth | None = None
     name: str = ""
     space: spaces.Space = field(default_factory=spaces.Euclidean)
+    noise: Array | None = None
 
     def __post_init__(self) -> None:
         of = f" of '{self.name}'" if self.name else ""
@@ -137,6 +140,8 @@ class Demonstration(Shown):
             object.__setattr__(self, "times", as_vector(self.times, f"times{of}", len(self.states)))
         if self.truth is not None:
             self._check_truth(self.truth, of)
+        if self.noise is not None:
+            object.__setattr__(self, "noise", self._each(self.noise, of))
 
     def __len__(self) -> int:
         return len(self.states)
@@ -150,6 +155,13 @@ class Demonstration(Shown):
             times=None if self.times is None else self.times[rows],
             truth=None if self.truth is None else Truth(self.truth.policy[rows], self.truth.projections[rows]),
         )
+
+    def _each(self, noise: Any, of: str) -> Array:
+        d = self.actions.shape[1]
+        each = as_vector(np.broadcast_to(noise, (d,)) if np.ndim(noise) == 0 else noise, f"noise{of}", d)
+        if (each < 0).any():
+            raise InvalidDataError(f"noise{of}: got {noise!r}, expected standard deviations, none below zero.")
+        return each
 
     def _check_truth(self, truth: Truth, of: str) -> None:
         steps, d = self.actions.shape
@@ -211,6 +223,12 @@ def times_of(demonstrations: Sequence[Demonstration]) -> Array | None:
     """Times of demonstrations laid end to end, shape (N,), seconds; None where one has none."""
     times = [demo.times for demo in demonstrations if demo.times is not None]
     return np.concatenate(times) if len(times) == len(demonstrations) else None
+
+
+def noise_of(demonstrations: Sequence[Demonstration]) -> Array | None:
+    """Standard deviations of the noise of demonstrations laid end to end, (N, d); None where one is not known."""
+    known = [np.broadcast_to(demo.noise, demo.actions.shape) for demo in demonstrations if demo.noise is not None]
+    return np.concatenate(known) if len(known) == len(demonstrations) else None
 
 
 def _time(times: Array | None) -> tuple[str, ...]:

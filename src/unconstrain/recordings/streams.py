@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ..base.arrays import BLOCK_ROWS, Array, check_at_least
 from ..base.errors import InvalidDataError
 from ..models import spaces
-from .demonstration import Demonstration, Recording, times_of
-from .preparation import Recipe, complete_recipe, prepare
+from .demonstration import Demonstration, Recording, noise_of, times_of
+from .preparation import Recipe, decide, prepare
 from .preparation.movements import prepare_one, warn
 from .preparation.plausibility.outlines import Outline
 from .preparation.plausibility.sets import compare, outline
@@ -24,7 +24,7 @@ from .preparation.surveys import subject_of
 from .readers import Reading, expand, read_blocks
 
 HELD_BYTES = 2**25
-"""Demonstrations that take no more than this in all are kept after the first walk, so that files are read once."""
+"""Demonstrations that take no more than this in all are kept after the first walk, so files are walked through once."""
 
 
 MOST_OUTLINES = 1000
@@ -34,7 +34,7 @@ MOST_OUTLINES = 1000
 class Block(NamedTuple):
     """Samples to learn from: ``states`` (N, n), ``actions`` (N, d), ``weights`` (N,) if not ones, ``groups`` (N,).
 
-    ``times`` (N,), seconds, where all demonstrations have them.
+    ``times`` (N,), seconds, and ``noise`` (N, d), where all demonstrations have them.
     """
 
     states: Array
@@ -42,6 +42,7 @@ class Block(NamedTuple):
     weights: Array | None
     groups: NDArray[Any]
     times: Array | None = None
+    noise: Array | None = None
 
 
 class Stream:
@@ -100,11 +101,9 @@ class Stream:
     @cached_property
     def recipe(self) -> Recipe:
         """The recipe, completed by a look at the first recording."""
-        asked = self._asked
-        told = asked.angle_unit is not None or not asked.angles
-        if told and asked.states and (asked.actions or asked.differentiate) and asked.action_is != "target":
-            return asked
-        return complete_recipe(asked, self.first)
+        recipe, remarks = decide(self._asked, self.first)
+        warn(self.first.name, remarks)
+        return recipe
 
     @property
     def space(self) -> spaces.Space:
@@ -168,7 +167,7 @@ class Stream:
             part = Stream(
                 path, self.recipe, reading=self.reading, speed_power=self.speed_power, leave_out=self.leave_out
             )
-            part.__dict__["unit"] = self.unit
+            part.__dict__ |= {"recipe": self.recipe, "unit": self.unit}
             part._first_file = self._first_file + number
             streams.append(part)
         return streams
@@ -208,6 +207,7 @@ class Stream:
             self._counts(actions),
             np.repeat([name for name, _ in named], [len(demo) for _, demo in named]),
             times_of([demo for _, demo in named]),
+            noise_of([demo for _, demo in named]),
         )
 
     def _counts(self, actions: Array) -> Array | None:

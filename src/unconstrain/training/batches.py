@@ -13,6 +13,7 @@ from ..base.arrays import (
     Array,
     Groups,
     as_groups,
+    as_matrix,
     as_table,
     as_vector,
     as_weights,
@@ -33,7 +34,8 @@ class Batch(NamedTuple):
     """Samples that were checked.
 
     ``states`` (N, n) and ``actions`` (N, d), of any real type (:meth:`blocks` gives float64) and of any array library;
-    sample ``weights`` (N,), ``groups`` (N,) and ``times`` (N,) in seconds, where given.
+    sample ``weights`` (N,), ``groups`` (N,), ``times`` (N,) in seconds and the standard deviation of each action's
+    ``noise`` (N, d), where given.
     """
 
     states: NDArray[Any]
@@ -41,6 +43,7 @@ class Batch(NamedTuple):
     weights: Array | None = None
     groups: NDArray[np.generic] | None = None
     times: Array | None = None
+    noise: Array | None = None
 
     @classmethod
     def checked(
@@ -50,6 +53,7 @@ class Batch(NamedTuple):
         sample_weight: ArrayLike | None = None,
         groups: Groups | None = None,
         times: ArrayLike | None = None,
+        noise: ArrayLike | None = None,
     ) -> tuple[Batch, bool]:
         """Check what goes with some states (N, n), and say whether the actions were a vector (N,).
 
@@ -71,7 +75,8 @@ class Batch(NamedTuple):
             )
         weights = None if sample_weight is None else as_weights(sample_weight, samples)
         names = None if groups is None else as_groups(groups, samples)
-        return cls(states, table, weights, names, None if times is None else as_vector(times, "times", samples)), flat
+        stamps = None if times is None else as_vector(times, "times", samples)
+        return cls(states, table, weights, names, stamps, None if noise is None else as_matrix(noise, "noise")), flat
 
     def blocks(self) -> Iterator[Batch]:
         """Go through it by some rows at a time, without those of no weight."""
@@ -101,7 +106,7 @@ class Batch(NamedTuple):
         return self._replace(weights=counts)
 
     def followed_by(self, other: Batch) -> Batch:
-        """Both in one; groups and times only where both have them."""
+        """Both in one; groups, times and noise only where both have them."""
         xp, weighted = namespace(self.states), self.weights is not None or other.weights is not None
         columns: list[Any] = [xp.concat([mine, theirs]) for mine, theirs in zip(self[:2], other[:2], strict=True)]
         columns.append(np.concatenate([self.counts, other.counts]) if weighted else None)

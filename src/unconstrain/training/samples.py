@@ -46,6 +46,8 @@ class Samples(Shown):
         Where it is among these, or was before some were taken.
     times : ndarray, shape (N,), optional
         Seconds, where they were given.
+    noise : ndarray, shape (N,), optional
+        Standard deviation of the noise on each action coordinate, where it was given.
     notes : tuple of str
         What had to be assumed of their order.
     """
@@ -62,6 +64,7 @@ class Samples(Shown):
     roughness: Array
     places: NDArray[np.intp]
     times: Array | None = None
+    noise: Array | None = None
     notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:

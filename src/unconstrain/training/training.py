@@ -203,6 +203,7 @@ class Training(Shown):
             model.roughness(models, centring.shape[1]),
             place[places],
             each.times,
+            None if each.noise is None else np.sqrt((each.noise**2).mean(axis=1)),
             notes,
         )
 
@@ -217,7 +218,9 @@ class Training(Shown):
         return self._in_units(given), *distinct(self._in_coordinates(given))
 
     def _in_units(self, batch: Batch) -> Batch:
-        return batch._replace(actions=batch.actions / self.action_unit, weights=batch.counts / self.weight_unit)
+        noise = None if batch.noise is None else batch.noise / self.action_unit
+        actions, weights = batch.actions / self.action_unit, batch.counts / self.weight_unit
+        return batch._replace(actions=actions, weights=weights, noise=noise)
 
     def _in_coordinates(self, batch: Batch) -> Batch:
         return batch._replace(states=self.model.embedding(batch.states))

@@ -163,7 +163,7 @@ class Segments(SampleLearner):
         found = self.labels == "found"
         labels = found_segments(samples.actions, samples.groups, known) if found else samples.groups
         if self.noise is None:
-            return by_segments(samples, labels, noise_of_each(samples.actions, labels, most)), {}
+            return by_segments(samples, labels, noise_of_each(samples.actions, labels, most, samples.noise)), {}
         return by_segments(samples, labels, np.full(len(samples), self.noise**2)), {}
 
 
@@ -210,7 +210,7 @@ class Robust(_Maximising):
     def compared(self, samples: Samples, training: Training) -> Comparison:
         """All candidates; those that use the Jacobian if they are as consistent as the best that does not, or more."""
         corrected, most = noise_corrected(samples), _most_noise(samples)
-        noise = noise_of_each(samples.actions, samples.groups, most)
+        noise = noise_of_each(samples.actions, samples.groups, most, samples.noise)
         learnt = [*softened(samples), corrected]
         if samples.groups.max() > 0:
             learnt.append(by_segments(samples, samples.groups, noise))
@@ -255,7 +255,7 @@ class Robust(_Maximising):
         if _trivial(any_):
             return next(iter(samples))
         best = {name: self.compared(samples[name], one).best for name, one in trainings.items()}
-        noise = noise_of_each(any_.actions, any_.groups, _most_noise(any_))
+        noise = noise_of_each(any_.actions, any_.groups, _most_noise(any_), any_.noise)
         least = min(one.variance for one in best.values())
         alike = [replace(one, name=name, softness=0.0) for name, one in best.items()]
         return Comparison(alike, np.minimum(noise, least), list(samples.values())).best.name

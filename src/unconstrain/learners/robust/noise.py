@@ -60,8 +60,8 @@ def noise_by_differences(actions: Array, groups: NDArray[np.intp]) -> float:
     return float(np.median(lengths) / chi2.median(actions.shape[1]) / (weights**2).sum())
 
 
-def noise_of_each(actions: Array, labels: NDArray[np.intp], most: float) -> Array:
-    """Noise variance of each sample: that of its segment by differences in time, where it is long enough, (N,).
+def noise_of_each(actions: Array, labels: NDArray[np.intp], most: float, known: Array | None = None) -> Array:
+    """Noise variance of each sample, (N,): what is known, or of its segment by differences, where it is long enough.
 
     Parameters
     ----------
@@ -70,7 +70,11 @@ def noise_of_each(actions: Array, labels: NDArray[np.intp], most: float) -> Arra
         Demonstration or segment of each sample.
     most : float
         Variance of short segments.
+    known : ndarray, shape (N,), optional
+        Standard deviation on each coordinate.
     """
+    if known is not None:
+        return known**2
     found = np.full(len(actions), most)
     for label in np.unique(labels):
         rows = labels == label

@@ -1,18 +1,21 @@
 """From recordings to demonstrations: which columns are what, what is not as it seems, derivatives, trimming."""
 
 from .alignment import align
+from .decisions import decide
 from .movements import PreparationWarning, differentiate, prepare, resample, trim, window_used
+from .plausibility.given import doubts_about
 from .plausibility.sets import doubts
-from .recipes import Recipe, complete_recipe
+from .recipes import Recipe
 from .surveys import survey, survey_set
 
 __all__ = [
     "PreparationWarning",
     "Recipe",
     "align",
-    "complete_recipe",
+    "decide",
     "differentiate",
     "doubts",
+    "doubts_about",
     "prepare",
     "resample",
     "survey",

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...base.errors import SettingError
-from ..signals.orientations import TURNS, UNITS, continuous_quaternions, continuous_rotations
+from ..signals.orientations import TURNS, continuous_quaternions, continuous_rotations
 from .recipes import Recipe
 
 
@@ -25,7 +25,7 @@ def continuous(states: Array, recipe: Recipe) -> Array:
     ndarray, shape (T, n)
         The same table where the recipe names no such column.
     """
-    unwrapped: Callable[[Array], Array] = partial(np.unwrap, period=UNITS[recipe.angle_unit or "rad"], axis=0)
+    unwrapped: Callable[[Array], Array] = partial(np.unwrap, axis=0)
     groups = [
         *(((name,), unwrapped) for name in recipe.angles),
         *((names, continuous_quaternions) for names in recipe.quaternions),

@@ -1,4 +1,4 @@
-"""What recorded actions are, by how they go with the states: velocities, states to come, differences."""
+"""What recorded actions are, by how they go with the states: velocities, or states to come."""
 
 from typing import NamedTuple
 
@@ -31,14 +31,6 @@ def are_backwards(states: Array, actions: Array) -> bool:
     return found is not None and found.by_changes > 0.7 and found.factor < 0 and found.by_targets < 0.5
 
 
-def are_differences(states: Array, actions: Array, interval: float) -> bool:
-    """Whether actions (T, n) are the changes to the next state themselves, at an interval in seconds that shows it."""
-    found = _explained(states, actions)
-    if found is None or found.by_changes < 0.95:
-        return False
-    return abs(found.factor - 1.0) < 0.05 and not 0.5 < interval < 2.0
-
-
 def _explained(states: Array, actions: Array) -> Explained | None:
     if states.shape != actions.shape or len(states) < 2 * LEAST_ROWS:
         return None
@@ -46,6 +38,8 @@ def _explained(states: Array, actions: Array) -> Explained | None:
     if not spread.all() or energy == 0.0:
         return None
     changes = np.gradient(states, axis=0)
+    if not changes.any():
+        return None
     factor = float((changes * actions).sum() / (changes**2).sum())
     by_changes = 1.0 - float(((actions - factor * changes) ** 2).sum()) / energy
     lags = [lag for lag in LAGS if lag < len(states) // 3]

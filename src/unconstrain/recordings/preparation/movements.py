@@ -20,12 +20,14 @@ from ...base.errors import InvalidDataError, SettingError
 from ..demonstration import Demonstration, Recording
 from ..remarks import Remark
 from ..signals.jumps import glitches, repaired, seams
+from ..signals.smoothing import LEAST, kalman_velocities
 from ..signals.stillness import pauses
 from .continuity import continuous
+from .decisions import decide
 from .plausibility.checks import examine
-from .plausibility.sets import compare, outline
+from .plausibility.sets import PUSHED, compare, outline
 from .plausibility.subject import Subject
-from .recipes import Recipe, complete_recipe, stamps
+from .recipes import Recipe, select, stamps
 
 GAP_INTERVALS = 5.0
 """An interval of this many median ones is a gap, where nothing else is said."""
@@ -56,14 +58,16 @@ class Gap(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """A stretch without gaps; ``actions`` is None until they are known."""
+    """A stretch without gaps; ``actions`` is None until they are known, and ``noise`` (d,) where it is not known."""
 
     times: Array
     states: Array
-    actions: Array | None
+    actions: Array | None = None
+    noise: Array | None = None
 
     def at(self, rows: slice | NDArray[np.bool_]) -> _Piece:
-        return _Piece(self.times[rows], self.states[rows], None if self.actions is None else self.actions[rows])
+        actions = None if self.actions is None else self.actions[rows]
+        return self._replace(times=self.times[rows], states=self.states[rows], actions=actions)
 
 
 def prepare(recordings: Recording | Sequence[Recording], recipe: Recipe | None = None) -> list[Demonstration]:
@@ -97,7 +101,8 @@ def prepare(recordings: Recording | Sequence[Recording], recipe: Recipe | None =
     every = [recordings] if isinstance(recordings, Recording) else list(recordings)
     if not every:
         raise InvalidDataError("got no recording, expected at least one.")
-    whole = complete_recipe(recipe or Recipe(), every[0])
+    whole, remarks = decide(recipe or Recipe(), every[0])
+    warn(every[0].name, remarks, stacklevel=3)
     subjects = [Subject(recording, whole) for recording in every]
     demonstrations = [prepare_one(subject, stacklevel=4) for subject in subjects]
     for subject, remarks in zip(subjects, compare([outline(subject) for subject in subjects]), strict=True):
@@ -133,10 +138,11 @@ def differentiate(
         Seconds, increasing; uniform for ``"savgol"``.
     positions : array_like, shape (T, n)
         No gaps.
-    method : {"savgol", "central"}
+    method : {"savgol", "kalman", "central"}
         Savitzky-Golay: the slope of a polynomial of degree ``order`` fitted to a window of
-        ``window_s`` seconds, at least the samples that the polynomial needs; or
-        central differences of second order, for stamps at any distance.
+        ``window_s`` seconds, at least the samples that the polynomial needs. A Kalman smoother of constant
+        acceleration under white jerk, with the most likely noise, or central differences of second order, both for
+        stamps at any distance.
     window_s : float
     order : int
 
@@ -168,9 +174,9 @@ def differentiate(
         )
     if method == "savgol" and _is_irregular(intervals):
         raise InvalidDataError(
-            "times: got irregular stamps, expected uniform ones. Use resample() before, or 'central'."
+            "times: got irregular stamps, expected uniform ones. Use resample() before, or 'kalman', or 'central'."
         )
-    return _velocities(times, positions, recipe, needed)
+    return _velocities(_Piece(times, positions), recipe, needed).velocities
 
 
 def resample(times: Array, values: Array, rate: float) -> tuple[Array, Array]:
@@ -268,33 +274,43 @@ def find_gaps(times: Array, max_gap_s: float | None = None) -> tuple[Gap, ...]:
 def _prepare(recording: Recording, recipe: Recipe) -> tuple[Demonstration, list[str]]:
     if not len(recording):
         raise InvalidDataError(f"'{recording.name}' has no samples, expected at least one.")
-    states = _finite(recording, recipe.states or ())
-    actions = None if recipe.actions is None else _finite(recording, recipe.actions)
+    states = _finite(recording, recipe.states or (), recipe)
+    actions = None if recipe.actions is None else _finite(recording, recipe.actions, recipe)
     times = stamps(recording, recipe)
     notes: list[str] = []
+    noise = None
     if times is None:
         states, actions = _in_rows(states, actions, recipe)
     else:
         piece, notes = _without_repeats(_Piece(*_sorted(times, states, actions, recipe)), recording.name)
         pieces = _split(_without_glitches(piece._replace(states=continuous(piece.states, recipe)), recipe), recipe)
-        (times, states, actions), more = _repair(pieces, recipe, recording.name)
+        (times, states, actions, noise), more = _repair(pieces, recipe, recording.name)
         notes += more
     if actions is None:
         raise SettingError(
             f"'{recording.name}' has no times, which are needed to differentiate: "
             "name the time column (--time), or give its rate in samples per second (--rate)."
         )
-    demonstration = Demonstration(states, actions, times, name=recording.name, space=recipe.space)
+    demonstration = Demonstration(states, actions, times, name=recording.name, noise=noise, space=recipe.space)
     if recipe.trim is not None or recipe.still is not None:
         demonstration = trim(demonstration, *(recipe.trim or (0.0, 0.0)), still=recipe.still)
     if recipe.centre:
         space, states = demonstration.space, demonstration.states
+        notes += _about_centre(states)
         demonstration = replace(demonstration, states=space.relative(states, space.mean(states)))
     return demonstration, notes
 
 
-def _finite(recording: Recording, names: Sequence[str]) -> Array:
-    values = recording.select(names)
+def _about_centre(states: Array) -> list[str]:
+    """A word where a mean is no place: on a movement that goes on, it depends on when the recording began and ended."""
+    on = float(np.linalg.norm(states[-1] - states[0]))
+    if on <= PUSHED * float(np.linalg.norm(np.ptp(states, axis=0))):
+        return []
+    return ["is centred by the mean of a movement from end to end, which hides a constant push; leave --centre off."]
+
+
+def _finite(recording: Recording, names: Sequence[str], recipe: Recipe) -> Array:
+    values = select(recording, names, recipe)
     bad = np.argwhere(~np.isfinite(values))
     if len(bad):
         row, column = bad[0]
@@ -332,7 +348,7 @@ def _in_rows(states: Array, actions: Array | None, recipe: Recipe) -> tuple[Arra
     """States and actions without times: continuous, without glitches and pauses."""
     piece = _Piece(np.arange(len(states), dtype=np.float64), continuous(states, recipe), actions)
     pieces = _split(_without_glitches(piece, recipe), recipe)
-    return _joined(pieces)[1:]
+    return _joined(pieces)[1:3]
 
 
 def _without_glitches(piece: _Piece, recipe: Recipe) -> _Piece:
@@ -362,9 +378,11 @@ def _repair(pieces: list[_Piece], recipe: Recipe, name: str) -> tuple[_Piece, li
         notes += _about_window(recipe, needed, interval)
         pieces, more = _long_enough(pieces, needed, name)
         notes += more
+        straight = [piece._replace(states=recipe.space.unrolled(piece.states)) for piece in pieces]
+        found = [_velocities(piece, recipe, needed) for piece in straight]
         pieces = [
-            piece._replace(actions=_velocities(piece.times, recipe.space.unrolled(piece.states), recipe, needed))
-            for piece in pieces
+            piece._replace(actions=one.velocities, noise=one.deviations)
+            for piece, one in zip(pieces, found, strict=True)
         ]
     if recipe.action_is == "delta":
         pieces = [_per_second(piece) for piece in pieces]
@@ -415,23 +433,37 @@ def _split(piece: _Piece, recipe: Recipe) -> list[_Piece]:
 
 def _resampled(piece: _Piece, rate: float) -> _Piece:
     times, states = resample(piece.times, piece.states, rate)
-    return _Piece(times, states, None if piece.actions is None else resample(piece.times, piece.actions, rate)[1])
+    actions = None if piece.actions is None else resample(piece.times, piece.actions, rate)[1]
+    return _Piece(times, states, actions, piece.noise)
 
 
-def _velocities(times: Array, positions: Array, recipe: Recipe, samples: int) -> Array:
+class _Moving(NamedTuple):
+    """Velocities (T, n), and the standard deviation of their noise (n,) where it is known."""
+
+    velocities: Array
+    deviations: Array | None = None
+
+
+def _velocities(piece: _Piece, recipe: Recipe, samples: int) -> _Moving:
+    times, positions = piece.times, piece.states
     if recipe.differentiate == "central":
-        return np.asarray(np.gradient(positions, times, axis=0, edge_order=2))
+        return _Moving(np.asarray(np.gradient(positions, times, axis=0, edge_order=2)))
+    if recipe.differentiate == "kalman":
+        return _Moving(*kalman_velocities(times, positions))
     from scipy.signal import savgol_filter  # takes half a second to import
 
     interval = float(np.mean(np.diff(times)))
-    return np.asarray(savgol_filter(positions, samples, recipe.order, deriv=1, delta=interval, axis=0))
+    return _Moving(np.asarray(savgol_filter(positions, samples, recipe.order, deriv=1, delta=interval, axis=0)))
 
 
 def _joined(pieces: Sequence[_Piece]) -> _Piece:
-    times, states, actions = zip(*pieces, strict=True)
-    return _Piece(
-        np.concatenate(times), np.concatenate(states), None if actions[0] is None else np.concatenate(actions)
-    )
+    times, states, actions, noises = zip(*pieces, strict=True)
+    noise = None
+    if noises[0] is not None:
+        shares = np.array([len(one) for one in times]) / sum(map(len, times))
+        noise = np.sqrt(shares @ np.square(noises))
+    joined = None if actions[0] is None else np.concatenate(actions)
+    return _Piece(np.concatenate(times), np.concatenate(states), joined, noise)
 
 
 def _typical(times: Array) -> float:
@@ -460,8 +492,8 @@ def window_used(recipe: Recipe, recording: Recording) -> float:
 
 
 def _samples_needed(recipe: Recipe, interval: float) -> int:
-    """Length of the window: odd, and enough for the polynomial; three for central differences."""
-    if recipe.differentiate == "central":
-        return 3
+    """Length of the window: odd, and enough for the polynomial; what others need."""
+    if recipe.differentiate != "savgol":
+        return LEAST if recipe.differentiate == "kalman" else 3
     asked = 0 if np.isnan(interval) else round(min(recipe.window_s / interval, MOST_SAMPLES))
     return max(asked, recipe.order + 1) | 1

@@ -14,11 +14,10 @@ from ...base.arrays import Array, check_at_least
 from ...base.errors import SettingError
 from ...models import spaces
 from ..demonstration import Recording
-from ..signals.orientations import UNITS, unit_of_angles
 from .guesses import guess_actions, guess_states, positions_in
 
-METHODS = ("savgol", "central")
-"""Ways to differentiate: Savitzky-Golay smoothing, central differences."""
+METHODS = ("savgol", "kalman", "central")
+"""Ways to differentiate: Savitzky-Golay smoothing, a Kalman smoother, central differences."""
 
 ORDERS = (2, 3)
 
@@ -28,8 +27,7 @@ CHOICES = {
     "glitches": ("keep", "repair", "drop"),
     "seams": ("keep", "cut"),
     "pauses": ("drop", "keep"),
-    "action_is": (None, "velocity", "target", "delta"),
-    "angle_unit": (None, *UNITS),
+    "action_is": ("auto", "velocity", "target", "delta"),
 }
 """What the settings of few values may be."""
 
@@ -44,8 +42,9 @@ class Recipe:
         Columns that make the state; guessed if None.
     actions : tuple of str, optional
         Columns that make the action. Guessed if neither these nor ``differentiate`` are given.
-    differentiate : {"savgol", "central"}, optional
-        Take the velocity of the states as actions: by a Savitzky-Golay filter, or by central differences.
+    differentiate : {"savgol", "kalman", "central"}, optional
+        Take the velocity of the states as actions: by a Savitzky-Golay filter; by a Kalman smoother, which finds how
+        much noise there is and keeps that of the velocities with the demonstration; or by central differences.
     window_s : float
         Length of the smoothing window of ``"savgol"`` in seconds; short beside one turn of the movement.
     order : {2, 3}
@@ -64,6 +63,9 @@ class Recipe:
         Put the rows in the order of their time stamps.
     angles : tuple of str
         State columns that are angles, wrapped or not: a turn more is the same state, for policies, too (``space``).
+    degrees : tuple of str, optional
+        State and action columns in degrees, which are taken in radians; by default those whose unit says so, and angles
+        that jump by 360.
     quaternions : tuple of tuple of str
         Four state columns each, side by side, that are a unit quaternion, in the order w, x, y, z unless their last
         letters say another: q and −q are the same state. Its velocity is the angular velocity in the frame of the body.
@@ -76,11 +78,10 @@ class Recipe:
         Whether nothing is smoothed across jumps to another place, as between demonstrations in one table.
     pauses : {"drop", "keep"}
         What becomes of rows in which nothing moves, in the middle of a demonstration; time stamps stay as they are.
-    action_is : {"velocity", "target", "delta"}, optional
-        What the action columns are: velocities, unless it is said; states to come, so that the velocity of the states
-        is learnt; or changes to the next sample, so that they are divided by the interval.
-    angle_unit : {"rad", "deg"}, optional
-        Unit of the angles. By default as the file says it, else degrees where they jump by 360, else radians.
+    action_is : {"auto", "velocity", "target", "delta"}
+        What the action columns are: velocities; states to come, so that the velocity of the states is learnt; changes
+        to the next sample, so that they are divided by the interval. ``"auto"`` takes them for velocities unless the
+        first recording shows states to come, and then says so.
 
     Raises
     ------
@@ -100,13 +101,13 @@ class Recipe:
     max_gap_s: float | None = None
     sort: bool = False
     angles: tuple[str, ...] = ()
+    degrees: tuple[str, ...] | None = None
     quaternions: tuple[tuple[str, ...], ...] = ()
     rotation_vectors: tuple[tuple[str, ...], ...] = ()
     glitches: str = "keep"
     seams: str = "keep"
     pauses: str = "drop"
-    action_is: str | None = None
-    angle_unit: str | None = None
+    action_is: str = "auto"
 
     def __post_init__(self) -> None:
         for name in ("states", "actions"):
@@ -122,6 +123,8 @@ class Recipe:
         for name, choices in CHOICES.items():
             _check_choice(name, getattr(self, name), choices)
         object.__setattr__(self, "angles", _names("angles", self.angles) if self.angles else ())
+        if self.degrees is not None:
+            object.__setattr__(self, "degrees", _names("degrees", self.degrees) if self.degrees else ())
         for name, width in (("quaternions", 4), ("rotation_vectors", 3)):
             object.__setattr__(self, name, _groups(name, getattr(self, name), width))
         if self.differentiate is not None:
@@ -137,9 +140,10 @@ class Recipe:
         """Whether each row is prepared without looking at others, so that recordings may be cut anywhere."""
         whole = (self.rate, self.trim, self.still)
         defaults = Recipe()
-        others = ("centre", "sort", "angles", "quaternions", "rotation_vectors", "glitches", "seams", "action_is")
+        others = ("centre", "sort", "angles", "quaternions", "rotation_vectors", "glitches", "seams")
         return (
             self.actions is not None
+            and self.action_is in ("auto", "velocity")
             and all(setting is None for setting in whole)
             and all(getattr(self, name) == getattr(defaults, name) for name in others)
         )
@@ -154,7 +158,7 @@ class Recipe:
             If an angle or part of a quaternion is none of the states, or a quaternion is not side by side.
         """
         names = self.states or ()
-        starts: dict[str, spaces.Space] = {name: spaces.Circle(UNITS[self.angle_unit or "rad"]) for name in self.angles}
+        starts: dict[str, spaces.Space] = {name: spaces.Circle() for name in self.angles}
         starts |= {ordered[0]: sphere for ordered, sphere in self._orientations}
         every, column = list[spaces.Space](), 0
         while column < len(names):
@@ -196,7 +200,7 @@ class Recipe:
         unknown = [name for name in values if name not in known]
         if unknown:
             raise SettingError(f"recipe: got {', '.join(map(repr, unknown))}, expected only {', '.join(known)}.")
-        return cls(**values)
+        return cls(**{name: value for name, value in values.items() if (name, value) != ("action_is", None)})
 
 
 def complete_recipe(recipe: Recipe, recording: Recording) -> Recipe:
@@ -215,8 +219,6 @@ def complete_recipe(recipe: Recipe, recording: Recording) -> Recipe:
         If a column that is named does not exist; the message lists those that do.
     """
     completed = _with_columns(recipe, recording)
-    if completed.angles and completed.angle_unit is None:
-        completed = replace(completed, angle_unit=_unit(completed.angles, recording))
     if completed.actions is not None and completed.action_is == "target":
         return replace(completed, actions=None, differentiate="savgol")
     return completed
@@ -227,6 +229,15 @@ def stamps(recording: Recording, recipe: Recipe) -> Array | None:
     if recording.times is None and recipe.rate is not None:
         return np.arange(len(recording)) / recipe.rate
     return recording.times
+
+
+def select(recording: Recording, names: Sequence[str], recipe: Recipe) -> Array:
+    """Columns of a recording by name, those in degrees in radians, shape (T, len(names))."""
+    values = recording.select(names)
+    for column, name in enumerate(names):
+        if name in (recipe.degrees or ()):
+            values[:, column] *= np.pi / 180.0
+    return values
 
 
 def _with_columns(recipe: Recipe, recording: Recording) -> Recipe:
@@ -266,13 +277,6 @@ def _groups(what: str, groups: Any, width: int) -> tuple[tuple[str, ...], ...]:
         if len(group) != width:
             raise SettingError(f"{what}: got {', '.join(group)}, expected {width} columns together.")
     return named
-
-
-def _unit(angles: Sequence[str], recording: Recording) -> str:
-    """Unit of angles: as the file says it, or as their numbers look."""
-    known = [name for name in angles if name in recording.columns]
-    said = [unit for name in known if (unit := recording.units.get(name, "").lower()[:3]) in UNITS]
-    return said[0] if said else unit_of_angles(recording.select(known))
 
 
 def _in_states(group: Sequence[str], states: Sequence[str]) -> tuple[tuple[str, ...], spaces.Sphere]:

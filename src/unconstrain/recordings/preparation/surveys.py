@@ -9,6 +9,7 @@ from ...base.arrays import Array
 from ...base.errors import InvalidDataError, SettingError, UnconstrainError
 from ..demonstration import Recording
 from ..remarks import Remark
+from .decisions import in_radians
 from .movements import Gap, find_gaps
 from .plausibility.checks import examine
 from .plausibility.sets import compare, outline, too_few
@@ -88,7 +89,13 @@ def survey_set(recordings: Iterable[Recording], recipe: Recipe | None = None) ->
     more = compare(outlines)
     if surveys:
         more[0] = (*too_few(len(surveys)), *more[0])
-    return [replace(each, warnings=once(each.warnings + added)) for each, added in zip(surveys, more, strict=True)]
+    return [_with(each, added) for each, added in zip(surveys, more, strict=True)]
+
+
+def _with(each: Survey, added: tuple[Remark, ...]) -> Survey:
+    notes = tuple(remark for remark in added if not remark.warns)
+    warnings = once((*each.warnings, *(remark for remark in added if remark.warns)))
+    return replace(each, warnings=warnings, notes=each.notes + notes)
 
 
 def once(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
@@ -128,7 +135,7 @@ def subject_of(recording: Recording, recipe: Recipe) -> Subject:
     nothing = replace(recipe, states=None, actions=None, angles=(), quaternions=(), rotation_vectors=())
     for known in (_completed(recipe, recording), replace(recipe, actions=None)):
         if known.states and {*known.states, *(known.actions or ())} <= set(recording.columns):
-            return Subject(recording, known)
+            return Subject(recording, in_radians(known, recording))
     return Subject(recording, nothing)
 
 

@@ -179,6 +179,7 @@ def find_layout(lines: Sequence[str]) -> Layout | None:
         if (delimiter != " " or decimal == ",") and not any(delimiter in line for line in lines):
             continue
         rows = [split(line, delimiter) if line.strip() and not is_comment(line) else None for line in lines]
+        rows = [cells if cells and any(cells) else None for cells in rows]  # nothing but delimiters is a blank line
         found = find_block(rows, lines, delimiter, decimal)
         if found is not None and (best is None or found[0] > best[0]):
             best = found

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.arrays import Array
+from ...base.arrays import BLOCK_ROWS, Array, slices
 
 FAR = 6.0
 """A jump is this many times larger than nine in ten steps, and half as many times than the steps around it."""
@@ -57,7 +57,9 @@ def glitches(values: Array) -> list[Glitch]:
 
 
 def repaired(values: Array, found: list[Glitch]) -> Array:
-    """Put straight lines in the place of glitches, shape (T, n)."""
+    """Put straight lines in the place of glitches, shape (T, n); the same table where there are none."""
+    if not found:
+        return values
     smooth = values.copy()
     rows = np.arange(len(values))
     for column in {glitch.column for glitch in found}:
@@ -81,7 +83,10 @@ def seams(values: Array) -> list[int]:
     moving = extent > 0
     if not moving.any():
         return []
-    steps = np.linalg.norm(np.diff(values[:, moving], axis=0) / extent[moving], axis=1)
+    squares = np.zeros(len(values) - 1)
+    for column in np.flatnonzero(moving):
+        squares += (np.diff(values[:, column]) / extent[column]) ** 2
+    steps = np.sqrt(squares)
     far = _far(steps)
     alone = [start for start, stop in _runs(far) if stop - start == 1 and _stands_out(steps, far, start, stop)]
     return [start + 1 for start in alone if AROUND / 2 <= start + 1 <= len(values) - AROUND / 2]
@@ -164,16 +169,26 @@ def topics(values: Array) -> int | None:
     int or None
         The first row of the second movement; None where there is one movement.
     """
-    extent = np.ptp(values, axis=0)
-    centred = (values - values.mean(axis=0)) / np.where(extent > 0, extent, 1.0)
-    along = centred @ np.linalg.eigh(centred.T @ centred)[1][:, -1]
+    along = _along_widest(values)
     order = np.sort(along)
     between = np.diff(order)
     widest = int(np.argmax(between))
     second = along > (order[widest] + order[widest + 1]) / 2
     if np.count_nonzero(np.diff(second)) < max(6, len(values) // 20):
         return None
-    within = np.concatenate([np.linalg.norm(np.diff(centred[side], axis=0), axis=1) for side in (second, ~second)])
+    extent = np.ptp(values, axis=0)
+    scaled = values / np.where(extent > 0, extent, 1.0)
+    within = np.concatenate([np.linalg.norm(np.diff(scaled[side], axis=0), axis=1) for side in (second, ~second)])
     if np.quantile(within, 0.95) > 0.25 * between[widest]:
         return None
     return int(np.argmax(second != second[0]))
+
+
+def _along_widest(values: Array) -> Array:
+    """Coordinate along the widest direction of columns that are scaled to extent one, shape (T,)."""
+    extent, middle = np.ptp(values, axis=0), values.mean(axis=0)
+    scale = np.where(extent > 0, extent, 1.0)
+    blocks = list(slices(values, BLOCK_ROWS))
+    spread = sum((part := (values[rows] - middle) / scale).T @ part for rows in blocks)
+    widest = np.linalg.eigh(spread)[1][:, -1] / scale
+    return np.concatenate([(values[rows] - middle) @ widest for rows in blocks])

@@ -6,10 +6,8 @@ import numpy as np
 
 from ...base.arrays import Array
 
-UNITS = {"rad": 2 * np.pi, "deg": 360.0}
-"""One turn in each unit of angles."""
-
-TURNS = tuple(UNITS.values())
+TURNS = (2 * np.pi, 360.0)
+"""One turn in radians, and in degrees."""
 
 MOST_TURNS = 16
 """Angles that go further than so many turns in radians are degrees."""
@@ -41,11 +39,13 @@ def wraps(angle: Array) -> Wrap | None:
     return None
 
 
-def unit_of_angles(angles: Array) -> str:
-    """Unit of angles (T, k): degrees where they jump by 360, or go too far to be radians."""
-    found = [wrap.turn for column in angles.T if (wrap := wraps(column[np.isfinite(column)])) is not None]
-    far = float(np.nanmax(np.ptp(angles, axis=0), initial=0.0)) > MOST_TURNS * UNITS["rad"]
-    return "deg" if UNITS["deg"] in found or (far and not found) else "rad"
+def in_degrees(angle: Array) -> bool:
+    """Whether an angle (T,) is in degrees: it jumps by 360, or goes too far to be in radians."""
+    finite = angle[np.isfinite(angle)]
+    wrap = wraps(finite)
+    if wrap is None:
+        return bool(np.ptp(finite) > MOST_TURNS * TURNS[0]) if finite.size else False
+    return wrap.turn == TURNS[1]
 
 
 def _jumps_by(angle: Array, turn: float) -> list[int]:

@@ -1,5 +1,7 @@
 """Standing still, in the middle of a movement or all the time."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,9 @@ SHORTEST_SHARE = 0.15
 LEFT = 0.05
 """Movement before and after a pause covers at least this share of the whole extent of a column."""
 
+NOISE = 4.5
+"""What moves by less than this many standard deviations of the noise stands still."""
+
 SHORTEST = 10
 """Samples that a pause has at least."""
 
@@ -23,9 +28,20 @@ def noise_share(values: Array) -> Array:
 
     A constant column has a share of 1.
     """
-    variance = values.var(axis=0)
-    changes = (np.diff(values, axis=0) ** 2).mean(axis=0) / 2 if len(values) > 1 else variance
-    return np.divide(changes, variance, out=np.ones_like(variance), where=variance > 0)
+    return _by_column(_share_of_noise, values)
+
+
+def _share_of_noise(column: Array) -> float:
+    variance = float(column.var())
+    if len(column) < 2 or variance == 0.0:
+        return 1.0
+    changes = np.diff(column)
+    return float(changes @ changes) / (2 * len(changes) * variance)
+
+
+def _by_column(measure: Callable[[Array], float], values: Array) -> Array:
+    """A number for each column, (n,), with no more than a column in memory beside the table."""
+    return np.array([measure(np.ascontiguousarray(column)) for column in values.T])
 
 
 def is_noise(values: Array) -> bool:
@@ -42,18 +58,41 @@ def pauses(values: Array) -> list[tuple[int, int]]:
     """
     if len(values) < 4 * SHORTEST:
         return []
-    moving = values[:, noise_share(values) < 0.3]
-    span = _span(moving) if moving.size else None
+    smooth = noise_share(values) < 0.3
+    moving = values if smooth.all() else values[:, smooth]
+    if not moving.size:
+        return []
+    shortest = int(max(SHORTEST, SHORTEST_SHARE * len(values)))
+    return _slow(moving, shortest) or _motionless(moving, max(shortest, 2 * SHORTEST))
+
+
+def _slow(values: Array, shortest: int) -> list[tuple[int, int]]:
+    """Stretches that are slow beside the movement before and after."""
+    span = _span(values)
     if span is None:
         return []
-    still = _is_still(moving, span)
-    rows = _reached(still, span)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]])))
-    runs = list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
-    near = np.maximum(4.5 * _noise(moving), 0.3 * _usual(moving, span) / span)
-    shortest = max(SHORTEST, SHORTEST_SHARE * len(values))
-    exact = [_around(moving, start, stop, near) for start, stop in runs if stop - start >= shortest]
-    return [run for run in exact if _is_left(moving, *run)]
+    usual = _usual(values, span)
+    near = np.maximum(NOISE * _noise(values), 0.3 * usual / span)
+    runs = _runs(values, span, SLOW * usual, shortest)
+    return _left([_around(values, *run, near) for run in runs], values, LEFT * np.ptp(values, axis=0))
+
+
+def _motionless(values: Array, shortest: int) -> list[tuple[int, int]]:
+    """Stretches in which nothing but noise moves, however slow the movement before and after is."""
+    near = NOISE * _noise(values)
+    runs = _runs(values, shortest // 2, near, shortest)
+    exact = [_around(values, *run, near) for run in runs]
+    return _left([(start, stop) for start, stop in exact if stop - start >= shortest], values, 2.0 * near)
+
+
+def _runs(values: Array, span: int, least: Array, shortest: int) -> list[tuple[int, int]]:
+    """Stretches of so many rows in which no column moves by more than the least (n,) within a span of rows."""
+    still = np.ones(len(values) - span, dtype=bool)
+    for column, allowed in zip(values.T, least, strict=True):
+        still &= np.abs(column[span:] - column[:-span]) <= allowed
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], _reached(still, span), [False]])))
+    runs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    return [(start, stop) for start, stop in runs if stop - start >= shortest]
 
 
 def _reached(windows: NDArray[np.bool_], span: int) -> NDArray[np.bool_]:
@@ -74,13 +113,17 @@ def _around(values: Array, start: int, stop: int, near: Array) -> tuple[int, int
     return max(first, start - SHORTEST), min(last, stop + SHORTEST)
 
 
-def _is_left(values: Array, start: int, stop: int) -> bool:
-    """Whether there is movement from elsewhere before, and to elsewhere after."""
+def _left(runs: list[tuple[int, int]], values: Array, far: Array) -> list[tuple[int, int]]:
+    """Those with movement from elsewhere before, and to elsewhere after, farther than some lengths (n,)."""
+    return [run for run in runs if _is_left(values, *run, far)]
+
+
+def _is_left(values: Array, start: int, stop: int, far: Array) -> bool:
     if stop <= start or min(start, len(values) - stop) < max(3, len(values) // 15):
         return False
-    place, extent = np.median(values[start:stop], axis=0), np.ptp(values, axis=0)
+    place = np.median(values[start:stop], axis=0)
     before, after = (np.abs(part - place).max(axis=0) for part in (values[:start], values[stop:]))
-    return bool((before > LEFT * extent).any() and (after > LEFT * extent).any())
+    return bool((before > far).any() and (after > far).any())
 
 
 def _span(values: Array) -> int | None:
@@ -96,14 +139,8 @@ def _span(values: Array) -> int | None:
 
 def _noise(values: Array) -> Array:
     """Standard deviation of white noise on each column, from second differences."""
-    return np.median(np.abs(np.diff(values, 2, axis=0)), axis=0) / (0.6745 * np.sqrt(6.0))
+    return _by_column(lambda column: float(np.median(np.abs(np.diff(column, 2)))), values) / (0.6745 * np.sqrt(6.0))
 
 
 def _usual(values: Array, span: int) -> Array:
-    return np.quantile(np.abs(values[span:] - values[:-span]), 0.9, axis=0)
-
-
-def _is_still(values: Array, span: int) -> NDArray[np.bool_]:
-    """Whether nothing moves from each row to the one ``span`` later, shape (T - span,)."""
-    moved = np.abs(values[span:] - values[:-span])
-    return np.all(moved < SLOW * _usual(values, span), axis=1)
+    return _by_column(lambda column: float(np.quantile(np.abs(column[span:] - column[:-span]), 0.9)), values)

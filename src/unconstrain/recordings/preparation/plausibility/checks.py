@@ -160,7 +160,7 @@ def other_topic(subject: Subject) -> Remark | None:
 def targets(subject: Subject) -> Remark | None:
     """Actions that are the states to come."""
     recipe = subject.recipe
-    if not subject.moves or recipe.action_is is not None or not are_targets(subject.clean, subject.actions):
+    if not subject.moves or recipe.action_is != "auto" or not are_targets(subject.clean, subject.actions):
         return None
     message = "are the states to come, not velocities; learn the velocity of the states with --action-is target."
     return Remark("targets-as-velocities", message, (recipe.actions or ("",))[0])

@@ -21,3 +21,9 @@ class Outline(NamedTuple):
     noisy: NDArray[np.bool_]
     places: Array
     steps: Array
+
+    @property
+    def push(self) -> float:
+        """How far it comes from its first place to its last, as a share of its extent."""
+        size = float(np.linalg.norm(self.extent))
+        return float(np.linalg.norm(self.places[-1] - self.places[0])) / size if size > 0 else 0.0

@@ -32,6 +32,14 @@ is in other units."""
 STILL = 0.01
 """A demonstration that covers less than this share of what the others cover is at rest."""
 
+APART = 2.0
+"""Demonstrations are at different places where they are so many times as far apart as they are wide."""
+
+PUSHED = 0.85
+"""A movement that ends farther from its beginning than this share of its extent goes from end to end.
+
+Ten bouts of wiping end at 0.13 to 0.72."""
+
 TOGETHER = 15
 """So many demonstrations are compared at once."""
 
@@ -65,7 +73,7 @@ def compare(outlines: Sequence[Outline | None]) -> list[tuple[Remark, ...]]:
     remarks: list[list[Remark]] = [[] for _ in outlines]
     if known:
         several = [one for _, one in known]
-        remarks[known[0][0]] += mixed_units(several)
+        remarks[known[0][0]] += [*mixed_units(several), *different_places(several)]
         for check in (unit_differs, smaller_than_others, reversed_among_others):
             for place, remark in check(several):
                 remarks[known[place][0]].append(remark)
@@ -106,8 +114,24 @@ def mixed_units(outlines: Sequence[Outline]) -> list[Remark]:
     if ratio < UNLIKE or extent[large] < UNLIKE / 3 * extent[small]:
         return []
     names = outlines[0].names
-    message = f"is {ratio:.0f} times smaller than {names[large]!r}, which outweighs it; give both in comparable units."
+    message = f"is {ratio:.0f} times smaller than {names[large]!r}, which outweighs it; --scale auto levels them."
     return [Remark("mixed-units", message, names[small])]
+
+
+def different_places(outlines: Sequence[Outline]) -> list[Remark]:
+    """Demonstrations farther from each other than each of them is wide."""
+    if len(outlines) < FEWEST or unit_differs(outlines):
+        return []
+    middles = np.array([one.places.mean(axis=0) for one in outlines])
+    wide = float(np.median([np.linalg.norm(one.extent) for one in outlines]))
+    apart = np.linalg.norm(middles[:, None] - middles, axis=2)[np.triu_indices(len(outlines), 1)]
+    if not 0.0 < APART * wide < np.median(apart):
+        return []
+    if np.median([one.push for one in outlines]) < PUSHED:
+        cure = "if where they are does not matter, take each from its own centre with --centre"
+    else:
+        cure = "they move on from end to end, so that no mean tells their places (--centre would hide a constant push)"
+    return [Remark("places", f"demonstrations are farther apart than each is wide; {cure}.")]
 
 
 def unit_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:

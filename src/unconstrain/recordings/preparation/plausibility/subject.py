@@ -15,7 +15,7 @@ from ...demonstration import Recording
 from ...signals.jumps import Glitch, glitches, repaired, seams, topics
 from ...signals.orientations import Wrap, continuous_quaternions, quaternion_flips, rotation_flips, wraps
 from ..continuity import continuous, unturned
-from ..recipes import Recipe, stamps
+from ..recipes import Recipe, select, stamps
 
 LEAST_ROWS = 10
 """Fewer rows show no movement."""
@@ -71,7 +71,8 @@ class Subject:
         """Rows of the recording whose used cells are finite, the first of each stamp, shape (R,)."""
         finite = np.ones(len(self.recording), dtype=bool)
         for used in (self.recipe.states, self.recipe.actions):
-            finite &= np.isfinite(self.recording.select(used or ())).all(axis=1)
+            for name in used or ():
+                finite &= np.isfinite(self.recording.select((name,))[:, 0])
         if self.times is not None:
             finite &= np.isfinite(self.times)
         rows = np.flatnonzero(finite)
@@ -80,7 +81,7 @@ class Subject:
     @cached_property
     def stamps(self) -> Array | None:
         """Times of :attr:`rows`, seconds."""
-        return None if self.times is None else self.times[self.rows]
+        return self.times if self.times is None or len(self.rows) == len(self.times) else self.times[self.rows]
 
     @cached_property
     def states(self) -> Array:
@@ -120,7 +121,7 @@ class Subject:
     @cached_property
     def unturned(self) -> Array:
         """States with orientations of continuous signs, shape (R, n)."""
-        smooth = self.states.copy()
+        smooth = self.states.copy() if self.flips else self.states
         for start, flip in self.flips.items():
             columns = slice(start, start + flip.width)
             smooth[:, columns] = flip.repair(smooth[:, columns])
@@ -135,7 +136,7 @@ class Subject:
     @cached_property
     def unwrapped(self) -> Array:
         """States without jumps by whole turns and turned signs, shape (R, n)."""
-        smooth = self.unturned.copy()
+        smooth = self.unturned.copy() if self.wraps else self.unturned
         for column, wrap in self.wraps.items():
             smooth[:, column] = np.unwrap(smooth[:, column], period=wrap.turn)
         return smooth
@@ -174,4 +175,8 @@ class Subject:
         return (self.recipe.states or ())[column]
 
     def _select(self, names: Sequence[str]) -> Array:
-        return self.recording.select(names)[self.rows]
+        every = len(self.rows) == len(self.recording)
+        if every and names == self.recording.columns and not self.recipe.degrees:
+            return self.recording.values  # nobody writes to it, and a large one is not held twice
+        values = select(self.recording, names, self.recipe)
+        return values if every else values[self.rows]
