@@ -148,7 +148,7 @@ def assert_learnt_the_policy(path, tolerance=1e-6):
 # Help
 
 
-COMMANDS = ["inspect", "diagnose", "fit", "score", "rollout", "export", "reproduce", "demo"]
+COMMANDS = ["inspect", "diagnose", "fit", "constraint", "score", "rollout", "export", "reproduce", "demo"]
 
 
 @pytest.mark.parametrize("command", COMMANDS)

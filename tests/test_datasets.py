@@ -21,6 +21,7 @@ from unconstrain.paper.datasets import (
     WipingBout,
     contours,
     load_contour,
+    load_fingertip,
     load_hand_tracks,
     load_handwriting,
     load_rim_wiping,
@@ -274,12 +275,27 @@ def test_contours_pass_where_the_tracker_was(local: None) -> None:
             np.testing.assert_allclose(way, demonstration.states[-1] - demonstration.states[0], atol=0.03)
 
 
+FINGERTIP = DATA / "ccl_trakstar_planar" / "planer_circle.csv"
+
+
+@pytest.mark.skipif(not FINGERTIP.is_file(), reason=f"no {FINGERTIP}")
+def test_a_fingertip_does_not_jump_across_the_tracker(local: None) -> None:
+    table = np.loadtxt(FINGERTIP, delimiter=",", skiprows=1)
+    assert np.linalg.norm(np.diff(table[:, 1:4], axis=0), axis=1).max() > 0.5
+    demonstration = load_fingertip()
+    assert len(demonstration) == pytest.approx(len(table), abs=3)
+    assert np.linalg.norm(np.diff(demonstration.states, axis=0), axis=1).max() < 0.05
+    way = np.trapezoid(demonstration.actions, demonstration.times, axis=0)
+    np.testing.assert_allclose(way, demonstration.states[-1] - demonstration.states[0], atol=0.02)
+
+
 @pytest.mark.parametrize(
     ("file", "load"),
     [
         ("lasa_handwriting/Angle.mat", lambda: load_handwriting("Angle")),
         ("libras_hand/movement_libras.csv", lambda: load_hand_tracks(1)),
         ("kuleuven_contour/data_demo_a_1.dat", lambda: load_contour("a")),
+        ("ccl_trakstar_planar/planer_circle.csv", load_fingertip),
     ],
 )
 def test_what_is_not_the_published_file_is_refused(

@@ -10,10 +10,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 import unconstrain as uc
-from recorded import needs_rim
-from unconstrain.base.errors import SettingError
+from recorded import DATA, needs_data, needs_rim
+from unconstrain.base.errors import ReadError, SettingError
 from unconstrain.paper import experiments
-from unconstrain.paper.experiments import figure4, figure5, table1, table2, toy, trials, washing
+from unconstrain.paper import pages as report
+from unconstrain.paper.experiments import constraints, figure4, figure5, table1, table2, toy, trials, washing
 from unconstrain.paper.experiments.journal import Journal
 from unconstrain.paper.experiments.washing.surfaces import simulated_split
 from unconstrain.paper.systems.limit_cycle import LimitCycle
@@ -594,3 +595,47 @@ def test_the_arm_moves_as_section_4b_says():
         assert_allclose(demo.truth.policy, away, atol=1e-12)
         assert_allclose(np.trace(demo.truth.projections, axis1=1, axis2=2), 4)  # three of seven are held
         assert_allclose(np.einsum("tij,tj->ti", demo.truth.projections, demo.truth.policy), demo.actions, atol=1e-12)
+
+
+# Constraints
+
+
+@pytest.fixture(scope="module")
+def small_constraints(once):
+    settings = constraints.Settings(trials=1, noise=(0.05,), blocks=(20,))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("UNCONSTRAIN_DATA", str(DATA))
+        return once("small constraints", lambda: constraints.run(settings))
+
+
+def test_each_generator_gives_back_its_constraint(small_constraints):
+    for row in small_constraints.rows:
+        assert row["rank_right"] == 1.0, row
+        assert row["nppe"] < 1e-3, row
+        assert row["noise_found"] == pytest.approx(1.0, abs=0.1), row
+
+
+def test_constraints_have_a_sentence_for_each_task_and_a_page(small_constraints):
+    said = constraints.headlines(small_constraints)
+    assert [line.split(":")[0] for line in said[: len(constraints.TASKS)]] == list(constraints.TASKS)
+    page = report.page(small_constraints)
+    assert "two links, Λ(q)" in page
+    assert ("held directions" in page) == ("recorded" in small_constraints.tables)
+
+
+@needs_data
+def test_the_recorded_fingertip_is_held_by_a_bent_sheet(small_constraints):
+    for row in small_constraints.tables["recorded"]:
+        assert row["npoe"] < 0.05
+
+
+def test_without_the_recording_the_rest_is_shown(monkeypatch):
+    def missing():
+        raise ReadError("planer_circle.csv is not on this machine")
+
+    monkeypatch.setattr(constraints, "load_fingertip", missing)
+    monkeypatch.setattr(constraints, "TASKS", {"constant": constraints.TASKS["constant"]})
+    found = constraints.run(constraints.Settings(trials=1, noise=(0.0,)))
+    assert "recorded" not in found.tables
+    assert found.details == {}
+    assert all(row["nppe"] < 1e-25 and row["noise_found"] is None for row in found.rows)

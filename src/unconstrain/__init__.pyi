@@ -9,11 +9,14 @@ from . import policies as policies
 from . import storage as storage
 from .base import errors as errors
 from .base.errors import UnconstrainError as UnconstrainError
+from .constraints import LearntConstraint as LearntConstraint
 from .evaluation import cpe as cpe
 from .evaluation import inconsistency as inconsistency
 from .evaluation import metrics as metrics
 from .evaluation import ncpe as ncpe
 from .evaluation import ninconsistency as ninconsistency
+from .evaluation import npoe as npoe
+from .evaluation import nppe as nppe
 from .evaluation import nupe as nupe
 from .evaluation import upe as upe
 from .learners import Direct as Direct

@@ -1,4 +1,4 @@
-"""A policy, with its moments, in one file that runs nothing when it is opened.
+"""A policy, with its moments, or a learnt constraint, in one file that runs nothing when it is opened.
 
 The file is a NumPy ``.npz`` of plain arrays and one JSON header. The header
 names classes from a fixed list; arrays are never unpickled; a digest over
@@ -14,12 +14,14 @@ from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from types import MethodType
+from typing import Any, TypeVar, overload
 
 import numpy as np
 
 from .base import files
 from .base.errors import ModelFileError
+from .constraints import STORED, LearntConstraint
 from .learners import (
     Belief,
     Direct,
@@ -53,8 +55,12 @@ _KNOWN: dict[str, type] = {
         *(Belief, Direct, Hybrid, Inconsistency, Judged, Likelihood, NoiseCorrected, Robust, Segments, Solution),
         *(FoldedMoments, Folds, HeldOut, Moments, Split, Training),
         *(LocallyLinearPolicy, ParametricPolicy),
+        *STORED,
     )
 }
+
+
+K = TypeVar("K")
 
 
 def register(kind: type) -> type:
@@ -73,15 +79,18 @@ def register(kind: type) -> type:
     return kind
 
 
-def save(policy: Policy, path: str | os.PathLike[str], notes: Mapping[str, Any] | None = None) -> None:
-    """Write a fitted policy to a file, whole or not at all.
+def save(
+    policy: Policy | LearntConstraint, path: str | os.PathLike[str], notes: Mapping[str, Any] | None = None
+) -> None:
+    """Write a policy, or a learnt constraint, to a file, whole or not at all.
 
     Parameters
     ----------
-    policy : Policy
-        Fitted or not. Its moments go along, so that it can learn on from sums. Samples do not: what was fitted by a
-        learner that looks at them, such as :class:`~unconstrain.Robust`, predicts as before, and to learn more has to
-        be fitted anew, or copied or pickled in place of saved.
+    policy : Policy or LearntConstraint
+        Fitted or not. A policy's moments go along, so that it can learn on from sums. Samples do not: what was fitted
+        by a learner that looks at them, such as :class:`~unconstrain.Robust`, predicts as before, and to learn more has
+        to be fitted anew, or copied or pickled in place of saved. A constraint goes without what it was learnt from,
+        and with its Jacobian if that is the method of a registered dataclass, such as an arm.
     path : str or path-like
         Usually ends in ``.npz``. An existing file is replaced in one step.
     notes : mapping, optional
@@ -101,13 +110,27 @@ def save(policy: Policy, path: str | os.PathLike[str], notes: Mapping[str, Any] 
     files.write(path, lambda stream: np.savez_compressed(stream, **arrays), ModelFileError)  # type: ignore[arg-type]
 
 
-def load(path: str | os.PathLike[str]) -> Policy:
-    """Read a policy from a file.
+@overload
+def load(path: str | os.PathLike[str]) -> Policy: ...
+
+
+@overload
+def load(path: str | os.PathLike[str], kind: type[K]) -> K: ...
+
+
+def load(path: str | os.PathLike[str], kind: type[Any] = Policy) -> Any:
+    """Read a policy from a file, or what else is asked for.
+
+    Parameters
+    ----------
+    path : str or path-like
+    kind : type
+        ``Policy`` or ``LearntConstraint``.
 
     Raises
     ------
     ModelFileError
-        If the file does not exist, is damaged, of a newer version, or not ours.
+        If the file does not exist, is damaged, of a newer version, not ours, or of another kind.
     """
     header, arrays = _read(path)
     try:
@@ -120,8 +143,9 @@ def load(path: str | os.PathLike[str]) -> Policy:
     # A file that was tampered with, digest included, can make any constructor fail, in any way.
     except Exception as error:
         raise ModelFileError(f"{path}: the policy in it is not complete ({_said(error)}).") from error
-    if not isinstance(policy, Policy):
-        raise ModelFileError(f"{path}: holds a {type(policy).__name__}, expected a policy.")
+    if not isinstance(policy, kind):
+        wanted = "policy" if issubclass(Policy, kind) else kind.__name__
+        raise ModelFileError(f"{path}: holds a {type(policy).__name__}, expected a {wanted}.")
     return policy
 
 
@@ -134,12 +158,12 @@ def load_notes(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise ModelFileError(f"{path}: the notes in it are not complete ({_said(error)}).") from error
 
 
-def _without_samples(policy: Policy) -> Policy:
-    if not hasattr(policy, "training_"):
-        return policy
-    slim = copy(policy)
-    slim.__dict__.pop("_waiting", None)
-    slim.training_ = policy.training_.without_samples()
+def _without_samples(model: Any) -> Any:
+    slim = copy(model)
+    for name in ("_waiting", "evidence_"):
+        slim.__dict__.pop(name, None)
+    if hasattr(model, "training_"):
+        slim.training_ = model.training_.without_samples()
     return slim
 
 
@@ -214,6 +238,8 @@ def _pack(value: Any, arrays: dict[str, np.ndarray[Any, Any]]) -> Any:
         return {"list": [_pack(item, arrays) for item in value]}
     if isinstance(value, dict):
         return {"pairs": [[_pack(key, arrays), _pack(item, arrays)] for key, item in value.items()]}
+    if isinstance(value, MethodType) and value.__name__ == "jacobian":
+        return {"jacobian": _pack(value.__self__, arrays)}
     kind = type(value)
     if _KNOWN.get(kind.__name__) is not kind:
         raise ModelFileError(
@@ -244,6 +270,8 @@ def _unpack(value: Any, arrays: Mapping[str, np.ndarray[Any, Any]]) -> Any:
         return tuple(_unpack(item, arrays) for item in value["list"])
     if "pairs" in value:
         return {_unpack(key, arrays): _unpack(item, arrays) for key, item in value["pairs"]}
+    if "jacobian" in value:
+        return _unpack(value["jacobian"], arrays).jacobian
     if value["class"] not in _KNOWN:
         raise ModelFileError(
             f"holds a {value['class']}, which is not known here. Import the module that defines it and pass it to "

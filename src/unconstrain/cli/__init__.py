@@ -18,6 +18,7 @@ import unconstrain as uc
 from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainError
 from ..base.files import write
 from ..paper import experiments
+from .constraining import constraint, held_of, options_for_held
 from .converting import convert
 from .diagnosing import diagnose
 from .fitting import (
@@ -46,6 +47,7 @@ def main() -> None:
     unconstrain inspect *.csv             what is in your recordings
     unconstrain diagnose *.csv            noise, and what to record next
     unconstrain fit *.csv -o policy.npz   learn from them
+    unconstrain constraint *.csv -o c.npz learn what held them
     """  # noqa: D301 - click's mark for lines that stay as they are
 
 
@@ -170,9 +172,11 @@ def fit(
 @main.command(epilog="\b\nExample:\n  unconstrain score wipe.npz other.csv --plane 0,0.3,1 --json")
 @click.argument("policy", type=click.Path())
 @click.argument("files", nargs=-1, required=True, metavar="FILE...")
-@click.option("--plane", type=numbers, help="Normal of the plane that was held, for the constrained error.")
+@options_for_held("that was held, for the errors that need one")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def score(policy: str, files: Sequence[str], plane: tuple[float, ...] | None, as_json: bool) -> None:
+def score(
+    policy: str, files: Sequence[str], plane: tuple[float, ...] | None, constraint: str | None, as_json: bool
+) -> None:
     """Score how well POLICY explains the demonstrations in each FILE.
 
     They are prepared as the training data of the policy was.
@@ -181,11 +185,13 @@ def score(policy: str, files: Sequence[str], plane: tuple[float, ...] | None, as
     recipe = uc.Recipe.from_dict(notes.get("recipe", {}))
     recordings = uc.read(files, **reading_of(**notes).roles)
     demonstrations = uc.prepare(recordings, recipe)
-    constraint = _plane(plane, learnt.n_outputs_, "one for each action")
+    held = held_of(plane, constraint, learnt.n_features_in_, learnt.n_outputs_, "one for each action")
 
     def scores(of: uc.Demonstration | Sequence[uc.Demonstration], name: str, samples: int) -> dict[str, Any]:
         found = {"demonstration": name, "samples": samples, "ninc": uc.ninconsistency(learnt, of)}
-        return found | ({"ncpe": uc.ncpe(learnt, of, constraint)} if constraint is not None else {})
+        if held is None:
+            return found
+        return found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(learnt, of, held)}
 
     rows = [scores(demo, demo.name, len(demo)) for demo in demonstrations]
     whole = scores(demonstrations, "all", sum(map(len, demonstrations)))
@@ -193,7 +199,7 @@ def score(policy: str, files: Sequence[str], plane: tuple[float, ...] | None, as
         click.echo(json.dumps({"policy": policy, "rows": rows, "all": whole}, indent=2))
         return
     rows.append(whole)
-    head = ["demonstration", "samples", "normalised inconsistency", *(["nCPE"] if plane is not None else [])]
+    head = ["demonstration", "samples", "normalised inconsistency", *([] if held is None else ["nPOE", "nCPE"])]
     print_table(head, [[str(v) if not isinstance(v, float) else f"{v:.4g}" for v in one.values()] for one in rows])
 
 
@@ -202,7 +208,7 @@ def score(policy: str, files: Sequence[str], plane: tuple[float, ...] | None, as
 @click.option("--start", type=numbers, required=True, help="Initial state, one number for each state column.")
 @click.option("--steps", type=click.IntRange(1), default=200, show_default=True, help="Number of samples.")
 @click.option("--dt", type=float, default=0.02, show_default=True, help="Seconds between samples.")
-@click.option("--plane", type=numbers, help="Normal of a plane to stay on.")
+@options_for_held("to stay on")
 @click.option(
     "-o",
     "--output",
@@ -212,14 +218,21 @@ def score(policy: str, files: Sequence[str], plane: tuple[float, ...] | None, as
     help="CSV file; - prints.",
 )
 def rollout(
-    policy: str, start: tuple[float, ...], steps: int, dt: float, plane: tuple[float, ...] | None, output: str
+    policy: str,
+    start: tuple[float, ...],
+    steps: int,
+    dt: float,
+    plane: tuple[float, ...] | None,
+    constraint: str | None,
+    output: str,
 ) -> None:
-    """Roll POLICY out, freely or on a plane, and write it as CSV."""
+    """Roll POLICY out, freely or under a constraint, to a CSV."""
     learnt, recipe = _fitted(policy), uc.Recipe.from_dict(uc.storage.load_notes(policy).get("recipe", {}))
     if len(start) != learnt.n_features_in_:
         raise SettingError(f"--start: got {len(start)} numbers, expected {learnt.n_features_in_}, one for each state.")
-    constraint = _plane(plane, learnt.n_outputs_, "one for each action")
-    path = uc.rollout(learnt, list(start), steps, dt, constraint)
+    held = held_of(plane, constraint, len(start), learnt.n_outputs_, "one for each action")
+    task = held.target if isinstance(held, uc.LearntConstraint) and held.task else None
+    path = uc.rollout(learnt, list(start), steps, dt, held, task=task)
     columns = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))
     try:
         support = learnt.support(path.states)
@@ -316,6 +329,7 @@ def doctor(as_json: bool) -> None:
     click.echo("Everything is there." if not missing else f"{missing} of {len(found)} are missing something.")
 
 
+main.add_command(constraint)
 main.add_command(convert)
 main.add_command(diagnose)
 
@@ -325,16 +339,6 @@ def _fitted(path: str) -> uc.Policy:
     if not hasattr(policy, "solution_"):
         raise ModelFileError(f"{path}: holds a policy that is not fitted. Fit it before saving.")
     return policy
-
-
-def _plane(normal: tuple[float, ...] | None, dimensions: int, meaning: str) -> uc.constraints.Plane | None:
-    import numpy as np
-
-    if normal is None:
-        return None
-    if len(normal) != dimensions:
-        raise SettingError(f"--plane: got {len(normal)} numbers, expected {dimensions}, {meaning}.")
-    return uc.constraints.Plane(np.array(normal))
 
 
 def _csv(header: Sequence[str], path: uc.Demonstration) -> str:

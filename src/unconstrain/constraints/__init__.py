@@ -1,6 +1,24 @@
-"""Constraint matrices A(x, t), with A u = 0."""
+"""Constraint matrices A(x, t), with A u = 0: known, and learnt."""
 
+from .choice import Choice
+from .components import null_space_component
+from .forms import Constant, Form, Surface, Velocities
 from .known import Constraint, JacobianRows, Plane, PolicyAligned, SwitchingLine
+from .learnt import LearntConstraint
 from .matrices import constraint_matrices
+from .spectrum import Fields
 
-__all__ = ["Constraint", "JacobianRows", "Plane", "PolicyAligned", "SwitchingLine", "constraint_matrices"]
+STORED = (Choice, Constant, Fields, Form, LearntConstraint, Surface, Velocities)
+"""What a learnt constraint is made of, for its file."""
+
+__all__ = [
+    "STORED",
+    "Constraint",
+    "JacobianRows",
+    "LearntConstraint",
+    "Plane",
+    "PolicyAligned",
+    "SwitchingLine",
+    "constraint_matrices",
+    "null_space_component",
+]

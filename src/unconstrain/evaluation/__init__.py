@@ -2,7 +2,7 @@
 
 from . import diagnosis
 from .diagnosis import Diagnosis, diagnose
-from .metrics import cpe, inconsistency, ncpe, ninconsistency, nupe, upe
+from .metrics import cpe, inconsistency, ncpe, ninconsistency, nnpe, npoe, nppe, nupe, upe
 
 __all__ = [
     "Diagnosis",
@@ -13,6 +13,9 @@ __all__ = [
     "metrics",
     "ncpe",
     "ninconsistency",
+    "nnpe",
+    "npoe",
+    "nppe",
     "nupe",
     "upe",
 ]

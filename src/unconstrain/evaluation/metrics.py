@@ -90,9 +90,58 @@ def ninconsistency(policy: PolicyLike, demonstrations: Demonstrations) -> float:
     return inconsistency(policy, demonstrations) / _norm(demonstrations)
 
 
+def nppe(constraint: Constraint, demonstrations: Demonstrations) -> float:
+    """Normalised projected policy error of a constraint, ``Σ ‖N π − N̂ π‖² / Σ ‖π − mean π‖²``.
+
+    How far the projection N̂ that it says is from the true one, as the policy sees it. The variance is the policy's.
+
+    Parameters
+    ----------
+    constraint : callable
+        A(x, t), such as a :class:`~unconstrain.LearntConstraint`.
+    demonstrations : Demonstration or sequence of Demonstration
+        With their truth.
+
+    Raises
+    ------
+    InvalidDataError
+        If a demonstration has no truth, or the constraint reads times that one does not have.
+    """
+    demos = _listed(demonstrations)
+    policy = _true_policy(demos)
+    wrong = np.concatenate([_projections(demo, None) - _projections(demo, constraint) for demo in demos])
+    return _squares(project(wrong, policy)) / _spread(policy)
+
+
+def npoe(constraint: Constraint, demonstrations: Demonstrations) -> float:
+    """Normalised projected observation error of a constraint, ``Σ ‖u − N̂ u‖² / Σ ‖u − mean u‖²``.
+
+    How much of the observed actions it would have taken away; zero for one that holds nothing. The variance is that of
+    the actions. As :func:`nppe`, but needs no truth.
+    """
+    demos = _listed(demonstrations)
+    actions = stack(demos).actions
+    projections = np.concatenate([_projections(demo, constraint) for demo in demos])
+    return _squares(actions - project(projections, actions)) / _spread(actions)
+
+
+def nnpe(component: PolicyLike, demonstrations: Demonstrations) -> float:
+    """Normalised null-space projection error of a component v(x), ``Σ ‖v − v̂v̂ᵀ u‖² / Σ ‖u − mean u‖²``.
+
+    How far it is from the action's part along it, such as of :func:`~unconstrain.constraints.null_space_component`. The
+    variance is that of the actions. Needs no truth.
+    """
+    demos = _listed(demonstrations)
+    actions, found = stack(demos).actions, _predicted(component, demos)
+    return _squares(found - project(action_projection(found), actions)) / _spread(actions)
+
+
 def _norm(demonstrations: Demonstrations) -> float:
     demos = _listed(demonstrations)
-    vectors = stack(demos).actions if any(demo.truth is None for demo in demos) else _true_policy(demos)
+    return _spread(stack(demos).actions if any(demo.truth is None for demo in demos) else _true_policy(demos))
+
+
+def _spread(vectors: Array) -> float:
     variance = _squares(vectors - vectors.mean(axis=0))
     if variance <= vectors.size * (1e-12 * np.abs(vectors).max()) ** 2:  # rounding of the mean is no variance
         raise InvalidDataError(

@@ -13,6 +13,9 @@ from ..models import spaces
 from ..recordings import Demonstration, Truth
 from ..risks import null_space_projection, project
 
+Task = Callable[[Array, Array], Array]
+"""States (K, n) and times (K,) to the b of ``A u = b``, shape (K, k)."""
+
 
 @overload
 def rollout(
@@ -22,6 +25,7 @@ def rollout(
     dt: float = ...,
     constraint: Constraint | None = ...,
     *,
+    task: Task | None = ...,
     name: str = ...,
     space: spaces.Space | None = ...,
 ) -> Demonstration: ...
@@ -35,6 +39,7 @@ def rollout(
     dt: float = ...,
     constraint: Constraint | Sequence[Constraint] | None = ...,
     *,
+    task: Task | None = ...,
     name: str = ...,
     space: spaces.Space | None = ...,
 ) -> list[Demonstration]: ...
@@ -47,10 +52,13 @@ def rollout(
     dt: float = 0.02,
     constraint: Constraint | Sequence[Constraint] | None = None,
     *,
+    task: Task | None = None,
     name: str = "rollout",
     space: spaces.Space | None = None,
 ) -> Demonstration | list[Demonstration]:
-    """Follow ``u = N(x, t) π(x)`` with Euler steps ``x ← x + dt u``, in the state space.
+    """Follow ``u = N(x, t) π(x)``, or ``u = A⁺b + N π`` under a task, with Euler steps ``x ← x + dt u``.
+
+    Steps are in the state space.
 
     Parameters
     ----------
@@ -64,6 +72,8 @@ def rollout(
         Seconds between samples.
     constraint : callable or sequence of K callables, optional
         A(x, t), for all or one for each start. None leaves the policy free.
+    task : callable, optional
+        b(x, t) of ``A u = b``: states (K, n) and times (K,) to values (K, k), one for each row of A. Zero by default.
     name : str
         Of the demonstrations; several are numbered.
     space : Space, optional
@@ -97,8 +107,10 @@ def rollout(
     for step in range(steps):
         states[:, step] = state
         wanted[:, step] = _action(policy, state, d)
-        projections[:, step] = _projections(constraint, state, times[step], d)
-        actions[:, step] = _without_rounding(project(projections[:, step], wanted[:, step]), wanted[:, step])
+        matrices = _matrices(constraint, state, times[step], d)
+        projections[:, step] = null_space_projection(matrices)
+        drift = 0.0 if task is None else _drift(matrices, task(state, np.full(runs, times[step])))
+        actions[:, step] = _without_rounding(project(projections[:, step], wanted[:, step]), wanted[:, step]) + drift
         state = _moved(within, state, dt * actions[:, step], step)
     names = [name] if single else [f"{name} {k + 1}" for k in range(runs)]
     demos = [
@@ -118,16 +130,27 @@ def _moved(space: spaces.Space, states: Array, ways: Array, step: int) -> Array:
     return moved
 
 
-def _projections(constraint: Constraint | Sequence[Constraint] | None, states: Array, time: float, d: int) -> Array:
-    """What the constraint, or that of each run, leaves free, shape (K, d, d)."""
+def _matrices(constraint: Constraint | Sequence[Constraint] | None, states: Array, time: float, d: int) -> Array:
+    """A of the constraint, or of that of each run, shape (K, k, d); no row where nothing holds."""
     runs = len(states)
     if constraint is None:
-        return np.broadcast_to(np.eye(d), (runs, d, d))
+        return np.zeros((runs, 0, d))
     now = np.full(runs, time)
     if callable(constraint):
-        return null_space_projection(constraint_matrices(constraint, states, now, d))
+        return constraint_matrices(constraint, states, now, d)
     rows = [constraint_matrices(one, states[k : k + 1], now[k : k + 1], d) for k, one in enumerate(constraint)]
-    return null_space_projection(np.concatenate(rows))
+    return np.concatenate(rows)
+
+
+def _drift(matrices: Array, target: Array) -> Array:
+    """``A⁺ b``, shape (K, n)."""
+    wanted = np.asarray(target, np.float64)
+    if wanted.shape != matrices.shape[:2]:
+        raise SettingError(
+            f"task: got b of shape {wanted.shape} for A of shape {matrices.shape}, expected {matrices.shape[:2]}, one "
+            "value for each row of the constraint."
+        )
+    return np.einsum("knr,kr->kn", np.linalg.pinv(matrices, rcond=1e-9), wanted)
 
 
 def _without_rounding(actions: Array, wanted: Array) -> Array:

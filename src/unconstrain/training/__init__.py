@@ -4,6 +4,7 @@ from . import cluster
 from .batches import Batch
 from .first_look import FirstLook, Seen, is_typical
 from .folds import Folds, HeldOut, Split, Validation
+from .order import mixed
 from .samples import Samples
 from .training import Training
 
@@ -19,4 +20,5 @@ __all__ = [
     "Validation",
     "cluster",
     "is_typical",
+    "mixed",
 ]

@@ -5,7 +5,7 @@ with the extra ``viz`` and is imported when first used.
 """
 
 from .curves import bars, over_time, spectra, step_scores
-from .planes import known_map, vector_field
+from .planes import known_map, line_through, vector_field
 from .spaces import movements
 from .style import COLOURS, LABELS, METHODS, PALETTE
 
@@ -16,6 +16,7 @@ __all__ = [
     "PALETTE",
     "bars",
     "known_map",
+    "line_through",
     "movements",
     "over_time",
     "spectra",

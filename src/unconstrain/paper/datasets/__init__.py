@@ -5,6 +5,7 @@ file at a fixed place. Local copies are looked for in the folder named by ``UNCO
 """
 
 from .contours import load_contour as load_contour
+from .fingertip import load_fingertip as load_fingertip
 from .hands import load_hand_tracks as load_hand_tracks
 from .handwriting import load_handwriting as load_handwriting
 from .rim import WipingBout as WipingBout

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...base import files
 from ..experiments.trials import Result
-from . import figure4, figure5, plain, recorded, regimes, table1, table2, washing
+from . import constraints, figure4, figure5, plain, recorded, regimes, table1, table2, washing
 
 __all__ = ["page", "write"]
 
@@ -27,6 +27,7 @@ _PAGES = {
     "washing": washing.page,
     "regimes": regimes.page,
     "recorded": recorded.page,
+    "constraints": constraints.page,
 }
 
 

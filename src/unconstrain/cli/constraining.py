@@ -1,0 +1,122 @@
+"""``unconstrain constraint``: what held the recordings; and where the other commands take it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+import unconstrain as uc
+
+from ..base.errors import SettingError
+from ..base.files import write
+from .fitting import check_writable
+from .printing import print_table, refuse_warnings
+from .reading import numbers, options_for_reading, reading_of, recipe_of, said_recipe
+
+FEATURES = ("auto", "constant", "affine", "quadratic", "rbf")
+
+
+@click.command(epilog="\b\nExample:\n  unconstrain constraint wipe_*.csv --state x,y,z --differentiate -o plate.npz")
+@options_for_reading
+@click.option("-o", "--output", required=True, type=click.Path(dir_okay=False), help="File for the constraint (.npz).")
+@click.option("--features", type=click.Choice(FEATURES), default="auto", show_default=True, help="How A may vary.")
+@click.option("--jacobian", metavar="URDF", help="States are joint angles of this robot: what is held is its hand.")
+@click.option("--tip", help="With --jacobian: the link that is its hand.")
+@click.option("--with-task", is_flag=True, help="Along what is held it moves, as a function of the state.")
+@click.option("--surface", is_flag=True, help="Learn from the positions alone: they lie on a surface.")
+@click.option("--report", type=click.Path(dir_okay=False), help="Also write an HTML page there.")
+def constraint(
+    files: Sequence[str],
+    output: str,
+    features: str,
+    jacobian: str | None,
+    tip: str | None,
+    with_task: bool,
+    surface: bool,
+    report: str | None,
+    **reading: Any,
+) -> None:
+    """Learn what held the demonstrations in each FILE.
+
+    Says its rank, form and noise, and what the data does not tell.
+    """
+    paths = uc.readers.expand(files)
+    check_writable((output, report), paths)
+    if (jacobian is None) != (tip is None):
+        raise SettingError("--jacobian and --tip belong together: a URDF file, and the link that is held.")
+    if surface and (with_task or jacobian is not None):
+        raise SettingError("--surface: got --with-task or --jacobian too; positions alone show neither.")
+    every = uc.read(paths, **reading_of(**reading).arguments)
+    recordings = [one for one in every if one.name not in reading["leave_out"]]
+    recipe, _ = uc.preparation.decide(recipe_of(**reading), recordings[0])
+    demonstrations = uc.prepare(recordings, recipe)
+    states, actions, groups = uc.stack(demonstrations)
+    learnt = uc.LearntConstraint(features, None if jacobian is None else _arm(jacobian, tip).jacobian, task=with_task)
+    learnt.fit(states, None if surface else actions, groups=groups)
+    refuse_warnings(reading["strict"])
+    click.echo(f"Learnt from {said_recipe(recipe, recordings[0])}.")
+    _say(learnt, "distance from it" if surface else "action")
+    uc.save(learnt, output, {"recipe": recipe.to_dict(), **reading_of(**reading).roles})
+    click.echo(f"constraint: {output}")
+    if report is not None:
+        from ..pages.constraint import constraint_page
+
+        write(report, constraint_page(learnt, demonstrations, Path(report).stem))
+        click.echo(f"report: {report}")
+
+
+def options_for_held(what: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Add the options that name a constraint."""
+    plane = click.option("--plane", type=numbers, help=f"Normal of a plane {what}.")
+    learnt = click.option("--constraint", type=click.Path(), help=f"Learnt constraint {what} (.npz).")
+    return lambda command: plane(learnt(command))
+
+
+def held_of(
+    plane: tuple[float, ...] | None, path: str | None, states: int, actions: int, meaning: str
+) -> uc.constraints.Constraint | None:
+    """The constraint of the options: a plane, or a learnt one from a file."""
+    import numpy as np
+
+    if plane is not None and path is not None:
+        raise SettingError("--plane: got --constraint too, expected one of them.")
+    if plane is not None:
+        if len(plane) != actions:
+            raise SettingError(f"--plane: got {len(plane)} numbers, expected {actions}, {meaning}.")
+        return uc.constraints.Plane(np.array(plane))
+    if path is None:
+        return None
+    uc.storage.register(_arms().Arm)
+    learnt = uc.load(path, uc.LearntConstraint)
+    found = learnt.choice_.columns, learnt.choice_.actions
+    if found != (states, actions):
+        raise SettingError(f"{path}: holds {found[1]} actions at {found[0]} states, expected {actions} at {states}.")
+    return learnt
+
+
+def _arm(urdf: str, tip: str | None) -> Any:
+    uc.storage.register(_arms().Arm)
+    return _arms().Arm.from_urdf(urdf, tip)
+
+
+def _arms() -> Any:
+    from ..paper.systems import arm
+
+    return arm
+
+
+def _say(learnt: uc.LearntConstraint, what: str) -> None:
+    choice = learnt.choice_
+    smooth = f", smoothed with {choice.smoothness:g}" if choice.smoothness else ""
+    click.echo(f"{learnt.rank_} of {choice.actions} directions held, by {choice.name} features{smooth}.")
+    click.echo(
+        f"Noise and misfit along them are about {learnt.noise_:.3g} of {what}, and where held out "
+        f"{choice.held_out:.3g} of its mean square."
+    )
+    rows = [[name, f"{share:.3g}"] for name, share in choice.candidates.items()]
+    print_table(["features", "missed where held out"], rows)
+    for doubt in choice.doubts:
+        click.echo(f"Note: {doubt}", err=True)

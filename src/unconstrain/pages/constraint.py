@@ -1,0 +1,94 @@
+"""The page of a learnt constraint: what was held, where, and what the data does not tell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..evaluation import npoe
+from ..recordings import Demonstration, stack
+from . import figures, html
+
+if TYPE_CHECKING:
+    from ..constraints import LearntConstraint
+
+MOST_NORMALS = 150
+MOST_POINTS = 4000
+
+_HELD = "inconsistency"
+"""The key that lends its colour to held directions."""
+
+
+def constraint_page(learnt: LearntConstraint, demonstrations: Sequence[Demonstration], title: str) -> str:
+    """Make the page of a learnt constraint.
+
+    Parameters
+    ----------
+    learnt : LearntConstraint
+    demonstrations : sequence of Demonstration
+        What it was learnt from, or others.
+    title : str
+        Of the page.
+
+    Returns
+    -------
+    str
+        A whole HTML document.
+
+    Raises
+    ------
+    MissingExtraError
+        If plotly or jinja2 is not installed.
+    """
+    choice, demos = learnt.choice_, list(demonstrations)
+    tiles = [
+        (f"{learnt.rank_} of {choice.actions}", "directions held"),
+        (choice.name or "own", "features"),
+        (html.number(learnt.noise_), "noise and misfit along them"),
+        (html.number(npoe(learnt, demos)), "nPOE, the share of the observed motion that it would take"),
+    ]
+    rows = [[name or "own", html.number(share)] for name, share in choice.candidates.items()]
+    note = "Mean square along the held directions, as a share of the mean square action, where held out."
+    parts = (
+        [html.section("Where it holds", held_directions(learnt, demos))] if choice.columns == choice.actions > 1 else []
+    )
+    doubts = [html.section("What the data does not tell", html.bullets(choice.doubts))] if choice.doubts else []
+    return html.document(
+        title,
+        html.words("constraint_lead"),
+        html.tiles(tiles),
+        *parts,
+        *doubts,
+        html.section("How its form was chosen", html.table(["features", "missed"], rows, note=note)),
+    )
+
+
+def held_directions(learnt: LearntConstraint, demos: Sequence[Demonstration]) -> html.Markup:
+    """Held directions through recorded states, over the first two or three columns."""
+    states, _, _ = stack(demos)
+    few = states[:: -(-len(states) // MOST_NORMALS)]
+    shown = min(states.shape[1], 3)
+    reach = float(np.ptp(states[:, :shown], axis=0).max()) / 25
+    lines = np.concatenate([_strokes(few, reach * learnt(few)[:, row]) for row in range(learnt.rank_)])[:, :shown]
+    every = -(-len(states) // MOST_POINTS)
+    tracks = [demo.states[::every, :shown] for demo in demos]
+    if shown == 3:
+        named = [("training", escape(demo.name), track) for demo, track in zip(demos, tracks, strict=True)]
+        panel = figures.movements([*named, (_HELD, "held", lines)], labels=("state 1", "state 2", "state 3"))
+    else:
+        panel = figures.vector_field(
+            few, {}, longest=1.0, scale=1.0, trajectories=tracks, labels=("state 1", "state 2")
+        )
+        panel.add_trace(figures.line_through(lines, _HELD, width=1.6))
+    caption = "Grey lines are the demonstrations. Strokes are directions in which they were held at these states."
+    labels = {_HELD: "held directions", "training": "demonstrations"}
+    return html.picture("held", [panel], caption, keys=(_HELD, "training"), labels=labels)
+
+
+def _strokes(points: Array, half: Array) -> Array:
+    """Lines through points to either side, with a row of NaN after each, shape (3 N, n)."""
+    return np.stack([points - half, points + half, np.full_like(points, np.nan)], axis=1).reshape(-1, points.shape[1])

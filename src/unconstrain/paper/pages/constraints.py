@@ -1,0 +1,60 @@
+"""The page of the constraints that are learnt."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...pages import html
+from ...pages.constraint import held_directions
+from ..experiments import constraints
+from ..experiments.trials import Result
+
+
+def page(result: Result) -> str:
+    """What was found for each task, and the recording with what held it."""
+    recorded = [html.section("The recording", _recording(result))] if result.details else []
+    return html.document(
+        "The constraint, learnt",
+        "Nobody says what held these movements: it is learnt from them, in closed form, and then compared with the "
+        "truth on fresh trajectories. nPPE is how far the learnt projection is from the true one as the policy sees "
+        "it, nPOE how much of the observed motion it would take away. Systems and counts are those of the library CCL.",
+        html.section("In short", html.bullets(constraints.headlines(result))),
+        html.section("Task by task", _table(result)),
+        *recorded,
+        html.section("The part that no task moves", _components(result)),
+        html.settings_table(result.settings),
+    )
+
+
+def _table(result: Result) -> html.Markup:
+    header = ["task", "features", "noise", "nPPE", "worst", "nPOE", "noise found\n/ true", "rank right", "ms"]
+    keys = ("nppe", "nppe_worst", "npoe", "noise_found")
+    rows = [
+        [
+            row["task"],
+            row["features"],
+            f"{row['noise']:.0%}",
+            *(html.number(row[key]) for key in keys),
+            f"{row['rank_right']:.0%}",
+            html.number(row["ms"]),
+        ]
+        for row in result.rows
+    ]
+    rules = [place for place, row in enumerate(result.rows) if place and row["task"] != result.rows[place - 1]["task"]]
+    note = "Medians over the data sets. “auto” is told nothing; the other features hold the truth, or nearly."
+    return html.table(header, rows, left=2, note=note, rules=rules)
+
+
+def _recording(result: Result) -> html.Markup:
+    details: dict[str, Any] = result.details
+    rows = [
+        [str(row["blocks"]), html.number(row["s_each"]), html.number(row["npoe"])] for row in result.tables["recorded"]
+    ]
+    table = html.table(["blocks", "s each", "nPOE where held out"], rows)
+    return html.markup("{}{}").format(held_directions(details["learnt"], [details["demonstration"]]), table)
+
+
+def _components(result: Result) -> html.Markup:
+    rows = [[row["way"], html.number(row["error"])] for row in result.tables["component"]]
+    note = "Squared error of the null-space component over its variance, medians; the task is drawn at each sample."
+    return html.table(["learnt by", "error"], rows, note=note)

@@ -1,0 +1,182 @@
+"""``unconstrain constraint``, its file and its page, and the commands that take the file."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from numpy.testing import assert_allclose
+
+import unconstrain as uc
+from unconstrain import cli, storage
+from unconstrain.base.errors import ModelFileError, SettingError
+from unconstrain.pages.constraint import constraint_page
+
+NORMAL = np.array([0.0, 0.6, 0.8])
+
+
+def call(*args):
+    result = CliRunner().invoke(cli.main, list(map(str, args)), prog_name="unconstrain")
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+def run(*args):
+    result = call(*args)
+    assert result.exit_code == 0, result.stderr
+    return result.stdout
+
+
+def refused(*args):
+    result = call(*args)
+    assert result.exit_code == 2
+    return result.stderr
+
+
+def write(path, head, columns):
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=head, comments="")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Four demonstrations on one plane, whose directions cross; and a policy that wants to leave it."""
+    folder = tmp_path_factory.mktemp("held")
+    rng = np.random.default_rng(0)
+    for k in range(4):
+        states, wanted = rng.uniform(-1, 1, (60, 3)), rng.standard_normal((60, 3))
+        actions = wanted - np.outer(wanted @ NORMAL, NORMAL)
+        write(folder / f"wipe_{k}.csv", "t,x,y,z,vx,vy,vz", [0.1 * np.arange(60), states, actions])
+    policy = uc.ParametricPolicy(uc.Affine(), learner="direct").fit(states, -states)
+    uc.save(policy, folder / "wipe.npz", {"recipe": {"states": ["x", "y", "z"], "actions": ["vx", "vy", "vz"]}})
+    said = run("constraint", folder / "wipe_*.csv", "-o", folder / "plate.npz", "--report", folder / "plate.html")
+    (folder / "said.txt").write_text(said)
+    return folder
+
+
+def test_it_says_what_was_held_and_how_its_form_was_chosen(folder):
+    lines = (folder / "said.txt").read_text().splitlines()
+    assert lines[0] == "Learnt from x, y, z as states and vx, vy, vz as actions."
+    assert lines[1] == "1 of 3 directions held, by constant features."
+    assert lines[2].startswith("Noise and misfit along them are about ")
+    assert [line.split()[0] for line in lines[3:8]] == ["features", "constant", "affine", "quadratic", "rbf"]
+    assert lines[8:] == [f"constraint: {folder / 'plate.npz'}", f"report: {folder / 'plate.html'}"]
+
+
+def test_its_file_holds_the_constraint_and_no_sample(folder):
+    found = uc.load(folder / "plate.npz", uc.LearntConstraint)
+    assert_allclose(np.abs(found(np.zeros((1, 3)))[0, 0]), NORMAL, atol=1e-9)
+    assert not hasattr(found, "evidence_")
+    with pytest.raises(SettingError, match="was stored, without what it was learnt from"):
+        found.partial_fit(np.ones((3, 3)), np.ones((3, 3)))
+    with pytest.raises(ModelFileError, match="holds a LearntConstraint, expected a policy"):
+        uc.load(folder / "plate.npz")
+    assert "holds a ParametricPolicy, expected a LearntConstraint" in refused(
+        "score", folder / "wipe.npz", folder / "wipe_0.csv", "--constraint", folder / "wipe.npz"
+    )
+
+
+@pytest.mark.parametrize("features", ["affine", "quadratic", "rbf"])
+def test_every_form_survives_its_file(features, tmp_path):
+    rng = np.random.default_rng(1)
+    directions = rng.standard_normal((200, 3))
+    points = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    constraint = uc.LearntConstraint(features).fit(points, np.cross(points, rng.standard_normal((200, 3))))
+    surface = uc.LearntConstraint("quadratic").fit(points)
+    for found in (constraint, surface):
+        uc.save(found, tmp_path / "c.npz")
+        again = uc.load(tmp_path / "c.npz", uc.LearntConstraint)
+        assert_allclose(again.projection(points), found.projection(points))
+        assert (again.rank_, again.noise_, again.choice_.doubts) == (found.rank_, found.noise_, found.choice_.doubts)
+
+
+def test_score_takes_it(folder):
+    scored = ("score", folder / "wipe.npz", folder / "wipe_0.csv")
+    by_plane = json.loads(run(*scored, "--plane", "0,3,4", "--json"))["all"]
+    learnt = json.loads(run(*scored, "--constraint", folder / "plate.npz", "--json"))["all"]
+    assert learnt["ncpe"] == pytest.approx(by_plane["ncpe"])
+    assert learnt["npoe"] == pytest.approx(0.0, abs=1e-15)
+    assert run(*scored, "--constraint", folder / "plate.npz").splitlines()[0].split()[-2:] == ["nPOE", "nCPE"]
+
+
+def test_rollout_takes_it(folder):
+    start = (folder / "wipe.npz", "--start", "0.1,0.2,0.3", "--steps", 5)
+    free, by_plane, learnt = (
+        np.genfromtxt(run("rollout", *start, *held).splitlines(), delimiter=",", skip_header=1)
+        for held in ((), ("--plane", "0,3,4"), ("--constraint", folder / "plate.npz"))
+    )
+    assert_allclose(learnt, by_plane, atol=1e-7)
+    assert np.abs(free - learnt).max() > 1e-3
+
+
+def test_a_task_is_followed(tmp_path):
+    rng = np.random.default_rng(2)
+    for k in range(3):
+        states, wanted = rng.uniform(-1, 1, (60, 2)), rng.standard_normal(60)
+        write(tmp_path / f"{k}.csv", "t,x,y,vx,vy", [0.1 * np.arange(60), states, wanted, 0.5 - states[:, 1]])
+    run("constraint", tmp_path / "*.csv", "--features", "affine", "--with-task", "-o", tmp_path / "task.npz")
+    run("fit", tmp_path / "*.csv", "--model", "linear", "--learner", "direct", "-o", tmp_path / "p.npz")
+    out = run("rollout", tmp_path / "p.npz", "--start", "0.2,0", "--steps", 4, "--constraint", tmp_path / "task.npz")
+    path = np.genfromtxt(out.splitlines(), delimiter=",", skip_header=1)
+    assert_allclose(path[:, 4], 0.5 - path[:, 2], atol=1e-6)
+
+
+ROBOT = """<robot name="two">
+  <link name="base"/><link name="upper"/><link name="lower"/><link name="hand"/>
+  <joint name="a" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/></joint>
+  <joint name="b" type="continuous"><parent link="upper"/><child link="lower"/>
+    <origin xyz="1 0 0"/><axis xyz="0 0 1"/></joint>
+  <joint name="c" type="fixed"><parent link="lower"/><child link="hand"/><origin xyz="1 0 0"/></joint>
+</robot>"""
+
+
+def test_an_arm_is_held_by_its_hand(tmp_path):
+    (tmp_path / "robot.urdf").write_text(ROBOT)
+    rng = np.random.default_rng(3)
+    arm = uc.systems.arm.Arm.from_urdf(tmp_path / "robot.urdf", "hand")
+    for k in range(4):
+        postures, wanted = rng.uniform(0.3, 1.8, (60, 2)), rng.standard_normal((60, 2))
+        free = uc.null_space_projection(arm.jacobian(postures)[:, :1])
+        write(tmp_path / f"{k}.csv", "t,a,b,va,vb", [0.1 * np.arange(60), postures, uc.project(free, wanted)])
+    options = ("--jacobian", tmp_path / "robot.urdf", "--tip", "hand", "-o", tmp_path / "c.npz")
+    said = run("constraint", tmp_path / "*.csv", *options)
+    assert "1 of 2 directions held, by constant features." in said
+    storage.register(uc.systems.arm.Arm)
+    found = uc.load(tmp_path / "c.npz", uc.LearntConstraint)
+    assert_allclose(found.projection(postures), free, atol=1e-9)
+    said = refused("constraint", tmp_path / "*.csv", "--tip", "hand", "-o", tmp_path / "c.npz")
+    assert "--jacobian and --tip belong together" in said
+
+
+def test_positions_alone_show_a_surface(tmp_path):
+    rng = np.random.default_rng(4)
+    turns = rng.uniform(0, 2 * np.pi, 300)
+    write(tmp_path / "rim.csv", "t,x,y", [0.02 * np.arange(300), np.cos(turns), np.sin(turns)])
+    said = run("constraint", tmp_path / "rim.csv", "--state", "x,y", "--differentiate", "--surface",
+               "--features", "quadratic", "-o", tmp_path / "c.npz")  # fmt: skip
+    assert "of distance from it" in said
+    assert "positions alone show neither" in refused(
+        "constraint", tmp_path / "rim.csv", "--surface", "--with-task", "-o", tmp_path / "c.npz"
+    )
+
+
+def test_one_constraint_at_a_time_and_of_the_right_size(folder, tmp_path):
+    start = ("rollout", folder / "wipe.npz", "--start", "0,0,0")
+    assert "got --constraint too, expected one of them" in refused(
+        *start, "--plane", "0,3,4", "--constraint", folder / "plate.npz"
+    )
+    states = np.random.default_rng(5).uniform(-1, 1, (50, 2))
+    uc.save(uc.LearntConstraint("constant").fit(states, states * [1.0, 0.0]), tmp_path / "flat.npz")
+    said = refused(*start, "--constraint", tmp_path / "flat.npz")
+    assert "flat.npz: holds 2 actions at 2 states, expected 3 at 3." in said
+
+
+def test_its_page_draws_held_directions_where_states_are(folder):
+    page = (folder / "plate.html").read_text()
+    assert "1 of 3" in page
+    assert "held directions" in page
+    states = np.random.default_rng(6).uniform(-1, 1, (80, 2))
+    demo = uc.Demonstration(states, states * [1.0, 0.0])
+    page = constraint_page(uc.LearntConstraint().fit(states, demo.actions), [demo], "flat")
+    assert "What the data does not tell" in page
+    assert "a free policy that is a function of the state looks the same" in page
