@@ -602,7 +602,7 @@ def test_the_arm_moves_as_section_4b_says():
 
 @pytest.fixture(scope="module")
 def small_constraints(once):
-    settings = constraints.Settings(trials=1, noise=(0.05,), blocks=(20,))
+    settings = constraints.Settings(trials=1, noise=(0.05,), blocks=(20,), mechanisms=8)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("UNCONSTRAIN_DATA", str(DATA))
         return once("small constraints", lambda: constraints.run(settings))

@@ -10,11 +10,14 @@ import click
 
 import unconstrain as uc
 
-from ..base.errors import SettingError
+from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
 from .fitting import check_writable
 from .printing import print_table, refuse_warnings
 from .reading import numbers, options_for_reading, reading_of, recipe_of, said_recipe
+
+MOST_POSITIONS = 4000
+"""Positions, at most, by which a mechanism is named; more are thinned evenly."""
 
 FEATURES = ("auto", "constant", "affine", "quadratic", "rbf")
 
@@ -59,12 +62,13 @@ def constraint(
     refuse_warnings(reading["strict"])
     click.echo(f"Learnt from {said_recipe(recipe, recordings[0])}.")
     _say(learnt, "distance from it" if surface else "action")
+    named = mechanism_of(states, groups) if jacobian is None and _are_positions(recipe) else None
     uc.save(learnt, output, {"recipe": recipe.to_dict(), **reading_of(**reading).roles})
     click.echo(f"constraint: {output}")
     if report is not None:
         from ..pages.constraint import constraint_page
 
-        write(report, constraint_page(learnt, demonstrations, Path(report).stem))
+        write(report, constraint_page(learnt, demonstrations, Path(report).stem, recipe.states, named))
         click.echo(f"report: {report}")
 
 
@@ -106,6 +110,23 @@ def _arms() -> Any:
     from ..paper.systems import arm
 
     return arm
+
+
+def mechanism_of(positions: Any, groups: Any) -> str | None:
+    """Say which mechanism may have held positions; None where too little was recorded."""
+    every = -(-len(positions) // MOST_POSITIONS)
+    try:
+        found = uc.constraints.identify(positions[::every], groups=groups[::every])
+    except InvalidDataError as error:
+        click.echo(f"Note: no mechanism is named: {error}", err=True)
+        return None
+    click.echo(f"Mechanism, if these are positions in m: {found.sentence}.")
+    return found.sentence
+
+
+def _are_positions(recipe: uc.Recipe) -> bool:
+    count = len(recipe.states or ())
+    return count in (2, 3) and recipe.space == uc.spaces.Euclidean(count)
 
 
 def _say(learnt: uc.LearntConstraint, what: str) -> None:

@@ -1,4 +1,4 @@
-"""Constraint matrices A(x, t), with A u = 0: known, and learnt."""
+"""Constraint matrices A(x, t), with A u = 0: known, learnt, and mechanisms with names, found in recordings."""
 
 from .choice import Choice
 from .components import null_space_component
@@ -6,6 +6,7 @@ from .forms import Constant, Form, Surface, Velocities
 from .known import Constraint, JacobianRows, Plane, PolicyAligned, SwitchingLine
 from .learnt import LearntConstraint
 from .matrices import constraint_matrices
+from .mechanisms import identify
 from .spectrum import Fields
 
 STORED = (Choice, Constant, Fields, Form, LearntConstraint, Surface, Velocities)
@@ -20,5 +21,6 @@ __all__ = [
     "PolicyAligned",
     "SwitchingLine",
     "constraint_matrices",
+    "identify",
     "null_space_component",
 ]

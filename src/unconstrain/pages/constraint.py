@@ -23,7 +23,13 @@ _HELD = "inconsistency"
 """The key that lends its colour to held directions."""
 
 
-def constraint_page(learnt: LearntConstraint, demonstrations: Sequence[Demonstration], title: str) -> str:
+def constraint_page(
+    learnt: LearntConstraint,
+    demonstrations: Sequence[Demonstration],
+    title: str,
+    columns: Sequence[str] | None = None,
+    mechanism: str | None = None,
+) -> str:
     """Make the page of a learnt constraint.
 
     Parameters
@@ -33,6 +39,10 @@ def constraint_page(learnt: LearntConstraint, demonstrations: Sequence[Demonstra
         What it was learnt from, or others.
     title : str
         Of the page.
+    columns : sequence of str, optional
+        Names of the states.
+    mechanism : str, optional
+        What may have held them, in words.
 
     Returns
     -------
@@ -54,22 +64,28 @@ def constraint_page(learnt: LearntConstraint, demonstrations: Sequence[Demonstra
     rows = [[name or "own", html.number(share)] for name, share in choice.candidates.items()]
     note = "Mean square along the held directions, as a share of the mean square action, where held out."
     parts = (
-        [html.section("Where it holds", held_directions(learnt, demos))] if choice.columns == choice.actions > 1 else []
+        [html.section("Where it holds", held_directions(learnt, demos, columns))]
+        if choice.columns == choice.actions > 1
+        else []
     )
     doubts = [html.section("What the data does not tell", html.bullets(choice.doubts))] if choice.doubts else []
     return html.document(
         title,
         html.words("constraint_lead"),
         html.tiles(tiles),
+        *([html.section("The mechanism", html.bullets([mechanism]))] if mechanism else []),
         *parts,
         *doubts,
         html.section("How its form was chosen", html.table(["features", "missed"], rows, note=note)),
     )
 
 
-def held_directions(learnt: LearntConstraint, demos: Sequence[Demonstration]) -> html.Markup:
+def held_directions(
+    learnt: LearntConstraint, demos: Sequence[Demonstration], columns: Sequence[str] | None = None
+) -> html.Markup:
     """Held directions through recorded states, over the first two or three columns."""
     states, _, _ = stack(demos)
+    labels = [escape(name) for name in columns or (f"state {column + 1}" for column in range(states.shape[1]))]
     few = states[:: -(-len(states) // MOST_NORMALS)]
     shown = min(states.shape[1], 3)
     reach = float(np.ptp(states[:, :shown], axis=0).max()) / 25
@@ -78,15 +94,15 @@ def held_directions(learnt: LearntConstraint, demos: Sequence[Demonstration]) ->
     tracks = [demo.states[::every, :shown] for demo in demos]
     if shown == 3:
         named = [("training", escape(demo.name), track) for demo, track in zip(demos, tracks, strict=True)]
-        panel = figures.movements([*named, (_HELD, "held", lines)], labels=("state 1", "state 2", "state 3"))
+        panel = figures.movements([*named, (_HELD, "held", lines)], labels=(labels[0], labels[1], labels[2]))
     else:
         panel = figures.vector_field(
-            few, {}, longest=1.0, scale=1.0, trajectories=tracks, labels=("state 1", "state 2")
+            few, {}, longest=1.0, scale=1.0, trajectories=tracks, labels=(labels[0], labels[1])
         )
         panel.add_trace(figures.line_through(lines, _HELD, width=1.6))
     caption = "Grey lines are the demonstrations. Strokes are directions in which they were held at these states."
-    labels = {_HELD: "held directions", "training": "demonstrations"}
-    return html.picture("held", [panel], caption, keys=(_HELD, "training"), labels=labels)
+    words = {_HELD: "held directions", "training": "demonstrations"}
+    return html.picture("held", [panel], caption, keys=(_HELD, "training"), labels=words)
 
 
 def _strokes(points: Array, half: Array) -> Array:

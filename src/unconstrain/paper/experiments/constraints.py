@@ -22,6 +22,7 @@ from ...base.errors import ReadError
 from ...models import FeatureMap, NormalisedRBF
 from ..datasets import load_fingertip
 from ..systems.arm import LWR3, Arm
+from . import mechanisms
 from .journal import Journal
 from .trials import Progress, Result, run_trials
 from .truths import spread, with_noise
@@ -144,6 +145,8 @@ class Settings:
         On actions, as shares of the policy's spread.
     blocks : tuple of int
         The recording is cut into so many pieces, each held out once, by what is learnt from the others.
+    mechanisms : int
+        Simulated mechanisms whose kind is to be found.
     seed : int
         Of everything random.
     """
@@ -151,6 +154,7 @@ class Settings:
     trials: int = 10
     noise: tuple[float, ...] = (0.0, 0.05, 0.2)
     blocks: tuple[int, ...] = (20, 40)
+    mechanisms: int = 200
     seed: int = 0
 
 
@@ -164,14 +168,16 @@ def run(
     Result
         A row for each task, noise and features: medians of "nppe", "npoe" and "ms", the worst "nppe", the noise found
         over the true one, and how often the rank is right. ``details`` holds the recording and its constraint; the
-        table "recorded" its nPOE where held out, the table "component" the error of null-space components.
+        table "recorded" its nPOE where held out, the table "component" the error of null-space components, the table
+        "mechanisms" what :func:`.mechanisms.mechanisms` finds.
     """
     chosen = settings or Settings()
     calls = [(name, number, chosen) for name in TASKS for number in range(chosen.trials)]
     found = [row for rows in run_trials(_trial, calls, workers, progress, journal) for row in rows]
     keys = dict.fromkeys((one["task"], one["noise"], one["features"]) for one in found)
     rows = [_row(key, [one for one in found if (one["task"], one["noise"], one["features"]) == key]) for key in keys]
-    tables = {"component": _components(chosen)}
+    named, _ = mechanisms.mechanisms(chosen.mechanisms, chosen.seed, workers, progress)
+    tables = {"component": _components(chosen), "mechanisms": named}
     try:
         demo = load_fingertip()
     except ReadError:
@@ -284,4 +290,10 @@ def headlines(result: Result) -> list[str]:
         for row in result.tables.get("recorded", [])
     ]
     ways = ", ".join(f"{row['way']} {row['error']:.1e}" for row in result.tables["component"])
-    return [*said, f"null-space component: {ways}"]
+    every = result.tables["mechanisms"][-1]
+    found = (
+        f"{every['mechanisms']} simulated mechanisms: kind right in {every['right']:.1%}, {every['inside']:.1%} of the "
+        f"parameters inside their 95 % intervals, {every['confident_and_wrong']} of {every['confident']} confident "
+        "verdicts wrong"
+    )
+    return [*said, f"null-space component: {ways}", found]

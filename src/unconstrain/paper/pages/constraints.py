@@ -22,6 +22,7 @@ def page(result: Result) -> str:
         html.section("Task by task", _table(result)),
         *recorded,
         html.section("The part that no task moves", _components(result)),
+        html.section("Mechanisms with names", _mechanisms(result)),
         html.settings_table(result.settings),
     )
 
@@ -58,3 +59,20 @@ def _components(result: Result) -> html.Markup:
     rows = [[row["way"], html.number(row["error"])] for row in result.tables["component"]]
     note = "Squared error of the null-space component over its variance, medians; the task is drawn at each sample."
     return html.table(["learnt by", "error"], rows, note=note)
+
+
+def _mechanisms(result: Result) -> html.Markup:
+    header = ["kind", "simulated", "kind right", "inside 95 %\nintervals", "confident", "confident\nand wrong"]
+    rows = [
+        [
+            row["kind"],
+            str(row["mechanisms"]),
+            f"{row['right']:.0%}",
+            f"{row['inside']:.1%} of {row['parameters']}",
+            str(row["confident"]),
+            str(row["confident_and_wrong"]),
+        ]
+        for row in result.tables["mechanisms"]
+    ]
+    note = "Noise of 2 mm. A verdict is confident from odds of 20:1; parameters are judged where the kind is right."
+    return html.table(header, rows, note=note)

@@ -1,0 +1,3 @@
+"""Mechanisms with names: found in recorded positions, compared by evidence."""
+
+from .identify import identify as identify

@@ -1,0 +1,228 @@
+"""Which mechanism made these movements, and how sure is that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...base.arrays import Array, Groups, as_groups, as_matrix
+from ...base.display import Shown
+from ...base.errors import InvalidDataError
+from ...risks import unit_actions
+from .evidence import log_evidence
+from .fitting import Fit, fit, noise
+from .forces import Witness, witnesses
+from .kinds import FLAT_KINDS, KINDS
+from .mechanism import Mechanism
+from .tied import TIED_KINDS
+from .track import Track, noise_by_differences
+
+MOST_CERTAIN = 700.0
+"""Logarithm of odds beyond which numbers end."""
+
+FEWEST = 10
+"""Samples of a demonstration."""
+
+SMALLEST_MOVEMENT = 1e-12
+"""Share of the numbers themselves below which positions differ by rounding."""
+
+LIKELY = 20.0
+"""Odds from which one kind is called decided."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Candidate(Shown):
+    """One explanation of a recording.
+
+    Parameters
+    ----------
+    mechanisms : tuple of Mechanism
+        One for all demonstrations; or one of the same kind for each, in the order of their sorted names.
+    log_evidence : float
+    noise : float
+        Standard deviation from them in each direction that they hold; NaN where they hold none.
+    """
+
+    mechanisms: tuple[Mechanism, ...]
+    log_evidence: float
+    noise: float
+
+    @property
+    def kind(self) -> str:
+        """point, line, plane, circle, sphere, cylinder, screw; slider, hinge where orientations tell; or free."""
+        return self.mechanisms[0].kind
+
+    @property
+    def sentence(self) -> str:
+        """Each mechanism in words."""
+        each = "; ".join(mechanism.sentence for mechanism in self.mechanisms)
+        return each if len(self.mechanisms) == 1 else f"one for each of {len(self.mechanisms)} demonstrations: {each}"
+
+    def _summary(self) -> tuple[str, ...]:
+        return (self.sentence,)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Shown):
+    """All explanations, the likeliest first; each kind was as likely as any other before.
+
+    Parameters
+    ----------
+    candidates : tuple of Candidate
+    effective_samples : float
+        Neighbours in time are partly copies of each other.
+    witnesses : list of Witness
+        What forces say of the directions that the likeliest mechanism holds; empty if none were given.
+    """
+
+    candidates: tuple[Candidate, ...]
+    effective_samples: float
+    witnesses: list[Witness]
+
+    @property
+    def kind(self) -> str:
+        """That of the likeliest."""
+        return self.candidates[0].kind
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The likeliest: a constraint, to be given to roll-outs. Of the first demonstration, if each has its own."""
+        return self.candidates[0].mechanisms[0]
+
+    @property
+    def probabilities(self) -> dict[str, float]:
+        """Of each kind."""
+        values = np.array([candidate.log_evidence for candidate in self.candidates])
+        shares = np.exp(values - values.max())
+        return {
+            kind: float(sum(shares[[candidate.kind == kind for candidate in self.candidates]]) / shares.sum())
+            for kind in dict.fromkeys(candidate.kind for candidate in self.candidates)
+        }
+
+    @property
+    def odds(self) -> float:
+        """Of the likeliest kind against the next."""
+        return float(np.exp(min(self.candidates[0].log_evidence - self._next.log_evidence, MOST_CERTAIN)))
+
+    @property
+    def decided(self) -> bool:
+        """Whether one kind is likely enough to speak of."""
+        return self.odds >= LIKELY
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in words: what it is, or what it may be, and what the forces say."""
+        best, odds = self.candidates[0].sentence, f"{self.odds:.{0 if self.odds >= 10 else 1}f}:1"
+        if self.odds > 1e4:
+            odds = "more than 10000:1"
+        if self.decided:
+            other = self._next.kind
+            verdict = f"{best}, against {'nothing held' if other == 'free' else f'a {other}'} {odds}"
+        else:
+            verdict = f"undecided: {best}; or else {self._next.sentence} ({odds})"
+        return "; ".join([verdict, *map(str, self.witnesses)])
+
+    def _summary(self) -> tuple[str, ...]:
+        return (self.sentence,)
+
+    @property
+    def _next(self) -> Candidate:
+        return next(candidate for candidate in self.candidates if candidate.kind != self.kind)
+
+
+def identify(
+    positions: ArrayLike,
+    orientations: ArrayLike | None = None,
+    forces: ArrayLike | None = None,
+    groups: Groups | None = None,
+) -> Identification:
+    """Fit every kind of mechanism to recorded positions and compare them.
+
+    Parameters
+    ----------
+    positions : array_like, shape (N, 2) or (N, 3)
+        In m, in the order of time within each demonstration.
+    orientations : array_like, shape (N, 4), optional
+        Quaternions (x, y, z, w) of what moves. They tell a hinge, whose tool turns with it, from a circle.
+    forces : array_like, shape (N, 2) or (N, 3), optional
+        On the mechanism, in N and in the frame of the positions, without the tool's weight.
+    groups : sequence, shape (N,), optional
+        Which demonstration each sample is from. One mechanism for all is compared with one of a kind for each.
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    InvalidDataError
+        If the tables do not fit together, a demonstration has fewer than ten samples, or nothing moves.
+    """
+    track, order, scale, origin = _track(positions, orientations, groups)
+    pushed = None if forces is None else _as_long(forces, "forces", track.positions.shape)[order]
+    explained = _fits(track)
+    time = min(max(one.time for one in fits) for fits in explained.values() if fits[0].mechanism.count)
+    white = noise_by_differences(track.positions, track.groups)
+    candidates = []
+    for (kind, count), fits in explained.items():
+        straight = None if kind.form.straight is None else explained[kind.form.straight, count]
+        evidence = log_evidence(fits, straight, time, white)
+        candidates.append(_candidate(fits, evidence, scale, origin))
+    candidates.sort(key=lambda candidate: -candidate.log_evidence)
+    said: list[Witness] = []
+    if pushed is not None:
+        said = witnesses(candidates[0].mechanisms, origin + scale * track.positions, pushed, track.groups)
+    return Identification(tuple(candidates), len(order) / time, said)
+
+
+def _track(
+    positions: ArrayLike, orientations: ArrayLike | None, groups: Groups | None
+) -> tuple[Track, NDArray[np.intp], float, Array]:
+    """What was recorded, in its own units; the order of its rows, the unit, the origin."""
+    table = as_matrix(positions, "positions")
+    if table.shape[1] not in (2, 3):
+        raise InvalidDataError(f"positions: got {table.shape[1]} columns, expected two or three, in m.")
+    names = as_groups(np.zeros(len(table)) if groups is None else groups, len(table))
+    _, codes, counts = np.unique(names, return_inverse=True, return_counts=True)
+    if counts.min() < FEWEST:
+        raise InvalidDataError(
+            f"positions: got a demonstration of {counts.min()} samples, expected at least {FEWEST} of each."
+        )
+    order = np.argsort(codes, kind="stable")
+    origin = table.mean(axis=0)
+    scale = float(np.sqrt(((table - origin) ** 2).sum(axis=1).mean()))
+    if scale <= SMALLEST_MOVEMENT * float(np.abs(table).max()):
+        raise InvalidDataError("positions: all rows are the same, expected a movement, or its noise at least.")
+    quaternions = np.empty((len(table), 0))
+    if orientations is not None:
+        quaternions, lengths = unit_actions(_as_long(orientations, "orientations", (len(table), 4)))
+        if table.shape[1] == 2 or not lengths.all():
+            raise InvalidDataError("orientations: expected quaternions that are not zero, beside positions in space.")
+    return Track((table[order] - origin) / scale, codes[order], quaternions[order]), order, scale, origin
+
+
+def _as_long(values: ArrayLike, what: str, shape: tuple[int, ...]) -> Array:
+    table = as_matrix(values, what)
+    if table.shape != shape:
+        raise InvalidDataError(
+            f"{what}: got an array of shape {table.shape}, expected {shape}, a row for each position."
+        )
+    return table
+
+
+def _fits(track: Track) -> dict[tuple[type[Mechanism], int], list[Fit]]:
+    """By kind, and by how many mechanisms there are: one for all demonstrations, or one for each."""
+    kinds = KINDS if track.dimensions == 3 else FLAT_KINDS
+    if track.poses:
+        kinds = (*kinds[:-1], *TIED_KINDS)
+    parts = track.demonstrations
+    each = {(kind, len(parts)): [fit(kind, part) for part in parts] for kind in kinds[1:] if len(parts) > 1}
+    return {**{(kind, 1): [fit(kind, track)] for kind in kinds}, **each}
+
+
+def _candidate(fits: list[Fit], evidence: float, scale: float, origin: Array) -> Candidate:
+    variances = noise(fits)
+    mechanisms = tuple(one.certain(variances).placed(scale, origin) for one in fits)
+    return Candidate(mechanisms, evidence, scale * float(np.sqrt(variances[0])) if len(variances) else np.nan)

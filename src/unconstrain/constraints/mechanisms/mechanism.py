@@ -1,0 +1,198 @@
+"""What all mechanisms have in common: place, changes in a fit, units.
+
+A mechanism has a centre, a frame whose first row is its axis (a plane's normal, a line's direction) and, where it needs
+them, a radius, a pitch and an orientation. Its *chart* lists what a fit may change, by small steps from where it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, NamedTuple, Self
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.display import Shown
+from ...risks import unit_actions
+from .quaternions import IDENTITY, product, rotation
+from .track import Track
+
+ANGLES = ("tilt", "turn")
+"""Entries of a chart that are radians; all others are lengths."""
+
+
+class Form(NamedTuple):
+    """What makes a kind; ``phrase`` has places for ``centre``, ``axis``, ``radius`` and ``pitch``."""
+
+    kind: str
+    phrase: str
+    chart: tuple[str, ...]
+    blocks: tuple[int, ...]
+    """Columns of residuals that have one noise level: of the positions, then of what ties orientations to them."""
+    straight: type[Mechanism] | None = None
+    """The kind that it is where it does not bend."""
+    directions: tuple[str, ...] = ()
+    """Names of the rows of A, where these turn with the movement."""
+    ties: bool = False
+    """Whether orientations are held, too."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Mechanism(Shown):
+    """A kind of constraint on positions. Called as constraints are, it returns A(x).
+
+    Parameters
+    ----------
+    centre : ndarray, shape (D,)
+        The centre, or the point of an axis or a plane that is near the recording.
+    frame : ndarray, shape (D, D)
+        Orthonormal rows, right-handed, the axis first.
+    radius : float
+    pitch : float
+        Advance along the axis for each radian.
+    orientation : ndarray, shape (4,)
+        That of the tool where the angle about the axis is zero, for kinds that tie it.
+    covariance : ndarray, shape (k, k), or None
+        Of the changes that the chart lists.
+    quantile : float
+        Standard errors in half of a 95 % interval.
+    """
+
+    form: ClassVar[Form]
+
+    centre: Array
+    frame: Array
+    radius: float = 0.0
+    pitch: float = 0.0
+    orientation: Array = field(default_factory=lambda: IDENTITY)
+    covariance: Array | None = None
+    quantile: float = 1.96
+
+    def __call__(self, states: Array, times: Array) -> Array:
+        """Return A, shape (T, k, D): orthonormal rows, of zeros where nothing is held."""
+        return self.rows(np.asarray(states, dtype=np.float64))
+
+    def rows(self, positions: Array) -> Array:
+        """A at positions (N, D), shape (N, k, D)."""
+        raise NotImplementedError
+
+    def residuals(self, track: Track) -> Array:
+        """Geometric distances along the rows of A, then those of what ties orientations, (N, c)."""
+        raise NotImplementedError
+
+    def travel(self, track: Track) -> Array:
+        """Coordinates in which it moves freely, (N, m): lengths, or angles where orientations are tied to them."""
+        raise NotImplementedError
+
+    @classmethod
+    def starts(cls, track: Track) -> list[Self]:
+        """Where fits begin: closed forms."""
+        raise NotImplementedError
+
+    @property
+    def kind(self) -> str:
+        """Name of the kind."""
+        return self.form.kind
+
+    @property
+    def axis(self) -> Array:
+        """Direction or normal, shape (D,)."""
+        return self.frame[0]
+
+    @property
+    def sizes(self) -> list[int]:
+        """How many numbers each entry of the chart has."""
+        d = len(self.centre)
+        sizes = {"centre": d, "across": d - 1, "along": 1, "tilt": d - 1, "radius": 1, "pitch": 1, "turn": 3}
+        return [sizes[name] for name in self.form.chart]
+
+    @property
+    def count(self) -> int:
+        """How many numbers the chart has, k."""
+        return sum(self.sizes)
+
+    @property
+    def margins(self) -> dict[str, Array]:
+        """Half of the 95 % interval of each entry of the chart: lengths, or radians; empty where it was not fitted."""
+        return {} if self.covariance is None else self._named(self.quantile * np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def sentence(self) -> str:
+        """What it is, with 95 % intervals; lengths in m."""
+        sure = {name: float(np.max(values)) for name, values in self.margins.items()}
+        near = max(sure.get("centre", 0.0), sure.get("across", 0.0), sure.get("along", 0.0))
+        tilt = f" ± {np.degrees(sure['tilt']):.2g}°" if "tilt" in sure else ""
+        return self.form.phrase.format(
+            centre=_vector(self.centre, near),
+            axis=_vector(self.axis, 0.01) + tilt,
+            radius=_length(self.radius, sure.get("radius", 0.0)),
+            pitch=_length(2 * np.pi * self.pitch, 2 * np.pi * sure.get("pitch", 0.0)),
+        )
+
+    def moved(self, step: Array) -> Self:
+        """Changed by small numbers (k,) of the chart: lengths, and rotations in radians."""
+        change = self._named(step)
+        ahead, aside = change.get("along", np.zeros(1)), change.get("across", np.zeros(len(self.centre) - 1))
+        return replace(
+            self,
+            centre=self.centre + change.get("centre", 0.0) + np.concatenate([ahead, aside]) @ self.frame,
+            frame=_tilted(self.frame, change["tilt"]) if "tilt" in change else self.frame,
+            radius=self.radius + change.get("radius", np.zeros(1)).item(),
+            pitch=self.pitch + change.get("pitch", np.zeros(1)).item(),
+            orientation=product(rotation(change["turn"]), self.orientation) if "turn" in change else self.orientation,
+        )
+
+    def placed(self, scale: float, origin: Array) -> Self:
+        """In other units and about another origin: ``scale`` of theirs are one of these."""
+        units = np.repeat([1.0 if name in ANGLES else scale for name in self.form.chart], self.sizes)
+        return replace(
+            self,
+            centre=origin + scale * self.centre,
+            radius=scale * self.radius,
+            pitch=scale * self.pitch,
+            covariance=None if self.covariance is None else units[:, None] * self.covariance * units,
+        )
+
+    def cylindrical(self, positions: Array) -> tuple[Array, Array, Array]:
+        """Along the axis (N,), the unit vector away from it (N, D), the distance from it (N,)."""
+        offset = positions - self.centre
+        along = offset @ self.axis
+        outwards, distance = unit_actions(offset - along[:, None] * self.axis)
+        return along, outwards, distance
+
+    def _summary(self) -> tuple[str, ...]:
+        return (self.sentence,)
+
+    def _named(self, numbers: Array) -> dict[str, Array]:
+        ends = np.cumsum(self.sizes, dtype=np.intp)
+        return dict(zip(self.form.chart, np.split(numbers, ends)[:-1], strict=True))
+
+
+def frame_of(axis: Array) -> Array:
+    """Orthonormal rows (D, D), right-handed, the first along the axis (D,)."""
+    d = len(axis)
+    frame = np.linalg.qr(np.column_stack([axis, np.eye(d)]))[0].T
+    frame[0] *= np.sign(frame[0] @ axis)
+    frame[-1] *= np.sign(np.linalg.det(frame))
+    return frame
+
+
+def _vector(values: Array, margin: float) -> str:
+    return "(" + ", ".join(f"{value:z.{_digits(margin)}f}" for value in values) + ")"
+
+
+def _length(value: float, margin: float) -> str:
+    return f"{value:z.{_digits(margin)}f} m ± {1e3 * margin:.2g} mm"
+
+
+def _digits(margin: float) -> int:
+    """Decimals that a margin leaves."""
+    return int(np.clip(np.ceil(-np.log10(max(margin, 1e-6))), 0, 6))
+
+
+def _tilted(frame: Array, tilt: Array) -> Array:
+    """The axis turned by small angles (D - 1,) towards the other rows, by a Cayley transform: it stays orthonormal."""
+    skew = np.zeros_like(frame)
+    skew[0, 1:], skew[1:, 0] = tilt / 2, -tilt / 2
+    one = np.eye(len(frame))
+    return np.asarray(np.linalg.solve(one - skew, (one + skew) @ frame), dtype=np.float64)

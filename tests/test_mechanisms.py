@@ -1,0 +1,248 @@
+"""Mechanisms with names: found in movements, with odds and intervals that can be trusted."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import unconstrain as uc
+from recorded import DATA, needs_rim
+from unconstrain.base.errors import InvalidDataError
+from unconstrain.constraints import identify
+from unconstrain.constraints.mechanisms.kinds import Circle, Cylinder, Line, Plane, Point, Screw, Sphere
+from unconstrain.constraints.mechanisms.track import correlation_time
+from unconstrain.paper.experiments.mechanisms import FREE, KINDS, inside, mechanisms, normals, simulate, strokes
+
+AT, FRAME = np.array([0.3, -0.2, 0.5]), np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0]
+FRAME = FRAME * np.sign(np.linalg.det(FRAME))
+PLACED = {
+    kind.__name__: kind(centre=AT, frame=FRAME, radius=0.4, pitch=0.05)
+    for kind in (Point, Line, Plane, Circle, Sphere, Cylinder, Screw)
+}
+
+
+def noise(shape, seed=0, size=2e-3):
+    return size * np.random.default_rng(seed).standard_normal(shape)
+
+
+def arc(degrees, samples=400, radius=0.71, seed=0):
+    """Back and forth on a circle about (0.41, -0.12)."""
+    angle = np.radians(degrees) / 2 * np.sin(np.linspace(0, 7, samples))
+    exact = [0.41, -0.12] + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    return exact + noise(exact.shape, seed)
+
+
+@pytest.mark.parametrize("mechanism", PLACED.values(), ids=PLACED)
+def test_whoever_follows_a_mechanism_as_a_constraint_stays_on_it(mechanism):
+    start = AT + 0.4 * FRAME[1] if mechanism.radius and mechanism.kind not in ("point", "line", "plane") else AT
+    moved = uc.rollout(lambda states: np.roll(states, 1, axis=1) + 0.3, start, 300, 1e-3, mechanism)
+    held = constraint_distance(mechanism, moved.states)
+    assert held < 1e-3  # Euler steps leave what bends by their square
+    assert np.linalg.norm(moved.actions, axis=1).max() > 0 or mechanism.kind == "point"
+
+
+def constraint_distance(mechanism, positions):
+    """By hand, from the definition of each kind."""
+    offset = positions - AT
+    height, (first, second) = offset @ FRAME[0], FRAME[1:] @ offset.T
+    distance, angle = np.hypot(first, second), np.unwrap(np.arctan2(second, first))
+    apart = {
+        "point": np.linalg.norm(offset, axis=1),
+        "line": distance,
+        "plane": height,
+        "circle": np.hypot(height, distance - 0.4),
+        "sphere": np.linalg.norm(offset, axis=1) - 0.4,
+        "cylinder": distance - 0.4,
+        "screw": np.hypot(height - 0.05 * angle, distance - 0.4),
+    }
+    return np.abs(apart[mechanism.kind]).max()
+
+
+@pytest.mark.parametrize("mechanism", PLACED.values(), ids=PLACED)
+def test_rows_are_orthonormal_and_as_many_as_the_dimensions_that_are_lost(mechanism):
+    rows = mechanism(AT + noise((5, 3), size=1.0), np.zeros(5))
+    lost = {"point": 3, "line": 2, "plane": 1, "circle": 2, "sphere": 1, "cylinder": 1, "screw": 2}[mechanism.kind]
+    assert_allclose(rows @ rows.swapaxes(1, 2), np.broadcast_to(np.eye(lost), (5, lost, lost)), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_simulated_mechanism_is_found_and_most_parameters_are_inside_their_intervals(name):
+    simulated = simulate(np.random.default_rng([11, list(KINDS).index(name)]), KINDS[name])
+    found = identify(simulated.positions, simulated.orientations)
+    assert found.kind == KINDS[name].name
+    assert found.odds > 3
+    kept = list(inside(found.mechanism, simulated))
+    assert sum(kept) >= len(kept) - 2
+
+
+def test_a_free_movement_is_not_called_a_mechanism_with_confidence():
+    for seed in range(2):
+        found = identify(simulate(np.random.default_rng([12, seed]), FREE).positions)
+        assert found.kind == "free" or not found.decided
+
+
+def test_the_verdict_is_a_sentence_with_centre_radius_and_odds():
+    found = identify(arc(110))
+    assert found.kind == "circle"
+    assert_allclose(found.mechanism.radius, 0.71, atol=found.mechanism.margins["radius"][0])
+    assert found.sentence.startswith("a circle (hinge) about (0.41")
+    assert "against a line more than 10000:1" in found.sentence or "against nothing held" in found.sentence
+
+
+def test_the_interval_of_a_radius_is_that_of_least_squares():
+    """The covariance of centre and radius on a whole circle, by hand: σ²/n diag(2, 2, 1)."""
+    found = identify(arc(360, samples=2000))
+    widths = np.r_[found.mechanism.margins["centre"], found.mechanism.margins["radius"]]
+    angle = np.pi * np.sin(np.linspace(0, 7, 2000))
+    design = np.column_stack([np.cos(angle), np.sin(angle), np.ones(2000)])
+    expected = 1.96 * 2e-3 * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
+    assert_allclose(widths, expected, rtol=0.1)
+
+
+def test_a_short_arc_against_a_line_is_undecided_and_says_so():
+    found = identify(arc(3, samples=100))
+    assert {one.kind for one in found.candidates[:2]} == {"circle", "line"}
+    assert not found.decided
+    assert found.sentence.startswith("undecided: ")
+    assert identify(arc(40, samples=100)).decided
+
+
+def test_confidence_is_deserved():
+    """Of arcs from nothing to 25 degrees hardly one is called a line with confidence."""
+    wrong = confident = 0
+    for seed in range(20):
+        found = identify(arc(1.0 + 1.2 * seed, samples=60 + 20 * seed, radius=0.3, seed=seed))
+        confident += found.decided
+        wrong += found.decided and found.kind != "circle"
+    assert wrong <= 1
+    assert confident >= 8
+
+
+def test_place_direction_and_unit_change_nothing_but_themselves():
+    simulated = simulate(np.random.default_rng([11, 3]), KINDS["circle"])
+    found, turned = identify(simulated.positions), identify(7.0 * simulated.positions @ FRAME.T + [100.0, 0.0, -3.0])
+    assert turned.kind == found.kind
+    assert_allclose(np.log(turned.odds), np.log(found.odds), rtol=1e-3)
+    assert_allclose(turned.mechanism.centre, 7.0 * FRAME @ found.mechanism.centre + [100.0, 0.0, -3.0], atol=1e-4)
+    assert_allclose(abs(turned.mechanism.axis @ FRAME @ found.mechanism.axis), 1.0, atol=1e-6)
+    assert_allclose(turned.mechanism.margins["radius"], 7.0 * found.mechanism.margins["radius"], rtol=1e-2)
+
+
+def test_neighbours_that_are_copies_count_once():
+    once, copied = identify(arc(90)), identify(np.repeat(arc(90), 6, axis=0))
+    assert_allclose(copied.effective_samples, once.effective_samples, rtol=0.3)
+    assert_allclose(copied.mechanism.margins["radius"], once.mechanism.margins["radius"], rtol=0.3)
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.5, 0.9])
+def test_the_correlation_time_of_a_first_order_process_is_the_known_one(kept):
+    values, shocks = np.zeros((20000, 2)), noise((20000, 2), size=1.0)
+    for row in range(1, 20000):
+        values[row] = kept * values[row - 1] + shocks[row]
+    assert_allclose(correlation_time(values, np.zeros(20000, dtype=int)), (1 + kept) / (1 - kept), rtol=0.15)
+
+
+def test_exact_movements_are_found_exactly():
+    angle = np.linspace(0, 2, 50)
+    found = identify(np.column_stack([0.2 * np.cos(angle), 0.2 * np.sin(angle), np.full(50, 0.3)]))
+    assert found.kind == "circle"
+    assert_allclose(found.mechanism.centre, [0, 0, 0.3], atol=1e-6)
+    assert found.candidates[0].noise < 1e-6
+
+
+def test_an_exact_line_is_no_screw_without_a_radius():
+    assert identify(np.arange(30.0)[:, None] * [1.0, 0.0, 0.0]).kind == "line"
+
+
+def demonstrations(count, tilt):
+    """Wiping on planes that are tilted more and more."""
+    u, rows = np.linspace(0, 9, 40), []
+    for k in range(count):
+        flat = np.column_stack([0.1 * np.cos(3 * u), 0.12 * np.sin(2 * u), np.zeros(40)])
+        c, s = np.cos(tilt * k), np.sin(tilt * k)
+        rows.append(flat @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]]) + [0, 0, tilt * k])
+    positions = np.concatenate(rows)
+    return positions + noise(positions.shape, size=1e-3), np.repeat(np.arange(count), 40)
+
+
+def test_demonstrations_share_a_mechanism_or_have_one_each_as_the_data_say():
+    same, groups = demonstrations(2, tilt=0.0)
+    found = identify(same, groups=groups)
+    assert (found.kind, len(found.candidates[0].mechanisms)) == ("plane", 1)
+    other, _ = demonstrations(2, tilt=0.3)
+    found = identify(other, groups=groups)
+    assert (found.kind, len(found.candidates[0].mechanisms)) == ("plane", 2)
+    for k, mechanism in enumerate(found.candidates[0].mechanisms):
+        assert_allclose(abs(mechanism.axis), np.abs([0, -np.sin(0.3 * k), np.cos(0.3 * k)]), atol=5e-3)
+    assert found.sentence.startswith("one for each of 2 demonstrations: a plane through")
+
+
+def test_the_order_of_demonstrations_changes_nothing():
+    positions, groups = demonstrations(2, tilt=0.0)
+    mixed = np.argsort(-groups, kind="stable")
+    first, second = identify(positions, groups=groups), identify(positions[mixed], groups=groups[mixed])
+    assert_allclose(second.candidates[0].log_evidence, first.candidates[0].log_evidence, rtol=1e-6)
+
+
+def straight_stroke(sideways):
+    """Along x on a table, with 10 N on it, friction of 3 N, and a side that is pushed against or not."""
+    along = 0.2 * strokes(np.random.default_rng(5), 200, 1)[:, 0]
+    positions = np.column_stack([along, np.zeros(200), np.zeros(200)])
+    force = np.column_stack([-3 * np.sign(np.gradient(along)), sideways * np.sin(20 * along), np.full(200, 10.0)])
+    return positions + noise(positions.shape), force + noise(force.shape, 1, 0.05)
+
+
+def test_forces_tell_what_is_held_from_what_nobody_wanted():
+    on_a_table = identify(*straight_stroke(0.0)[:1], forces=straight_stroke(0.0)[1])
+    assert on_a_table.kind == "line"
+    assert [one.held for one in on_a_table.witnesses] == [True, False]
+    assert "undetermined along (0.00, " in on_a_table.sentence
+    in_a_slot = identify(*straight_stroke(6.0)[:1], forces=straight_stroke(6.0)[1])
+    assert [one.held for one in in_a_slot.witnesses] == [True, True]
+
+
+def test_friction_is_no_witness():
+    positions, force = straight_stroke(0.0)
+    force[:, 2] = 0.0
+    found = identify(positions, forces=force)
+    assert not any(one.held for one in found.witnesses)
+
+
+def test_a_hinge_turns_its_tool_and_a_circle_does_not():
+    angle = 1.2 * np.sin(np.linspace(0, 6, 60))
+    positions = np.column_stack([0.3 * np.cos(angle), 0.3 * np.sin(angle), np.zeros(60)]) + noise((60, 3), seed=2)
+    turning = np.column_stack([np.zeros((60, 2)), np.sin(angle / 2), np.cos(angle / 2)]) + noise((60, 4), seed=1)
+    still = np.array([0.0, 0.0, 0.0, 1.0]) + noise((60, 4), seed=1)
+    assert identify(positions, turning).kind == "hinge"
+    assert identify(positions, -turning).kind == "hinge"
+    assert identify(positions, still).kind == "circle"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ({"positions": np.zeros((20, 4))}, "positions: got 4 columns, expected two or three"),
+        ({"positions": np.zeros((9, 3))}, "a demonstration of 9 samples, expected at least 10 of each"),
+        ({"positions": np.ones((20, 3))}, "positions: all rows are the same"),
+        ({"positions": noise((20, 3)), "forces": np.zeros((19, 3))}, r"forces: got an array of shape \(19, 3\)"),
+        ({"positions": noise((20, 3)), "orientations": np.zeros((20, 4))}, "quaternions that are not zero"),
+        ({"positions": noise((20, 2)), "orientations": np.ones((20, 4))}, "beside positions in space"),
+    ],
+)
+def test_what_does_not_fit_is_refused(arguments, sentence):
+    with pytest.raises(InvalidDataError, match=sentence):
+        identify(**arguments)
+
+
+@needs_rim
+def test_the_flat_rim_is_a_plane_across_the_tools_axis(monkeypatch):
+    monkeypatch.setenv("UNCONSTRAIN_DATA", str(DATA))
+    flat = [row for row in normals(rate=4.0) if row["bout"].startswith("A")]
+    assert max(row["angle"] for row in flat) < 3
+
+
+@pytest.mark.slow
+def test_two_hundred_mechanisms():
+    *_, row = mechanisms(200, seed=101)[0]
+    assert row["right"] >= 0.90
+    assert 0.88 <= row["inside"] <= 0.99
+    assert row["confident_and_wrong"] <= 0.02 * row["confident"]
