@@ -909,7 +909,7 @@ def test_reproduce_writes_numbers_and_a_page(table1_of_two):
     found = json.loads(text)
     assert found["settings"]["trials"] == 2
     assert found["settings"]["seed"] == 0
-    assert len(found["rows"]) == 6
+    assert len(found["rows"]) == 8
     assert "<html" in (out / "table1.html").read_text(encoding="utf-8")
 
 
@@ -917,15 +917,15 @@ def test_reproduce_prints_a_table_for_80_columns(table1_of_two):
     _, said, _ = table1_of_two
     lines = said.splitlines()
     assert lines[0].split() == ["method", "constr.", "nUPE", "nCPE", "norm.", "incon."]
-    assert [line.split()[:2] for line in lines[1:7]] == [
-        [method, data] for method in ("direct", "inconsistency", "hybrid") for data in ("none", "random")
+    assert [line.split()[:2] for line in lines[1:9]] == [
+        [method, data] for method in ("direct", "inconsistency", "hybrid", "truncated") for data in ("none", "random")
     ]
-    assert max(map(len, lines[:7])) <= 80
+    assert max(map(len, lines[:9])) <= 80
 
 
 def test_the_printed_means_are_those_in_the_file(table1_of_two):
     text, said, _ = table1_of_two
-    for line, row in zip(said.splitlines()[1:7], json.loads(text)["rows"], strict=True):
+    for line, row in zip(said.splitlines()[1:9], json.loads(text)["rows"], strict=True):
         assert float(line.split()[2]) == pytest.approx(row["nupe_mean"], rel=0.05)
         assert line.split()[3] == "±"
 

@@ -132,6 +132,55 @@ def test_the_area_is_the_statistic_of_mann_and_whitney():
         assert regimes.area_under_curve(scores, labels) == pytest.approx(area, abs=1e-12)
 
 
+@pytest.fixture
+def both(monkeypatch):
+    """A result with the arm, from made-up figures: the learner that knows its Jacobian has a tenth of the others'."""
+
+    def made_up(settings, system, constraint, seed):
+        methods = sorted(METHODS) + ([regimes.JACOBIAN] if system == "arm" else [])
+        drawn = np.random.default_rng(seed).uniform(1.0, 2.0, (len(methods), 5)) * [
+            [0.1 if one == regimes.JACOBIAN else 1.0] for one in methods
+        ]
+        return [dict(zip(methods, map(tuple, drawn.tolist()), strict=True)) for _ in settings.noise]
+
+    monkeypatch.setattr(regimes, "trial", made_up)
+    return regimes.run(regimes.Settings(trials=3, only=("arm, 1", "arm, 1-2-3", "pendulum, none"), noise=(0.0, 0.05)))
+
+
+def test_who_knows_the_jacobian_is_in_a_table_of_its_own_and_in_no_comparison(both):
+    known = both.tables["jacobian_known"]
+    assert [(row["system"], row["constraint"], row["noise"]) for row in known] == [
+        ("arm", held, noise) for held in ("1", "1-2-3") for noise in (0.0, 0.05)
+    ]
+    assert {row["method"] for row in known} == {regimes.JACOBIAN}
+    assert max(row["nupe_median"] for row in known) <= 0.2
+    assert {row["method"] for row in both.rows} == {one["method"] for one in both.tables["summary"]} == METHODS
+    said = [line for line in regimes.headlines(both) if line.startswith(f"{regimes.JACOBIAN}, arm, ")]
+    assert len(said) == len(known)
+    assert f"{100 * known[0]['nupe_median']:.4f}e-2" in said[0]
+
+
+def test_the_page_shows_it_apart(both, result):
+    cells = [html.number(100.0 * row["nupe_median"]) for row in both.tables["jacobian_known"]]
+    before, _, after = report.page(both).partition("With the kinematics known")
+    assert all(f"<td>{cell}</td>" in after and f"<td>{cell}</td>" not in before for cell in cells)
+    assert result.tables["jacobian_known"] == []  # nothing in the plane has kinematics
+    assert "have no kinematics to know" in report.page(result)
+
+
+@pytest.mark.slow
+def test_the_arms_policy_is_better_known_with_its_jacobian():
+    [found] = regimes.trial(regimes.Settings(noise=(0.05,)), "arm", "1-2-3", np.random.SeedSequence(7001))
+    assert found[regimes.JACOBIAN][0] < 0.6 * found[regimes.DEFAULT][0]
+
+
+def test_noise_is_on_actions_and_states_are_those_of_the_roll_out():
+    training, _ = regimes.demonstrate("pendulum", "random", np.random.default_rng(0))
+    for noisy, exact in zip(regimes.with_noise(training, 0.1, np.random.default_rng(1)), training, strict=True):
+        assert (noisy.states == exact.states).all()
+        assert (noisy.actions != exact.actions).all()
+
+
 def test_the_table_prints_what_is_not_known_as_a_dash(result, capsys):
     print_table(*commands.summary(result))
     assert capsys.readouterr().out.count("oracle") >= 4

@@ -118,9 +118,9 @@ def deliver(result: Result, headlines: Sequence[str], out: str, table: Table) ->
 
 
 def summary(result: Result) -> tuple[list[str], list[list[str]]]:
-    """Head and rows without the paper's values, which stay in the files: mean and s.d. fill a terminal's 80 columns."""
+    """Head and rows: mean and s.d. fill a terminal's 80 columns; medians and the paper's values stay in the files."""
     first = result.rows[0]
-    kept = [name for name in first if not name.startswith("paper_") and not name.endswith("_sd")]
+    kept = [name for name in first if not name.startswith("paper_") and not name.endswith(("_sd", "_median"))]
     names = [short if f"{short}_sd" in first else name for name in kept for short in [name.removesuffix("_mean")]]
     rows = [
         [_cell(row[name]) if name in row else f"{row[f'{name}_mean']:.2g} ± {row[f'{name}_sd']:.2g}" for name in names]

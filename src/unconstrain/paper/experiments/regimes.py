@@ -1,4 +1,8 @@
-"""Every learner in every regime of constraints and noise, beside an oracle."""
+"""Every learner in every regime of constraints and noise, beside an oracle.
+
+Noise is added to recorded actions alone: states are those of the roll-out, so their differences in time are the
+actions without noise. No learner that is judged here may take differences of states.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +33,7 @@ from ..systems.limit_cycle import LimitCycle
 from ..systems.pendulum import Pendulum
 from . import toy
 from .journal import Journal
-from .trials import Progress, Result, row, run_trials
+from .trials import Progress, Result, errors_of, row, run_trials
 from .truths import true_policy, true_projections, was_free, with_noise
 
 PLANAR = ("none", "random", "half", "quarter free", "0.1", "0.3", "0.6", "1", "1.5")
@@ -47,9 +51,13 @@ ORACLE = "oracle"
 KNOWN = "constraints known"
 """What could be learnt if every sample's constraint were known, and a ridge chosen by the truth."""
 
+JACOBIAN = "Jacobian known"
+"""The default learner with the Jacobian of the arm's hand, though not which of its rows are held; has its own table."""
+
 _SOFTNESSES = tuple(np.logspace(-9, 0, 10).tolist())
 _HELD = {"1": 1, "1-2-3": 3, "half": 3, "1-...-5": 5, "1-...-6": 6}
 _SYSTEMS: dict[str, Callable[[Array], Array]] = {"limit cycle": LimitCycle(), "pendulum": Pendulum()}
+_JACOBIANS: dict[str, Callable[[Array], Array]] = {"arm": LWR3.jacobian}
 
 
 @dataclass(frozen=True)
@@ -62,7 +70,7 @@ class Settings:
         Data sets of each regime, and what draws them. Everything was developed on other seeds.
     noise : tuple of float
         Standard deviation of the noise on each action coordinate, as a share of the root-mean-square spread of the
-        policy over its coordinates.
+        policy over its coordinates. States are exact.
     alpha : float
         Of the paper's hybrid.
     thresholds : int
@@ -87,19 +95,22 @@ def run(
 
     Rows are as those of Table I, with ``system``, ``constraint``, ``noise``,
     the geometric mean of nUPE over the trials and its ratio to the oracle's;
-    ``tables["summary"]`` has one row for each method and noise.
+    ``tables["summary"]`` has one row for each method and noise, and
+    ``tables["jacobian_known"]`` the arm's rows of the learner that knows its
+    Jacobian, which is compared with none that knows less.
     """
     chosen = settings or Settings()
     regimes = _regimes(chosen.only)
     seeds = np.random.SeedSequence(chosen.seed).spawn(chosen.trials)
     calls = [(chosen, *regime, seed) for seed in seeds for regime in regimes]
     found = run_trials(trial, calls, workers, progress, journal)
-    rows = []
+    every = []
     for index, (system, constraint) in enumerate(regimes):
         of_regime = found[index :: len(regimes)]
         for place, noise in enumerate(chosen.noise):
-            rows += _rows([one[place] for one in of_regime], system=system, constraint=constraint, noise=noise)
-    return Result("regimes", chosen, rows, tables={"summary": _summary(rows, chosen)})
+            every += _rows([one[place] for one in of_regime], system=system, constraint=constraint, noise=noise)
+    known, rows = ([one for one in every if (one["method"] == JACOBIAN) == apart] for apart in (True, False))
+    return Result("regimes", chosen, rows, tables={"summary": _summary(rows, chosen), "jacobian_known": known})
 
 
 def _regimes(only: Sequence[str]) -> list[tuple[str, str]]:
@@ -135,8 +146,11 @@ def trial(
             "noise-corrected": policy.with_learner(uc.NoiseCorrected()),
             "likelihood": policy.with_learner(uc.Likelihood()),
         }
-        of_noise: dict[str, tuple[float, ...]] = {method: _errors(one, test) for method, one in learnt.items()}
-        of_noise[DEFAULT] = (*_errors(policy, test), *_knowledge(policy, noisy, test))
+        of_noise: dict[str, tuple[float, ...]] = {method: errors_of(one, test) for method, one in learnt.items()}
+        of_noise[DEFAULT] = (*errors_of(policy, test), *_knowledge(policy, noisy, test))
+        if system in _JACOBIANS:
+            knowing = policy.with_learner(uc.Robust(jacobian=_JACOBIANS[system]))
+            of_noise[JACOBIAN] = (*errors_of(knowing, test), *_knowledge(knowing, noisy, test))
         of_noise[ORACLE] = _oracle(policy, test, settings.thresholds)
         of_noise[KNOWN] = _knowing(policy, noisy, test)
         found.append(of_noise)
@@ -186,6 +200,11 @@ def headlines(result: Result) -> list[str]:
                 f"{one['system']}, {one['constraint']}, noise {one['noise']:.0%}: nUPE {mean} (mean, standard error "
                 f"{error}; geometric mean {geometric}){told}"
             )
+    said += [
+        f"{JACOBIAN}, {one['system']}, {one['constraint']}, noise {one['noise']:.0%}: nUPE "
+        f"{100 * one['nupe_mean']:.4f}e-2 (mean; median {100 * one['nupe_median']:.4f}e-2)"
+        for one in result.tables["jacobian_known"]
+    ]
     covered = [
         one["coverage_mean"] for one in result.rows if one["method"] == DEFAULT and one["coverage_mean"] is not None
     ]
@@ -235,10 +254,6 @@ def _summary(rows: Sequence[dict[str, Any]], settings: Settings) -> list[dict[st
                 }
             )
     return said
-
-
-def _errors(policy: uc.Policy, test: Sequence[uc.Demonstration]) -> tuple[float, float, float]:
-    return uc.nupe(policy, test), uc.ncpe(policy, test), uc.ninconsistency(policy, test)
 
 
 def _knowledge(
@@ -316,7 +331,7 @@ def _best(policy: uc.Policy, test: Sequence[uc.Demonstration], found: Sequence[A
         if missed < least:
             best, least = judged.solution_, missed
     judged.solution_ = best
-    return _errors(judged, test)
+    return errors_of(judged, test)
 
 
 def _policy(system: str) -> uc.Policy:

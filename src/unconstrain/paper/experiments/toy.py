@@ -72,11 +72,12 @@ def random_lines(settings: ToySettings, rng: np.random.Generator) -> uc.constrai
     return uc.constraints.SwitchingLine.random(rng, settings.steps * settings.dt, settings.switches)
 
 
-def policy_aligned(widest: float) -> Draw:
-    """Eq. 20 with θ uniform in [−widest, widest]."""
+def policy_aligned(widest: float, angles: int | None = None) -> Draw:
+    """Eq. 20 with θ uniform in [−widest, widest], drawn for each step, or for the first ``angles`` of them."""
 
     def draw(settings: ToySettings, rng: np.random.Generator) -> uc.constraints.PolicyAligned:
-        return uc.constraints.PolicyAligned.random(rng, settings.system, widest, settings.steps, settings.dt)
+        drawn = settings.steps if angles is None else angles
+        return uc.constraints.PolicyAligned.random(rng, settings.system, widest, drawn, settings.dt)
 
     return draw
 

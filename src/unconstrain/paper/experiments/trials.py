@@ -103,20 +103,21 @@ def errors(
     policy: uc.Policy, learners: Mapping[str, uc.Learner], demonstrations: Sequence[uc.Demonstration]
 ) -> dict[str, tuple[float, ...]]:
     """The three normalised errors of each learner, from one set of moments."""
-    found = {}
-    for name, learner in learners.items():
-        learnt = policy.with_learner(learner)
-        found[name] = tuple(metric(learnt, demonstrations) for metric in (uc.nupe, uc.ncpe, uc.ninconsistency))
-    return found
+    return {name: errors_of(policy.with_learner(learner), demonstrations) for name, learner in learners.items()}
+
+
+def errors_of(policy: uc.Policy, demonstrations: Sequence[uc.Demonstration]) -> tuple[float, float, float]:
+    """The three normalised errors of a policy, in the order of :data:`METRICS`."""
+    return uc.nupe(policy, demonstrations), uc.ncpe(policy, demonstrations), uc.ninconsistency(policy, demonstrations)
 
 
 def row(method: str, values: Sequence[Sequence[float]], **where: Any) -> dict[str, Any]:
-    """Mean and standard deviation over trials of the three errors, as one row of a table."""
+    """Mean, standard deviation and median over trials of the three errors, as one row of a table."""
     table = np.asarray(values, dtype=np.float64)
     spread = table.std(axis=0, ddof=1) if len(table) > 1 else np.zeros(table.shape[1])
     result: dict[str, Any] = {"method": method, **where}
-    for metric, mean, sd in zip(METRICS, table.mean(axis=0), spread, strict=True):
-        result |= {f"{metric}_mean": float(mean), f"{metric}_sd": float(sd)}
+    for metric, mean, sd, median in zip(METRICS, table.mean(axis=0), spread, np.median(table, axis=0), strict=True):
+        result |= {f"{metric}_mean": float(mean), f"{metric}_sd": float(sd), f"{metric}_median": float(median)}
     return result
 
 

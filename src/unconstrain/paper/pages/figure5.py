@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ...base.arrays import Array
@@ -18,23 +20,29 @@ ANGLE = "how far constraints vary, θ<sub>max</sub> (rad)"
 def page(result: Result) -> str:
     """Errors against how much the constraints vary."""
     widest = np.array(sorted({row["theta_max"] for row in result.rows}))
-    rows = sorted(result.rows, key=lambda row: row["theta_max"])
-    curves = {metric: table1.curves(rows, metric) for metric in TITLES}
+    per_step, per_trajectory = (_curves(rows) for rows in (result.rows, result.tables["per_trajectory"]))
     return html.document(
         "Figure 5: from one constraint to many",
         html.markup(
             "Movement is allowed only along the policy turned by a random angle of at most θ<sub>max</sub>. At 0 the "
             "recordings are the policy itself; to the right the constraint takes away more, and differently at each "
-            "sample. Direct learning is good at the left and gets worse steadily; inconsistency alone is the other way "
-            "round. The hybrid has to follow the lower of the two without being told where on this axis the data lies. "
-            "<b>nUPE</b> is the error of the learnt policy where it is free, <b>nCPE</b> after the constraint has "
-            "taken its share, both as a share of the policy’s variance."
+            "sample (the paper does not say how often it draws the angle; at the end of the page it is drawn once for "
+            "each trajectory). Direct learning is good at the left and gets worse steadily; inconsistency alone is the "
+            "other way round. The hybrid has to follow the lower of the two without being told where on this axis the "
+            "data lies. <b>nUPE</b> is the error of the learnt policy where it is free, <b>nCPE</b> after the "
+            "constraint has taken its share, both as a share of the policy’s variance."
         ),
-        html.section("Errors", _errors(widest, curves)),
+        html.section("Errors", _errors(widest, per_step)),
         html.section("The hybrid against the better of the other two", _ratio(widest, result)),
-        html.section("Numbers", _table(widest, curves, result)),
+        html.section("Numbers", _table(widest, per_step, result)),
+        html.section("Numbers with one angle for each trajectory", _table(widest, per_trajectory, result)),
         html.settings_table(result.settings),
     )
+
+
+def _curves(rows: list[dict[str, Any]]) -> dict[str, table1.Curves]:
+    ordered = sorted(rows, key=lambda row: row["theta_max"])
+    return {metric: table1.curves(ordered, metric) for metric in TITLES}
 
 
 def _errors(widest: Array, curves: dict[str, table1.Curves]) -> html.Markup:
@@ -56,7 +64,7 @@ def _errors(widest: Array, curves: dict[str, table1.Curves]) -> html.Markup:
 
 
 def _ratio(widest: Array, result: Result) -> html.Markup:
-    found = {title: figure5.ratios(result, metric) for metric, title in TITLES.items()}
+    found = {title: figure5.ratios(result.rows, metric) for metric, title in TITLES.items()}
     made = charts.ratios(
         widest,
         {title: np.array([by_angle[angle] for angle in widest]) for title, by_angle in found.items()},

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...pages import html
-from ..experiments.regimes import DEFAULT, KNOWN, ORACLE, PAPER
+from ..experiments.regimes import DEFAULT, JACOBIAN, KNOWN, ORACLE, PAPER
 from ..experiments.trials import Result
 from ..figures import charts
 from . import parts
@@ -26,13 +26,15 @@ def page(result: Result) -> str:
             "random, with and without noise on the recorded actions. Every learner sees the same recordings. The "
             "<b>oracle</b> sees the truth as well, and takes with it the best point on the paper’s path between "
             "consistency and risk. With <b>{known}</b>, every sample’s projection is given, and a ridge chosen by the "
-            "truth. What counts is <b>nUPE</b>, how far the learnt policy is from the true one where nothing holds it "
+            "truth. Noise is added to actions, not to states: no learner here may take differences of states. "
+            "What counts is <b>nUPE</b>, how far the learnt policy is from the true one where nothing holds it "
             "back. {said}"
         ).format(systems=systems, known=KNOWN, said=_said(result)),
         html.section("Summary", _summary(result)),
         html.section("Regime by regime", *(_cells(result, noise, index) for index, noise in enumerate(noises))),
         html.section("What they know of their data", _knowledge(result)),
-        html.section("All numbers", _rows(result)),
+        html.section("With the kinematics known", *_kinematics(result)),
+        html.section("All numbers", html.folded(f"{len(result.rows)} rows", _table(result.rows, result))),
         html.settings_table(result.settings),
     )
 
@@ -128,11 +130,24 @@ def _range(rows: list[dict[str, Any]], key: str) -> list[str]:
     return [html.number(float(np.mean(known))), html.number(min(known))] if known else ["–", "–"]
 
 
-def _rows(result: Result) -> html.Markup:
-    header = ["system", "constraint", "noise", "method", "nUPE", "nUPE, geom.", "/ oracle", "nCPE", "norm. incon."]
+def _kinematics(result: Result) -> list[html.Markup]:
+    """What the default learner makes of the arm's Jacobian."""
+    rows = result.tables["jacobian_known"]
+    if not rows:
+        return [html.paragraph("No arm is among these systems; those in the plane have no kinematics to know.")]
+    text = (
+        f"“{JACOBIAN}” is the learner “{DEFAULT}” that is told the Jacobian of the arm’s hand, and finds by itself "
+        "which rows are held, in which demonstrations. It knows more than all learners above and is compared with none."
+    )
+    return [html.paragraph(text), _table(rows, result)]
+
+
+def _table(given: list[dict[str, Any]], result: Result) -> html.Markup:
+    """All figures of some rows."""
+    header = ["system", "constraint", "noise", "method", "nUPE", "median", "geom.", "/ oracle", "nCPE", "norm. incon."]
     header += ["area", "coverage"]
     rows, rules, before = [], [], None
-    for row in result.rows:
+    for row in given:
         where = (row["system"], row["constraint"], row["noise"])
         if before is not None and where != before:
             rules.append(len(rows))
@@ -144,6 +159,7 @@ def _rows(result: Result) -> html.Markup:
                 f"{row['noise']:.0%}",
                 row["method"],
                 parts.mean_sd(row["nupe_mean"], row["nupe_sd"]),
+                html.number(100.0 * row["nupe_median"]),
                 html.number(100.0 * row["nupe_geometric"]),
                 html.number(row["to_oracle"]),
                 parts.mean_sd(row["ncpe_mean"], row["ncpe_sd"]),
@@ -152,6 +168,8 @@ def _rows(result: Result) -> html.Markup:
                 html.number(row["coverage_mean"]),
             ]
         )
-    note = f"Mean ± standard deviation over {getattr(result.settings, 'trials', 1)} data sets; errors × 10⁻²."
-    table = html.table(header, rows, left=4, note=note, rules=rules)
-    return html.folded(f"{len(rows)} rows", table)
+    note = (
+        f"Mean ± standard deviation over {getattr(result.settings, 'trials', 1)} data sets; errors × 10⁻². The median "
+    )
+    note += "and the geometric mean are of nUPE."
+    return html.table(header, rows, left=4, note=note, rules=rules)
