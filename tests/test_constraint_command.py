@@ -171,6 +171,18 @@ def test_one_constraint_at_a_time_and_of_the_right_size(folder, tmp_path):
     assert "flat.npz: holds 2 actions at 2 states, expected 3 at 3." in said
 
 
+def test_what_is_decided_is_said_and_nothing_to_learn_from_is_refused(folder, tmp_path):
+    nothing = ("constraint", folder / "wipe_0.csv", "--leave-out", "wipe_0", "-o", tmp_path / "none.npz")
+    assert "got no recording, expected at least one" in refused(*nothing)
+    time, columns = 0.02 * np.arange(201), ("a", "b", "a_next", "b_next")
+    states = np.degrees(np.column_stack([np.sin(time), 0.5 * np.sin(time)]))
+    write(tmp_path / "to.csv", ",".join(("t", *columns)), [time[:-1], states[:-1], states[1:]])
+    columns = ("--state", "a,b", "--action", "a_next,b_next", "--degrees", ",".join(columns))
+    result = call("constraint", tmp_path / "to.csv", *columns, "--features", "constant", "-o", tmp_path / "to.npz")
+    assert "are the states to come, so the velocity of the states is learnt" in result.stderr
+    assert "1 of 2 directions held" in result.stdout
+
+
 def test_its_page_draws_held_directions_where_states_are(folder):
     page = (folder / "plate.html").read_text()
     assert "1 of 3" in page
@@ -180,3 +192,19 @@ def test_its_page_draws_held_directions_where_states_are(folder):
     page = constraint_page(uc.LearntConstraint().fit(states, demo.actions), [demo], "flat")
     assert "What the data does not tell" in page
     assert "a free policy that is a function of the state looks the same" in page
+
+
+def test_it_names_the_mechanism_of_a_door(tmp_path):
+    for number in range(3):
+        angle = 0.3 + 0.1 * number + 0.6 * (1 - np.cos(np.linspace(0, np.pi, 120)))
+        noise = 1e-3 * np.random.default_rng(number).normal(size=(120, 2))
+        hand = np.column_stack([0.41 + 0.71 * np.cos(angle), -0.12 + 0.71 * np.sin(angle)]) + noise
+        table = np.column_stack([np.linspace(0, 3, 120), hand])
+        np.savetxt(tmp_path / f"door_{number}.csv", table, delimiter=",", header="t,x,y", comments="")
+    paths, page = sorted(tmp_path.glob("*.csv")), tmp_path / "door.html"
+    said = run("constraint", *paths, "-o", tmp_path / "door.npz", "--report", page)
+    [line] = [line for line in said.splitlines() if line.startswith("Mechanism")]
+    assert "a circle (hinge) about (0.41" in line
+    assert "radius 0.71" in line
+    assert "The mechanism" in page.read_text()
+    assert "radius 0.71" in page.read_text()

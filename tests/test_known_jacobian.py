@@ -110,11 +110,30 @@ def test_where_the_jacobian_explains_nothing_the_result_is_as_without(case, one_
     assert error(known) < 1.01 * error(without)
 
 
+def test_a_jacobian_is_in_the_units_of_the_data_whatever_the_scale(one_row):
+    units = np.array([180.0, 180.0, 1.0]) / np.pi  # two joints in degrees
+    demos = [uc.Demonstration(one.states * units, one.actions * units, one.times) for one in one_row]
+    policy = uc.LocallyLinearPolicy(learner=uc.Robust(jacobian=lambda q: planar(q / units) / units), scale=units)
+    policy.fit_demonstrations(demos)
+    plain, states = learnt(one_row, planar), one_row[0].states
+    assert policy.solution_.method == plain.solution_.method
+    assert_allclose(policy(states * units) / units, plain(states), atol=1e-6)
+
+
+def test_a_demonstration_too_short_to_be_looked_at_is_of_no_kind(one_row):
+    short = [one_row[0][:39], *one_row[1:9], one_row[9][:1]]  # of all rows, every second is looked at
+    states, actions, groups = uc.stack(short)
+    kinds = HeldRows(actions, planar(states), groups, 1e-4).kinds(0.02)
+    assert kinds.labels.tolist() == [0] * 9 + [UNKNOWN]
+
+
 def test_a_jacobian_of_another_shape_is_refused(one_row):
     with pytest.raises(
         uc.errors.InvalidDataError, match=r"jacobian: got an array of shape \(\d+, 3\), expected \(\d+, rows, 3"
     ):
         learnt(one_row, lambda states: states)
+    with pytest.raises(uc.errors.InvalidDataError, match=r"jacobian: got an array of shape \(\d+, 0, 3\)"):
+        learnt(one_row, lambda states: planar(states)[:, :0])
     with pytest.raises(uc.errors.InvalidDataError, match="jacobian: found NaN"):
         learnt(one_row, lambda states: np.full((len(states), 1, 3), np.nan))
 

@@ -478,6 +478,10 @@ def test_a_scale_cures_mixed_units():
     policy = uc.ParametricPolicy(uc.Affine(), uc.Hybrid(), scale=(1000, 1))
     mixed = given(lambda x: x * [1000, 1], lambda u: u * [1000, 1])
     assert policy.fit_demonstrations(mixed).solution_.notes == ()
+    crank = uc.spaces.Euclidean() * uc.spaces.Circle()
+    beside_angles = [uc.Demonstration(one.states, one.actions, one.times, space=crank) for one in mixed]
+    [note] = policy.set_params(scale="auto").fit_demonstrations(beside_angles).solution_.notes
+    assert note.startswith("mixed-units")  # which angles have no scale for
 
 
 @pytest.mark.parametrize("size", [1e-300, 1e25])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from unconstrain.recordings.demonstration import Demonstration, Recording
 from unconstrain.recordings.preparation import (
     PreparationWarning,
     Recipe,
+    decide,
     differentiate,
     prepare,
     resample,
@@ -215,6 +217,21 @@ def test_degrees_are_told_for_files_without_units_and_forbidden_for_others() -> 
     np.testing.assert_array_equal(forbidden.states, bare.values[:, :2])
     with pytest.raises(SettingError, match="degrees: got yaw, expected some of x, a, vx, va"):
         prepare(bare, Recipe(degrees=("yaw",)))
+
+
+@pytest.mark.parametrize("degrees", [None, ("a", "b", "a_next", "b_next")])
+def test_what_was_decided_of_targets_in_degrees_is_decided_so_again(degrees: tuple[str, ...] | None) -> None:
+    columns, states = ("a", "b", "a_next", "b_next"), np.degrees(circle(STEADY))
+    table = np.hstack([states[:-1], states[1:]])
+    units = dict.fromkeys(columns, "deg") if degrees is None else {}
+    recording = Recording(columns, table, STEADY[:-1], "arm", units=units)
+    asked = Recipe(columns[:2], columns[2:], degrees=degrees)
+    decided, remarks = decide(asked, recording)
+    assert "targets-as-velocities" in {remark.code for remark in remarks}
+    assert (decided.actions, decided.degrees) == (None, ("a", "b"))
+    assert decide(decided, recording) == (decided, ())
+    assert decide(replace(asked, action_is="target"), recording)[0] == decided
+    np.testing.assert_allclose(only(prepare(recording, decided)).states, circle(STEADY)[:-1], rtol=1e-12)
 
 
 def test_an_angle_in_degrees_is_made_continuous_in_radians() -> None:
@@ -615,3 +632,12 @@ def test_a_survey_of_a_tracked_finger_tip_finds_fifty_hertz() -> None:
     assert found.rate_hz == pytest.approx(50, rel=0.02)
     assert found.duration_s == pytest.approx(61, rel=0.02)
     assert found.missing == {}
+
+
+def test_targets_without_a_clock_are_learnt_as_they_are_with_a_word():
+    path = np.cumsum(np.random.default_rng(3).normal(size=(80, 2)), axis=0)
+    table = np.column_stack([path[:-1], path[1:]])
+    recording = Recording(("q1", "q2", "a1", "a2"), table)
+    with pytest.warns(PreparationWarning, match="are the states to come.*--rate without a clock"):
+        [demonstration] = prepare(recording, Recipe(("q1", "q2"), ("a1", "a2")))
+    np.testing.assert_array_equal(demonstration.actions, path[1:])

@@ -144,6 +144,16 @@ def test_uncertainty_support_and_diagnosis_are_in_the_units_of_the_data():
         assert theirs.along == pytest.approx(mine.along, rel=1e-6, abs=1e-12)
 
 
+def test_centres_of_fields_are_given_in_the_units_of_the_data():
+    demos = turning()
+    centres, states = rows(demos)[::60], rows(demos)[::9]
+    plain = uc.LocallyLinearPolicy(0.5, centres=centres, learner="hybrid").fit_demonstrations(demos)
+    scaled = uc.LocallyLinearPolicy(0.5, centres=centres * MM, learner="hybrid", scale=MM)
+    scaled.fit_demonstrations(in_units(demos, MM))
+    assert_allclose(scaled.fields_.centres, plain.fields_.centres, rtol=1e-12)
+    assert_allclose(scaled(states * MM) / MM, plain(states), atol=1e-7 * np.abs(plain(states)).max())
+
+
 def test_in_pieces_it_is_the_same():
     demos = in_units(turning(), MM)
     whole = uc.LocallyLinearPolicy(0.5, learner=uc.Hybrid(), scale=MM).fit_demonstrations(demos)
@@ -203,6 +213,9 @@ def test_the_command_line_scales_and_says_so(tmp_path):
     assert "As one" not in unscaled.out
     assert "mixed-units: 'd0', column 'yaw': " in unscaled.err
     assert "--scale auto levels them" in unscaled.err
+    beside = call("fit", *files, "-o", output, "--learner", "hybrid", "--scale", "auto", "--angle", "yaw")
+    assert "As one" not in beside.out
+    assert "Note: --scale auto: angles and orientations have none; give positions in metres." in beside.err
     wrong = call("fit", *files, "-o", output, "--scale", "1,2")
     assert wrong.code == 2
     assert "Error: scale: got 2 numbers, expected 3, one for each state." in wrong.err

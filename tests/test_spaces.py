@@ -5,6 +5,7 @@ import shutil
 import subprocess
 from contextlib import nullcontext
 from functools import cache
+from warnings import catch_warnings, simplefilter
 
 import array_api_strict
 import numpy as np
@@ -151,6 +152,7 @@ def test_a_space_of_one_column_serves_for_several():
         (lambda: Sphere("zyxw"), "order: got 'zyxw', expected one of wxyz, xyzw."),
         (lambda: Circle(0.0), "turn: got 0.0, expected a number above 0"),
         (lambda: Sphere().coordinates(np.ones((2, 4))), "got a quaternion of length 2 at row 0, expected unit quat"),
+        (lambda: uc.LocallyLinearPolicy(space="circle").fit([[0.0]], [[1.0]]), "space: got 'circle', expected one of"),
         (lambda: Sphere().coordinates(np.zeros((1, 4))), "got a quaternion of length 0 at row 0, expected unit quat"),
     ],
 )
@@ -207,6 +209,16 @@ def test_degrees_are_known_by_the_row_of_units_by_their_jumps_or_by_the_option()
     assert uc.prepare(crank(0.0, wrapped=False), CRANK)[0].space == Circle()
 
 
+def test_degrees_that_are_said_to_be_none_are_a_warning():
+    wrapped = crank(3.0, 180 / np.pi)
+    told = uc.Recipe(("crank",), differentiate="savgol", angles=("crank",), degrees=())
+    with pytest.warns(match="column 'crank': jumps by 360, and is taken for radians"):
+        uc.prepare(wrapped, told)
+    with catch_warnings():
+        simplefilter("error")
+        uc.prepare(crank(3.0), told)  # which is in radians
+
+
 def turning(start, order="wxyz", flips=True):
     times = np.arange(0.0, 2.0, 0.02)
     table = quaternions(start * Rotation.from_rotvec(times[:, None] * TURN), order)
@@ -251,7 +263,8 @@ def test_a_recipe_names_space_and_directions_of_its_states():
 def test_states_relative_to_their_mean_are_so_in_the_space():
     names = ("qw", "qx", "qy", "qz")
     recipe = uc.Recipe(names, differentiate="savgol", quaternions=(names,), centre=True)
-    [demonstration] = uc.prepare(turning(Rotation.random(random_state=1)), recipe)
+    with pytest.warns(match="hides a constant push"):
+        [demonstration] = uc.prepare(turning(Rotation.random(random_state=1)), recipe)
     assert_allclose(np.abs(Sphere().mean(demonstration.states)), [[1.0, 0.0, 0.0, 0.0]], atol=1e-12)
     assert_allclose(demonstration.actions, np.tile(TURN, (100, 1)), atol=1e-9)
 

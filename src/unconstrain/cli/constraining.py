@@ -54,12 +54,15 @@ def constraint(
         raise SettingError("--surface: got --with-task or --jacobian too; positions alone show neither.")
     every = uc.read(paths, **reading_of(**reading).arguments)
     recordings = [one for one in every if one.name not in reading["leave_out"]]
-    recipe, _ = uc.preparation.decide(recipe_of(**reading), recordings[0])
-    demonstrations = uc.prepare(recordings, recipe)
+    asked = recipe_of(**reading)
+    demonstrations = uc.prepare(recordings, asked)
+    recipe, _ = uc.preparation.decide(asked, recordings[0])
     states, actions, groups = uc.stack(demonstrations)
     learnt = uc.LearntConstraint(features, None if jacobian is None else _arm(jacobian, tip).jacobian, task=with_task)
     learnt.fit(states, None if surface else actions, groups=groups)
     refuse_warnings(reading["strict"])
+    if recipe.angles:
+        click.echo(f"Note: {', '.join(recipe.angles)} as unwrapped: a turn more is another state to it.", err=True)
     click.echo(f"Learnt from {said_recipe(recipe, recordings[0])}.")
     _say(learnt, "distance from it" if surface else "action")
     named = mechanism_of(states, groups) if jacobian is None and _are_positions(recipe) else None
@@ -125,8 +128,9 @@ def mechanism_of(positions: Any, groups: Any) -> str | None:
 
 
 def _are_positions(recipe: uc.Recipe) -> bool:
+    """Whether two or three states may be positions: their velocity is what is learnt from."""
     count = len(recipe.states or ())
-    return count in (2, 3) and recipe.space == uc.spaces.Euclidean(count)
+    return recipe.actions is None and count in (2, 3) and recipe.space == uc.spaces.Euclidean(count)
 
 
 def _say(learnt: uc.LearntConstraint, what: str) -> None:

@@ -123,6 +123,8 @@ def say_fit(policy: uc.Policy, stream: uc.Stream | None, learner: str) -> None:
 
 def say_scale(policy: uc.Policy, recipe: uc.Recipe) -> None:
     """Print what counts as one of each state and action, where that is not their own unit."""
+    if policy.scale is not None and (recipe.angles or recipe.quaternions):
+        click.echo("Note: --scale auto: angles and orientations have none; give positions in metres.", err=True)
     if policy.scale_ is None:
         return
     states = recipe.states or ()

@@ -1,4 +1,4 @@
-"""Constraint matrices A(x, t), with A u = 0: known, learnt, and mechanisms with names, found in recordings."""
+"""Constraint matrices A(x, t), with A u = 0: known, learnt, and mechanisms found in recordings."""
 
 from .choice import Choice
 from .components import null_space_component

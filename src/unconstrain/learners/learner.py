@@ -1,9 +1,10 @@
 """Base class of the learners."""
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from ..base.parameters import Parameters
+from ..models import Scale
 from ..risks import inconsistency, vec
 from ..training import Training
 from .solution import Solution
@@ -40,6 +41,10 @@ class Learner(Parameters, ABC):
     def solve(self, training: Training) -> Solution:
         """The solution with weights over the features φ(x), in the units of what was given."""
         return self.learn(training).over(training.model).in_units(training.action_unit, training.weight_unit)
+
+    def within(self, scale: Scale) -> Self:
+        """The same learner for states and actions in such units of a policy's own."""
+        return self
 
     def held_out_score(self, training: Training) -> float:
         """Cross-validated share of the squared motion explained: one minus the inconsistency over the energy.

@@ -214,9 +214,9 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         speed = np.linalg.norm(actions, axis=1)
         weights = (speed / speed.max()) ** speed_power if speed_power and speed.any() else None
         doubts = preparation.doubts_about(demos)
-        if self.scale is not None:
-            doubts.pop("mixed-units", None)  # is what it cures
         self._fit(learner, states, actions, weights, groups, times_of(demos), noise_of(demos), space=demos[0].space)
+        if self.scale is not None and not self._is_curved:
+            doubts.pop("mixed-units", None)  # is what it cures
         self.solution_ = replace(self.solution_, notes=(*self.solution_.notes, *doubts.values()))
         return self
 
@@ -383,10 +383,9 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         """The scale that was asked for, or that makes a first batch comparable; None where it is one."""
         asked: Any = self.scale
         auto = isinstance(asked, str) and asked == "auto"
-        curved = not isinstance(self._space, spaces.Euclidean)
-        if asked is None or (auto and curved):
+        if asked is None or (auto and self._is_curved):
             return None
-        if curved:
+        if self._is_curved:
             raise SettingError(
                 f"scale: got one for states in {self._space}, expected Euclidean states, without angles."
             )
@@ -396,6 +395,11 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
             asked = Scale.comparable(states, actions, partial(self._consistency, some))
         scale = Scale.of(asked, batch.states.shape[1], batch.actions.shape[1])
         return None if scale.is_one else scale
+
+    @property
+    def _is_curved(self) -> bool:
+        """Whether some states are angles or orientations, whose columns have no scale."""
+        return not isinstance(self._space, spaces.Euclidean)
 
     def _draft(self, *without: str) -> Self:
         """A copy to work on, without some of its attributes."""
@@ -432,7 +436,8 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         return self._solved(learner)
 
     def _solved(self, learner: Learner) -> Self:
-        self.solution_ = learner.solve(self.training_)
+        own = learner if self.scale_ is None else learner.within(self.scale_)
+        self.solution_ = own.solve(self.training_)
         return self
 
     def _check_speed_power(self, speed_power: float) -> Learner:
@@ -454,7 +459,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         columns = batch.actions.shape[1]
         if reset:
             self._flat, self.n_outputs_ = flat, columns
-            self._space = self.space or space or spaces.Euclidean()
+            self._space = _space_of(self.space or space or spaces.Euclidean())
             self.scale_ = self._scaled(batch)
         elif columns != self.n_outputs_:
             raise InvalidDataError(f"actions: got {columns} columns, expected {self.n_outputs_} as before.")
@@ -469,6 +474,12 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         tags = super().__sklearn_tags__()
         tags.target_tags.multi_output = True
         return tags
+
+
+def _space_of(asked: Any) -> spaces.Space:
+    if isinstance(asked, spaces.Space):
+        return asked
+    raise SettingError(f"space: got {asked!r}, expected one of unconstrain.spaces, such as Euclidean(2) * Circle().")
 
 
 def _seen(draft: Policy, part: Iterable[Sequence[Any]]) -> Seen:

@@ -4,6 +4,7 @@ from typing import cast
 
 from numpy.typing import ArrayLike
 
+from ..base.arrays import as_matrix
 from ..learners import Learner
 from ..models import Model, ReceptiveFields, spaces
 from ..training import FirstLook, Validation
@@ -65,7 +66,10 @@ class LocallyLinearPolicy(Policy):
 
     def place(self, look: FirstLook) -> Model:
         """Lay fields over the states seen at first look; regressors share one origin."""
-        return Model.local(look.states, self.variance, self.at_least, self.centres, look.embedding)
+        centres = None if self.centres is None else as_matrix(self.centres, "centres")
+        if centres is not None and self.scale_ is not None:
+            centres = self.scale_.state(centres)
+        return Model.local(look.states, self.variance, self.at_least, centres, look.embedding)
 
     @property
     def fields_(self) -> ReceptiveFields:

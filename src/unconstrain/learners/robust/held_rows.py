@@ -145,15 +145,17 @@ class HeldRows:
         return np.asarray((scaled @ rows[:, along < HELD_VARIANCES * variance]).T)
 
     def _fits(self, rows: Array, variance: float) -> NDArray[np.bool_]:
-        """Which demonstrations move along rows as little as noise and misfit explain, (G,)."""
+        """Which demonstrations move along rows as little as noise and misfit explain, if any were looked at, (G,)."""
         moved, inner = self._moved[self._some] @ rows.T, rows @ self._metric[self._some] @ rows.T
         inner = inner + 1e-12 * np.trace(inner, axis1=1, axis2=2)[:, None, None] * np.eye(len(rows))
         leak = np.vecdot(moved, np.linalg.solve(inner, moved[:, :, None])[:, :, 0])  # ‖(I − N) u‖²
         groups, k = self._groups[self._some], len(rows)
-        sizes = np.maximum(np.bincount(groups, minlength=self._count), 1)
+        counts = np.bincount(groups, minlength=self._count)
+        sizes = np.maximum(counts, 1)
         mean = np.bincount(groups, leak, self._count) / sizes
         chance = 1.0 + NOISE_OF_KIND + 4.0 * np.sqrt(2.0 / (sizes * k))
-        return np.asarray(mean < k * (self._noise * chance + MISFIT_OF_KIND * (variance - self._noise)))
+        explained = k * (self._noise * chance + MISFIT_OF_KIND * (variance - self._noise))
+        return np.asarray((counts > 0) & (mean < explained))
 
     @cached_property
     def _samples(self) -> NDArray[np.intp]:

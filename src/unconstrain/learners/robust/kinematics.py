@@ -52,7 +52,7 @@ def with_jacobian(samples: Samples, jacobian: Jacobian, noise: float) -> Iterato
 def _evaluated(jacobian: Jacobian, samples: Samples) -> Array:
     found = np.asarray(jacobian(samples.states), dtype=np.float64)
     count, d = samples.actions.shape
-    if found.ndim != 3 or (found.shape[0], found.shape[2]) != (count, d):
+    if found.ndim != 3 or (found.shape[0], found.shape[2]) != (count, d) or not found.shape[1]:
         raise InvalidDataError(f"jacobian: got an array of shape {found.shape}, expected ({count}, rows, {d}).")
     if not np.isfinite(found).all():
         raise InvalidDataError("jacobian: found NaN or infinity, expected finite numbers.")

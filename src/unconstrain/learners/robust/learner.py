@@ -3,12 +3,13 @@
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
 from ...base.arrays import Array, check_at_least
 from ...base.errors import SettingError
+from ...models import Scale
 from ...risks import inconsistency, unit_actions, vec
 from ...training import Batch, Samples, Training
 from ..direct import Direct
@@ -187,7 +188,8 @@ class Robust(_Maximising):
     steps, most : int
         See :class:`Likelihood`.
     jacobian : callable, optional
-        Jacobian J of a task, states (N, n) to (N, r, d), such as that of a robot's hand. A candidate then is the policy
+        Jacobian J of a task, states (N, n) to (N, r, d), such as that of a robot's hand, in the units of the data
+        whatever the policy's scale. A candidate then is the policy
         of least constrained error under ``A = Λ J``, with Λ and its rank from the demonstrations; see
         :mod:`unconstrain.learners.robust.held_rows`. It is not stored with a policy.
     """
@@ -195,6 +197,13 @@ class Robust(_Maximising):
     jacobian: Jacobian | None = field(default=None, metadata={"stored": False})
     needs_samples: ClassVar[bool] = False
     uses_samples: ClassVar[bool] = True
+
+    def within(self, scale: Scale) -> Self:
+        """With the Jacobian, which is in the units of the data, in those of the policy."""
+        given = self.jacobian
+        if given is None:
+            return self
+        return replace(self, jacobian=lambda states: given(states * scale.states) * scale.actions)
 
     def learn(self, training: Training) -> Solution:
         """Learn from the samples where they were kept, and from the moments elsewhere."""
@@ -221,8 +230,9 @@ class Robust(_Maximising):
         found = Comparison(learnt, np.minimum(noise, least), samples)
         if self.jacobian is None:
             return found
-        beside = Comparison([found.best, *with_jacobian(samples, self.jacobian, least)], found.noise, samples)
-        return Comparison([*learnt, *beside.as_consistent], found.noise, samples)
+        held = list(with_jacobian(samples, self.jacobian, least))
+        beside = Comparison([found.best, *held], found.noise, samples).as_consistent if held else []
+        return Comparison([*learnt, *beside], found.noise, samples) if beside else found
 
     def suited(self, begun: Mapping[str, Training], seen: Iterable[Batch] | None) -> str:
         """The name of the model in which the policy of least estimated error is learnt.

@@ -6,13 +6,16 @@ from dataclasses import replace
 from ...base.errors import SettingError
 from ..demonstration import Recording
 from ..remarks import Remark
-from ..signals.orientations import in_degrees
+from ..signals.orientations import TURNS, in_degrees, wraps
 from .plausibility.checks import targets
 from .plausibility.subject import Subject
-from .recipes import Recipe, complete_recipe
+from .recipes import Recipe, complete_recipe, stamps
 
 DEGREES = re.compile(r"\s*(deg|degs|degrees?|[°º])\s*((/|per |\*|·)?\s*s(ec|econds?)?(\^?-1|⁻¹)?)?\s*", re.IGNORECASE)
 """How people write degrees, and degrees a second."""
+
+NOT_TOLD = "jumps by 360, and is taken for radians; name it with --degrees, or leave that option off."
+"""What is said of an angle in degrees that is not told to be."""
 
 
 def decide(recipe: Recipe, recording: Recording) -> tuple[Recipe, tuple[Remark, ...]]:
@@ -34,29 +37,49 @@ def decide(recipe: Recipe, recording: Recording) -> tuple[Recipe, tuple[Remark, 
         As :func:`~.recipes.complete_recipe`.
     """
     completed = in_radians(complete_recipe(recipe, recording), recording)
-    said = _about_degrees(recipe, completed)
+    said = _about_degrees(recipe, completed, recording)
     if completed.actions is None or not (found := targets(Subject(recording, completed))):
-        return completed, said
+        return _of_used_columns(completed), said
+    if stamps(recording, completed) is None:  # nothing to differentiate by
+        return _of_used_columns(completed), (*said, found)
     message = "are the states to come, so the velocity of the states is learnt; --action-is velocity forbids it."
     decided = complete_recipe(replace(completed, action_is="target"), recording)
-    return decided, (*said, found._replace(message=message))
+    return _of_used_columns(decided), (*said, found._replace(message=message))
 
 
 def in_radians(recipe: Recipe, recording: Recording) -> Recipe:
     """A recipe with the columns in degrees: those that it tells, or whose unit or, of angles, whose numbers say so."""
     if recipe.degrees is not None:
         return replace(recipe, degrees=recording.resolve(recipe.degrees))
-    used = (*(recipe.states or ()), *(recipe.actions or ()))
+    used = _used(recipe)
     units = {name: recording.units.get(name, "") for name in used}
     shown = {name for name in used if name in recipe.angles and not units[name]}
     shown = {name for name in shown if in_degrees(recording.select([name])[:, 0])}
     return replace(recipe, degrees=tuple(name for name in used if name in shown or DEGREES.fullmatch(units[name])))
 
 
-def _about_degrees(asked: Recipe, decided: Recipe) -> tuple[Remark, ...]:
-    degrees, used = decided.degrees or (), (*(decided.states or ()), *(decided.actions or ()))
-    if others := set(degrees) - set(used):
+def _of_used_columns(recipe: Recipe) -> Recipe:
+    """Without degrees of columns that are not used, such as actions that are states to come."""
+    return replace(recipe, degrees=tuple(name for name in recipe.degrees or () if name in _used(recipe)))
+
+
+def _turning_by_360(recipe: Recipe, recording: Recording) -> list[str]:
+    """Angles that are taken for radians, and jump as if they were none."""
+    left = [name for name in recipe.angles if name not in (recipe.degrees or ())]
+    found = [(name, wraps(recording.select([name])[:, 0])) for name in left]
+    return [name for name, wrap in found if wrap is not None and wrap.turn == TURNS[1]]
+
+
+def _used(recipe: Recipe) -> tuple[str, ...]:
+    return (*(recipe.states or ()), *(recipe.actions or ()))
+
+
+def _about_degrees(asked: Recipe, decided: Recipe, recording: Recording) -> tuple[Remark, ...]:
+    degrees, used = decided.degrees or (), _used(decided)
+    if others := set(degrees) - {*used, *recording.resolve(asked.actions or ())}:
         raise SettingError(f"degrees: got {', '.join(sorted(others))}, expected some of {', '.join(used)}.")
-    if not degrees or asked.degrees is not None:
+    if asked.degrees is not None:
+        return tuple(Remark("degrees", NOT_TOLD, name) for name in _turning_by_360(decided, recording))
+    if not degrees:
         return ()
     return (Remark("degrees", f"{', '.join(degrees)} is taken in radians; --degrees none forbids it."),)

@@ -162,7 +162,7 @@ def targets(subject: Subject) -> Remark | None:
     recipe = subject.recipe
     if not subject.moves or recipe.action_is != "auto" or not are_targets(subject.clean, subject.actions):
         return None
-    message = "are the states to come, not velocities; learn the velocity of the states with --action-is target."
+    message = "are the states to come, not velocities; --action-is target learns these (--rate without a clock)."
     return Remark("targets-as-velocities", message, (recipe.actions or ("",))[0])
 
 
