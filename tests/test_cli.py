@@ -291,7 +291,7 @@ def test_fit_says_how_the_default_learner_went(files, tmp_path):
 
 def test_options_of_the_hybrid_mean_the_hybrid(files, tmp_path):
     for option in (("--alpha", "auto"), ("--alpha", 0.3), ("--softness", 0.1)):
-        run("fit", *files, "--model", "linear", *option, "-o", tmp_path / "p.npz")
+        run("fit", *files, "--model", "linear", *option, "-o", tmp_path / "p.npz", "--force")
         learner = storage.load(tmp_path / "p.npz").learner
         assert isinstance(learner, uc.Hybrid)
         assert getattr(learner, option[0].removeprefix("--")) == option[1]
@@ -362,7 +362,7 @@ def test_settings_reach_the_policy(files, tmp_path):
     found = storage.load(tmp_path / "p.npz")
     assert (found.variance, found.learner) == (0.3, uc.Hybrid(alpha=0.05))
     assert found.validation == uc.Folds(4, by="sample")
-    run("fit", *files, "--model", "rbf", "--centres", 9, "--softness", 0.1, "-o", tmp_path / "p.npz")
+    run("fit", *files, "--model", "rbf", "--centres", 9, "--softness", 0.1, "-o", tmp_path / "p.npz", "--force")
     found = storage.load(tmp_path / "p.npz")
     assert (found.features, found.learner) == (uc.KMeansRBF(9), uc.Hybrid(softness=0.1, threshold=0.0))
 
@@ -751,16 +751,14 @@ def test_a_recording_is_never_overwritten_by_its_policy(files, tmp_path):
     path.write_bytes(files[0].read_bytes())
     for options in (("-o", path), ("-o", tmp_path / "p.npz", "--report", path)):
         said = refused("fit", path, *options)
-        assert said == f"{path}: is one of the files to learn from; give another name to write to."
+        assert said == f"{path}: is one of the files to read; give another name to write to."
     assert path.read_bytes() == files[0].read_bytes()
 
 
 def test_a_place_that_cannot_be_written_to_is_named(files, policy, tmp_path):
     away = tmp_path / "none" / "x"
-    assert refused("fit", files[0], "-o", away) == f"{away}: cannot be written, its folder does not exist."
-    assert refused("rollout", policy, "--start", "0,0", "-o", away) == (
-        f"{away}: cannot be written (No such file or directory)."
-    )
+    for command in (("fit", files[0]), ("rollout", policy, "--start", "0,0")):
+        assert refused(*command, "-o", away) == f"{away}: cannot be written (No such file or directory)."
     assert "is a directory" in refused("rollout", policy, "--start", "0,0", "-o", tmp_path)
     assert "is a directory" in refused("fit", files[0], "-o", tmp_path)
 
@@ -967,7 +965,7 @@ def test_an_interrupted_run_goes_on_where_it_stopped(table1_of_two, tmp_path, mo
     whole = table1.trial
     arguments = ("reproduce", "table1", "--trials", 2, "--workers", 1, "--out", tmp_path)
     monkeypatch.setattr(table1, "trial", interrupted)
-    assert call(*arguments).code == 1
+    assert call(*arguments).code == 130
     assert not (tmp_path / "table1.json").exists()
     monkeypatch.setattr(table1, "trial", lambda *args: calls.append(args) or whole(*args))
     run(*arguments)

@@ -138,13 +138,13 @@ def test_an_arm_is_held_by_its_hand(tmp_path):
         postures, wanted = rng.uniform(0.3, 1.8, (60, 2)), rng.standard_normal((60, 2))
         free = uc.null_space_projection(arm.jacobian(postures)[:, :1])
         write(tmp_path / f"{k}.csv", "t,a,b,va,vb", [0.1 * np.arange(60), postures, uc.project(free, wanted)])
-    options = ("--jacobian", tmp_path / "robot.urdf", "--tip", "hand", "-o", tmp_path / "c.npz")
+    options = ("--jacobian", tmp_path / "robot.urdf", "--tip", "hand", "-o", tmp_path / "d.npz")
     said = run("constraint", tmp_path / "*.csv", *options)
     assert "1 of 2 directions held, by constant features." in said
     storage.register(uc.systems.arm.Arm)
     found = uc.load(tmp_path / "c.npz", uc.LearntConstraint)
     assert_allclose(found.projection(postures), free, atol=1e-9)
-    said = refused("constraint", tmp_path / "*.csv", "--tip", "hand", "-o", tmp_path / "c.npz")
+    said = refused("constraint", tmp_path / "*.csv", "--tip", "hand", "-o", tmp_path / "d.npz")
     assert "--jacobian and --tip belong together" in said
 
 
@@ -156,7 +156,7 @@ def test_positions_alone_show_a_surface(tmp_path):
                "--features", "quadratic", "-o", tmp_path / "c.npz")  # fmt: skip
     assert "of distance from it" in said
     assert "positions alone show neither" in refused(
-        "constraint", tmp_path / "rim.csv", "--surface", "--with-task", "-o", tmp_path / "c.npz"
+        "constraint", tmp_path / "rim.csv", "--surface", "--with-task", "-o", tmp_path / "d.npz"
     )
 
 

@@ -106,7 +106,9 @@ def table_of(name, states, actions):
 
 
 def run_console(text):
-    """Each command of a console block, by the command line of this very package."""
+    """Each command of a console block, by the command line of this very package, where it has not yet been run."""
+    for written in re.findall(r"(?:-o|--report) (\S+)", text):
+        Path(written).unlink(missing_ok=True)
     commands = [line[2:] for line in text.splitlines() if line.startswith("$ ")]
     ours = f'unconstrain() {{ {shlex.quote(sys.executable)} -m unconstrain "$@"; }}'
     done = subprocess.run(["bash", "-ec", "\n".join([ours, *commands])], capture_output=True, text=True, check=False)

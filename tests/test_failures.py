@@ -1,5 +1,8 @@
 """A call that fails leaves the estimator as it was, and a retry counts nothing twice."""
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -22,6 +25,14 @@ class LearnsNothing(uc.Direct):
 
     def learn(self, training):
         raise RuntimeError("as told")
+
+
+class LearnsNaN(uc.Direct):
+    """A learner whose sums overflow."""
+
+    def learn(self, training):
+        found = super().learn(training)
+        return replace(found, weights=np.nan * found.weights)
 
 
 def halves():
@@ -73,6 +84,8 @@ FAILING = {
     "no demonstration": lambda policy: policy.fit_demonstrations([]),
     "a learner": lambda policy: policy.set_params(learner=LearnsNothing()).partial_fit(*halves()[0]),
     "a learner in fit": lambda policy: policy.set_params(learner=LearnsNothing()).fit(*halves()[0]),
+    "what is not finite": lambda policy: policy.set_params(learner=LearnsNaN()).partial_fit(*halves()[0]),
+    "what is not finite in fit": lambda policy: policy.set_params(learner=LearnsNaN()).fit(*halves()[0]),
     "a cluster that is lost after the first look": lambda policy: policy.fit_parts([halves()], Lost()),
     "parts": lambda policy: policy.fit_parts([halves(), broken()], lambda call, parts: sum_of(map(call, parts))),
 }
@@ -114,6 +127,28 @@ def test_a_first_call_that_fails_fixes_nothing(kind, failing):
         assert not hasattr(policy, "n_features_in_")
     scaled = (1000 * DATA.states, 1000 * DATA.actions, None, DATA.groups)
     assert_allclose(policy.partial_fit(*scaled).predict(scaled[0]), clone(policy).fit(*scaled).predict(scaled[0]))
+
+
+def test_what_is_not_finite_is_neither_saved_nor_exported(tmp_path):
+    policy = clone(POLICIES["hybrid"]).fit(DATA.states, DATA.actions, groups=DATA.groups)
+    policy.solution_ = replace(policy.solution_, weights=np.where(policy.solution_.weights > 0, np.inf, 0.0))
+    for write in (partial(uc.save, policy), policy.export_c, policy.export_onnx):
+        (tmp_path / "old").write_text("old")
+        with pytest.raises(InvalidDataError, match=r"is not finite: NaN or infinity in \d+ of \d+ weights"):
+            write(tmp_path / "old")
+        assert (tmp_path / "old").read_text() == "old"
+
+
+@pytest.mark.parametrize("unit", [1e-320, 1e-307, 1e300])
+@pytest.mark.parametrize("kind", POLICIES)
+def test_weights_in_any_unit_give_a_finite_policy_or_a_sentence(kind, unit):
+    policy = clone(POLICIES[kind])
+    try:
+        policy.fit(DATA.states, DATA.actions, np.full(120, unit), DATA.groups)
+    except uc.UnconstrainError:
+        assert not hasattr(policy, "solution_")
+    else:
+        assert np.isfinite(policy.predict(DATA.states)).all()
 
 
 @pytest.mark.parametrize("scale", [1.0, 1000.0])

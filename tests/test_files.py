@@ -76,9 +76,13 @@ def test_an_error_that_is_not_of_the_file_system_passes(there):
 
 
 @pytest.mark.parametrize(
-    ("module", "name"), [(Path, "open"), (Path, "chmod"), (files, "_fill"), (os, "fsync"), (Path, "replace")]
+    ("module", "name"),
+    [(files, "_new"), (os, "dup"), (os, "chmod"), (files, "_fill"), (os, "fsync"), (os, "link"), (Path, "replace")],
 )
+@posix
 def test_an_interrupted_write_leaves_the_old_file_and_no_other(there, monkeypatch, module, name):
+    if name == "link" and not files._UNNAMED:
+        pytest.skip("this system has no files without a name")
     with monkeypatch.context() as patch:
         patch.setattr(module, name, interrupted)
         with pytest.raises(KeyboardInterrupt):
@@ -97,21 +101,59 @@ def half(stream):
     print("writing", flush=True)
     time.sleep(60)
 
-files.write(sys.argv[1], half)
+def folder(path):
+    with files.workshop(path) as made, open(made / "half", "wb") as stream:
+        half(stream)
+
+files._UNNAMED *= sys.argv[2] == "unnamed"
+folder(sys.argv[1]) if sys.argv[2] == "folder" else files.write(sys.argv[1], half)
 """
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="this system has no SIGKILL")
-def test_a_kill_leaves_the_old_file_whole(there):
+@pytest.mark.parametrize("kind", ["unnamed", "named", "folder"])
+def test_a_kill_leaves_the_old_file_whole_and_the_next_write_no_other(there, kind):
     environment = os.environ | {"PYTHONPATH": str(Path(files.__file__).parents[2])}
-    child = subprocess.Popen([sys.executable, "-c", KILLED, there], stdout=subprocess.PIPE, env=environment)
+    child = subprocess.Popen([sys.executable, "-c", KILLED, there, kind], stdout=subprocess.PIPE, env=environment)
     with child:
         assert child.stdout.readline() == b"writing\n"
+        files.write(there, "old")  # what is being written is no other's to remove
+        assert len(names(there.parent)) == 1 + (kind != "unnamed" or not files._UNNAMED)
         child.kill()
     assert child.returncode == -signal.SIGKILL
     assert there.read_bytes() == b"old"
-    files.write(there, "new")  # what the killed one left behind is in nobody's way
+    assert kind != "unnamed" or not files._UNNAMED or names(there.parent) == ["a.txt"]
+    files.write(there, "new")
     assert there.read_bytes() == b"new"
+    assert names(there.parent) == ["a.txt"]
+
+
+@pytest.mark.parametrize("unnamed", [True, False])
+def test_two_that_write_to_one_place_both_write(there, unnamed, monkeypatch):
+    monkeypatch.setattr(files, "_UNNAMED", files._UNNAMED * unnamed)
+    files.write(there, lambda stream: files.write(there, "first") or stream.write(b"second"))
+    assert there.read_bytes() == b"second"
+    assert names(there.parent) == ["a.txt"]
+
+
+def test_what_is_not_of_a_killed_run_stays(there):
+    for name in (".a.txt.part", ".a.txt.0123456789abcdeg.part", ".b.txt.0123456789abcdef.part"):
+        (there.parent / name).touch()
+    files.write(there, "new")
+    assert len(names(there.parent)) == 4
+
+
+@pytest.mark.parametrize("one_step", [True, False])
+def test_a_folder_comes_to_its_place(tmp_path, one_step, monkeypatch):
+    if not one_step:
+        monkeypatch.setattr(files, "_exchanged", lambda *_: False)
+    for content in ("old", "new"):
+        with files.workshop(tmp_path / "set") as folder:
+            (folder / "made").mkdir()
+            (folder / "made" / "a").write_text(content)
+            files.put_folder(folder / "made", tmp_path / "set")
+        assert (tmp_path / "set" / "a").read_text() == content
+        assert names(tmp_path) == ["set"]
 
 
 @posix
@@ -141,8 +183,7 @@ def test_what_only_its_owner_may_read_is_never_open_to_others(there):
     there.chmod(0o600)
 
     def look(stream):
-        [temporary] = [path for path in there.parent.iterdir() if path != there]
-        assert stat.S_IMODE(temporary.stat().st_mode) == 0o600
+        assert stat.S_IMODE(os.fstat(stream.fileno()).st_mode) == 0o600
 
     files.write(there, look)
 

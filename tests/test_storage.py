@@ -548,7 +548,7 @@ def interrupted(*_, **__):
     [
         (np, "savez_compressed", half_an_archive),
         (os, "fsync", full_disk),
-        (Path, "chmod", full_disk),
+        (os, "chmod", full_disk),
         (Path, "replace", full_disk),
         (os, "fsync", interrupted),
         (Path, "replace", interrupted),

@@ -101,7 +101,12 @@ def save(
     ModelFileError
         If part of the policy is of a class that is not known here, or the
         place cannot be written to.
+    InvalidDataError
+        If what was learnt is not finite.
     """
+    for learnt in ("solution_", "choice_"):
+        if hasattr(policy, learnt):
+            getattr(policy, learnt).checked()
     arrays: dict[str, np.ndarray[Any, Any]] = {}
     content = {"policy": _pack(_without_samples(policy), arrays), "notes": _plain(notes or {})}
     header = {"format": _FORMAT, "version": VERSION, "content": content}

@@ -287,6 +287,22 @@ def _is_sensible(block: Array) -> bool:
     return bool(xp.all(xp.abs(doubles) <= LARGEST))
 
 
+def check_learnt(learnt: ArrayLike) -> None:
+    """Refuse what was learnt where it is not finite, before it is kept, saved or exported.
+
+    Raises
+    ------
+    InvalidDataError
+        If anything in it is NaN or infinity.
+    """
+    bad = np.count_nonzero(~np.isfinite(on_host(learnt)))
+    if bad:
+        raise InvalidDataError(
+            f"what was learnt is not finite: NaN or infinity in {bad} of {np.size(learnt)} weights, so it is neither "
+            "kept, saved nor exported. Take units in which states, actions and sample weights are nearer to 1."
+        )
+
+
 def _refuse(values: Array, what: str) -> NoReturn:
     bad = ~np.isfinite(values)
     if bad.any():

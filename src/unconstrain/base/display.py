@@ -28,6 +28,11 @@ class ShownWithSolution:
         return settings if solution is None else settings + solution._repr_html_()
 
 
+def legible(name: str) -> str:
+    r"""A name as text that has an encoding: bytes of a file's name that are no UTF-8 are shown, as ``"\udcff"``."""
+    return name.encode("utf-8", "backslashreplace").decode()
+
+
 def counted(number: int, noun: str) -> str:
     """A number of things: ``"1 sample"``, ``"2 samples"``."""
     return f"{number} {noun}{'' if number == 1 else 's'}"

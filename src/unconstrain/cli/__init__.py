@@ -23,7 +23,6 @@ from .converting import convert
 from .diagnosing import diagnose
 from .fitting import (
     alpha_of,
-    check_writable,
     default_learner,
     learn,
     learner_of,
@@ -33,6 +32,7 @@ from .fitting import (
 )
 from .printing import Group, keep_codes, print_table, refuse_warnings, say_fit, say_scale, say_surveys
 from .reading import numbers, options_for_reading, reading_of, recipe_of, said_recipe, stream_of
+from .writing import check_outputs, option_for_force
 
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
 
@@ -124,6 +124,7 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     help="What counts as one of each state, such as 1000,1 for mm beside rad; auto finds it.",
 )
 @click.option("--report", type=click.Path(dir_okay=False), help="Also write an HTML report there.")
+@option_for_force
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on the dask cluster of this scheduler.")
 def fit(
     files: Sequence[str],
@@ -139,6 +140,7 @@ def fit(
     hold_out: Any,
     scale: Any,
     report: str | None,
+    force: bool,
     scheduler: str | None,
     **reading: Any,
 ) -> None:
@@ -147,7 +149,7 @@ def fit(
     Data larger than memory is read twice, one file or block at a time.
     """
     paths = uc.readers.expand(files)
-    check_writable((output, report), paths)
+    check_outputs((output, report), paths, force)
     if scale is not None:  # is what cures them
         warnings.filterwarnings("ignore", "mixed-units", UserWarning)
     learner = learner or default_learner(paths, scheduler, alpha, softness, speed_power)
@@ -217,6 +219,7 @@ def score(
     show_default=True,
     help="CSV file; - prints.",
 )
+@option_for_force
 def rollout(
     policy: str,
     start: tuple[float, ...],
@@ -225,8 +228,10 @@ def rollout(
     plane: tuple[float, ...] | None,
     constraint: str | None,
     output: str,
+    force: bool,
 ) -> None:
     """Roll POLICY out, freely or under a constraint, to a CSV."""
+    check_outputs(() if output == "-" else (output,), (policy, constraint), force)
     learnt, recipe = _fitted(policy), uc.Recipe.from_dict(uc.storage.load_notes(policy).get("recipe", {}))
     if len(start) != learnt.n_features_in_:
         raise SettingError(f"--start: got {len(start)} numbers, expected {learnt.n_features_in_}, one for each state.")
@@ -252,13 +257,15 @@ def rollout(
 @click.argument("policy", type=click.Path())
 @click.option("-o", "--output", required=True, type=click.Path(dir_okay=False), help="File that ends in .c or .onnx.")
 @click.option("--name", help="C: prefix of functions and macros, policy by default.")
-def export(policy: str, output: str, name: str | None) -> None:
+@option_for_force
+def export(policy: str, output: str, name: str | None, force: bool) -> None:
     """Write POLICY as C99 source or as an ONNX graph."""
     kind = Path(output).suffix.lower()
     if kind not in (".c", ".onnx"):
         raise SettingError(f"{output}: got the suffix {kind!r}, expected .c for C source or .onnx for an ONNX graph.")
     if name is not None and kind != ".c":
         raise SettingError(f"--name: belongs to C source, got {output}.")
+    check_outputs((output,), (policy,), force)
     learnt = _fitted(policy)
     if kind == ".c":
         learnt.export_c(output, name or "policy")

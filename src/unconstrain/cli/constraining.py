@@ -12,9 +12,9 @@ import unconstrain as uc
 
 from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
-from .fitting import check_writable
 from .printing import print_table, refuse_warnings
 from .reading import numbers, options_for_reading, reading_of, recipe_of, said_recipe
+from .writing import check_outputs, option_for_force
 
 MOST_POSITIONS = 4000
 """Positions, at most, by which a mechanism is named; more are thinned evenly."""
@@ -31,6 +31,7 @@ FEATURES = ("auto", "constant", "affine", "quadratic", "rbf")
 @click.option("--with-task", is_flag=True, help="Along what is held it moves, as a function of the state.")
 @click.option("--surface", is_flag=True, help="Learn from the positions alone: they lie on a surface.")
 @click.option("--report", type=click.Path(dir_okay=False), help="Also write an HTML page there.")
+@option_for_force
 def constraint(
     files: Sequence[str],
     output: str,
@@ -40,6 +41,7 @@ def constraint(
     with_task: bool,
     surface: bool,
     report: str | None,
+    force: bool,
     **reading: Any,
 ) -> None:
     """Learn what held the demonstrations in each FILE.
@@ -47,7 +49,7 @@ def constraint(
     Says its rank, form and noise, and what the data does not tell.
     """
     paths = uc.readers.expand(files)
-    check_writable((output, report), paths)
+    check_outputs((output, report), (*paths, jacobian), force)
     if (jacobian is None) != (tip is None):
         raise SettingError("--jacobian and --tip belong together: a URDF file, and the link that is held.")
     if surface and (with_task or jacobian is not None):

@@ -4,33 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import click
 
 import unconstrain as uc
 
-from ..base.errors import SettingError
 from .reading import options_for_reading, reading_of, recipe_of
+from .writing import check_outputs, option_for_force
 
 
 @click.command(epilog="\b\nExample:\n  unconstrain convert demo.hdf5 wiping --state robot0_eef_pos --action actions")
 @options_for_reading
 @click.argument("output", type=click.Path())
 @click.option("--align", is_flag=True, help="Bring all recordings onto one clock, beside each other.")
-@click.option("--force", is_flag=True, help="Replace what is there.")
+@option_for_force
 def convert(files: Sequence[str], output: str, align: bool, force: bool, **options: Any) -> None:
     """Write the recordings in each FILE to OUTPUT: .csv, .parquet, .mcap, or a folder for LeRobot.
 
     With --state or --action only those columns are written.
     """
     paths = uc.readers.expand(files)
-    target = Path(output)
-    if target.resolve() in {Path(path).resolve() for path in [*map(str, paths), *files]}:
-        raise SettingError(f"{output}: is one of the files to read; give another name to write to.")
-    if target.exists() and not force:
-        raise SettingError(f"{output}: is there; give another name, or --force to replace it.")
+    check_outputs((output,), paths, force)
     recordings = uc.read(paths, **reading_of(**options).arguments)
     recordings = [_timed(recording, options.get("rate")) for recording in recordings]
     if align:
@@ -38,7 +33,7 @@ def convert(files: Sequence[str], output: str, align: bool, force: bool, **optio
     states, actions = _columns(recordings[0], options)
     kept = (*states, *actions) or recordings[0].columns
     chosen = [replace(each, columns=kept, values=each.select(kept)) for each in recordings]
-    uc.writers.write_recordings(chosen, target, states, actions)
+    uc.writers.write_recordings(chosen, output, states, actions)
     click.echo(f"{len(chosen)} recordings, {sum(map(len, chosen))} samples: {output}")
 
 

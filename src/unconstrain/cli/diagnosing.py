@@ -12,9 +12,10 @@ import click
 import unconstrain as uc
 
 from ..base.files import write
-from .fitting import check_writable, options_for_model, policy_of
+from .fitting import options_for_model, policy_of
 from .printing import print_table, refuse_warnings, say
 from .reading import options_for_reading, reading_of, recipe_of, said_recipe
+from .writing import check_outputs, option_for_force
 
 MOST_ROWS = 8
 
@@ -23,6 +24,7 @@ MOST_ROWS = 8
 @options_for_reading
 @options_for_model
 @click.option("-o", "--report", type=click.Path(dir_okay=False), help="Also write an HTML page there.")
+@option_for_force
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def diagnose(
     files: Sequence[str],
@@ -30,6 +32,7 @@ def diagnose(
     variance: float | None,
     centres: int | None,
     report: str | None,
+    force: bool,
     as_json: bool,
     **reading: Any,
 ) -> None:
@@ -38,7 +41,7 @@ def diagnose(
     Learns from each FILE, and also reports where constraints vary too little and which demonstrations look free.
     """
     paths = uc.readers.expand(files)
-    check_writable((report,), paths)
+    check_outputs((report,), paths, force)
     every = uc.read(paths, **reading_of(**reading).arguments)
     recordings = [one for one in every if one.name not in reading["leave_out"]]
     asked = recipe_of(**reading)

@@ -1,4 +1,4 @@
-"""The steps of ``unconstrain fit``: where to write, which policy and learner, where to compute."""
+"""The steps of ``unconstrain fit``: which policy and learner, where to compute."""
 
 from __future__ import annotations
 
@@ -91,15 +91,6 @@ def learner_of(name: str, alpha: float | Literal["auto"] | None, softness: float
         )
     # A softened split needs no threshold on top.
     return uc.Hybrid(**given, threshold=0.0 if softness else None)  # type: ignore[arg-type]
-
-
-def check_writable(outputs: Sequence[str | None], paths: Sequence[str | Path]) -> None:
-    """Refuse to write over what is read, or where there is no folder."""
-    for written in filter(None, outputs):
-        if Path(written).resolve() in {Path(path).resolve() for path in paths}:
-            raise SettingError(f"{written}: is one of the files to learn from; give another name to write to.")
-        if not Path(written).absolute().parent.is_dir():
-            raise SettingError(f"{written}: cannot be written, its folder does not exist.")
 
 
 def policy_of(model: str, variance: float | None, centres: int | None, **chosen: Any) -> uc.Policy:

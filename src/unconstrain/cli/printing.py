@@ -13,7 +13,9 @@ import click
 
 import unconstrain as uc
 
-from ..base.errors import InvalidDataError, UnconstrainError
+from ..base.errors import InvalidDataError
+from .endings import REFUSED, ending
+from .terminal import plain_output
 
 if TYPE_CHECKING:
     import numpy as np
@@ -24,26 +26,33 @@ CODES = "unconstrain.codes"
 
 
 class Group(click.Group):
-    """Reports our errors, and those of the file system, in one sentence, with exit code 2."""
+    """Ends in one sentence and the right exit code, whatever happens; what cannot be printed stops no command."""
+
+    def main(self, *args: Any, **extra: Any) -> Any:
+        """Parse and run the command line; ends with ``SystemExit``."""
+        with plain_output() as printed:
+            try:
+                return super().main(*args, **extra)
+            except SystemExit as end:
+                # Who closes a pipe has seen enough.
+                if end.code or printed.trouble is None or printed.trouble.errno == errno.EPIPE:
+                    raise
+                click.echo(f"Error: standard output: cannot be written ({printed.trouble.strerror}).", err=True)
+                raise SystemExit(REFUSED) from None
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command."""
-        said, result = "", None
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("default", UserWarning)
                 warnings.showwarning = show_warning  # type: ignore[assignment]
-                result = super().invoke(ctx)
-        except UnconstrainError as error:
-            said = str(error)
-        except OSError as error:
-            if error.errno == errno.EPIPE:  # the reader of our output has closed it; click exits quietly
-                raise
-            said = f"{error.filename}: {error.strerror}." if error.filename and error.strerror else str(error)
-        if said:
+                return super().invoke(ctx)
+        except (click.ClickException, click.exceptions.Exit, click.Abort):
+            raise
+        except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - the last clause
+            said, code = ending(error)
             click.echo(f"Error: {said}", err=True)
-            ctx.exit(2)
-        return result
+            ctx.exit(code)
 
 
 def say_surveys(surveys: Sequence[Any]) -> None:
@@ -185,8 +194,8 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     for row in rows:
         table.add_row(*row)
     # Piped output is for programs and files: no wrapping there.
-    console = Console(width=None if sys.stdout.isatty() else 10_000)
-    console.print(table)
+    width = None if sys.stdout.isatty() else 10_000
+    Console(width=width, markup=False, emoji=False, highlight=False, color_system=None).print(table)
 
 
 def show_warning(message: Warning | str, *_: Any) -> None:

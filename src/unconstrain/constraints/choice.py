@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
+from ..base.arrays import Array, check_learnt
 from ..base.display import counted
 from ..base.errors import InvalidDataError
 from .evidence import Evidence, Kept
@@ -82,6 +82,17 @@ class Choice:
     columns: int
     actions: int
     unit: float
+
+    def checked(self) -> Choice:
+        """Itself, if it is finite.
+
+        Raises
+        ------
+        InvalidDataError
+            If the fields are not finite.
+        """
+        check_learnt(self.fields.coefficients)
+        return self
 
     @property
     def doubts(self) -> tuple[str, ...]:

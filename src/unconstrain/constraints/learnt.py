@@ -198,7 +198,7 @@ class LearntConstraint(Parameters, Shown):
 
     def _learnt(self, evidence: Evidence) -> Self:
         draft = copy(self)
-        draft.choice_, draft.evidence_ = chosen(evidence), evidence
+        draft.choice_, draft.evidence_ = chosen(evidence).checked(), evidence
         draft.rank_, draft.noise_ = draft.choice_.fields.rank, draft.choice_.noise
         self.__dict__ = draft.__dict__
         return self

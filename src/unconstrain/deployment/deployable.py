@@ -71,9 +71,11 @@ class Deployable:
         ------
         SettingError
             If the features are a callable that does not say its formula.
+        InvalidDataError
+            If the weights are not finite.
         """
         check_is_fitted(self, "solution_")
-        form = self.training_.model.formula(self.solution_.weights)
+        form = self.training_.model.formula(self.solution_.checked().weights)
         return form if self.scale_ is None else self.scale_.form(form)
 
     def export_c(self, path: str | os.PathLike[str], name: str = "policy") -> None:

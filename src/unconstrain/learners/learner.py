@@ -39,8 +39,15 @@ class Learner(Parameters, ABC):
         """
 
     def solve(self, training: Training) -> Solution:
-        """The solution with weights over the features φ(x), in the units of what was given."""
-        return self.learn(training).over(training.model).in_units(training.action_unit, training.weight_unit)
+        """The solution with weights over the features φ(x), in the units of what was given.
+
+        Raises
+        ------
+        InvalidDataError
+            If it is not finite.
+        """
+        found = self.learn(training).over(training.model)
+        return found.in_units(training.action_unit, training.weight_unit).checked()
 
     def within(self, scale: Scale) -> Self:
         """The same learner for states and actions in such units of a policy's own."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
+from ..base.arrays import Array, check_learnt
 from ..base.display import Shown, counted
 from ..base.errors import MissingBeliefError
 
@@ -229,6 +229,17 @@ class Solution(Shown):
             },
         )
         return replace(self, weights=self.weights @ centring, belief=belief)
+
+    def checked(self) -> Solution:
+        """Itself, if it is finite.
+
+        Raises
+        ------
+        InvalidDataError
+            If the weights are not finite.
+        """
+        check_learnt(self.weights)
+        return self
 
     def in_units(self, action: float, weight: float) -> Solution:
         """With actions and sample weights measured in units ``1 / action`` and ``1 / weight`` as large."""

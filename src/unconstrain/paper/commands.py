@@ -143,6 +143,6 @@ def progress_bar(title: str) -> Iterator[Progress]:
     from rich.console import Console
     from rich.progress import Progress as Bar
 
-    with Bar(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as bar:
+    with Bar(console=Console(file=sys.__stderr__), transient=True, disable=not sys.stderr.isatty()) as bar:
         job = bar.add_task(title, total=None)
         yield lambda done, of: bar.update(job, completed=done, total=of)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -15,7 +14,7 @@ import numpy as np
 
 from ..base.arrays import Array, require_extra
 from ..base.errors import SettingError, WriteError
-from ..base.files import write
+from ..base.files import put_folder, workshop, write
 from .demonstration import Recording
 
 GROUP, TIME = "demo", "t"
@@ -107,14 +106,12 @@ def _write_lerobot(recordings: Sequence[Recording], path: Path, states: Sequence
     require_extra("pyarrow", "data")
     if path.exists() and not (path / "meta" / "info.json").is_file():
         raise SettingError(f"{path}: is there and no LeRobot data set; give another name for the folder.")
-    with tempfile.TemporaryDirectory(prefix=".lerobot-", dir=path.absolute().parent) as folder:
-        root = Path(folder) / "set"
+    with workshop(path) as folder:
+        root = folder / "set"
         for name, content in _lerobot_files(recordings, {"observation.state": states, "action": actions}):
             (root / name).parent.mkdir(parents=True, exist_ok=True)
             write(root / name, content)
-        if path.exists():
-            path.rename(Path(folder) / "before")
-        root.rename(path)
+        put_folder(root, path)
 
 
 def _lerobot_files(
@@ -208,13 +205,13 @@ def _write_mcap(recordings: Sequence[Recording], path: Path, states: Sequence[st
         )
     types = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     kind = "sensor_msgs/msg/JointState"
-    with tempfile.TemporaryDirectory(prefix=".mcap-", dir=path.absolute().parent) as folder:
-        with rosbag2.Writer(Path(folder) / "bag", version=9, storage_plugin=rosbag2.StoragePlugin.MCAP) as bag:
+    with workshop(path) as folder:
+        with rosbag2.Writer(folder / "bag", version=9, storage_plugin=rosbag2.StoragePlugin.MCAP) as bag:
             for recording in recordings:
                 topic = bag.add_connection(f"/{recording.name.strip('/')}", kind, typestore=types)
                 for stamp, message in _messages(recording, states, actions, types.types):
                     bag.write(topic, stamp, types.serialize_cdr(message, kind))
-        [made] = (Path(folder) / "bag").glob("*.mcap")
+        [made] = (folder / "bag").glob("*.mcap")
         write(path, made.read_bytes())
 
 

@@ -36,7 +36,7 @@ class Journal:
     def begin(self) -> dict[int, Any]:
         """Results that are there already, by index; starts a new file where the settings differ."""
         head = json.dumps({"version": VERSION, **asdict(self.settings)}, sort_keys=True)
-        lines = self.path.read_text(encoding="utf-8").split("\n") if self.path.exists() else []
+        lines = self.path.read_text("utf-8", "replace").split("\n") if self.path.exists() else []
         # What follows the last line break was being written when the run was interrupted.
         try:
             done = dict(json.loads(line) for line in lines[1:-1]) if lines[:1] == [head] else {}

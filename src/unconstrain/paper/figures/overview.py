@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 import unconstrain as uc
 
 from ...base.arrays import Array, require_extra
+from ...base.files import write
 from ...pages.figures.style import COLOURS, INK
 from ...risks import unit_actions
 
@@ -71,7 +73,7 @@ def overview(
         panel.set_title(title, fontsize=19, color=INK, pad=12)
         panel.spines[:].set_color("#c9ced6")
     _colour_bar(drawing, coloured[-1])
-    drawing.savefig(path, metadata={"Software": None})
+    write(path, partial(drawing.savefig, format="png", metadata={"Software": None}))
 
 
 def _colour_bar(drawing: Any, coloured: Any) -> None:

@@ -41,7 +41,7 @@ def backend() -> str | None:
 def _works(name: str) -> bool:
     try:
         tried = subprocess.run(
-            [sys.executable, "-c", _PROBE],
+            [sys.executable, "-P", "-c", _PROBE],
             env=os.environ | {"MUJOCO_GL": name},
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,

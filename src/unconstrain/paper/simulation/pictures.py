@@ -109,7 +109,7 @@ def _shots(name: str, plate: Plate, postures: Array, trails: Sequence[Array], wi
         job, name=name, plate=[plate.tilt_x, plate.tilt_y, *plate.centre], postures=postures, size=[width, height],
         lengths=[len(trail) for trail in trails], trails=np.concatenate(trails),
     )  # fmt: skip
-    command = [sys.executable, "-c", f"from {__name__} import _render; _render()"]
+    command = [sys.executable, "-P", "-c", f"from {__name__} import _render; _render()"]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     if chosen:
         environment["MUJOCO_GL"] = chosen

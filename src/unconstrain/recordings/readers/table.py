@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array
+from ...base.display import legible
 from ...base.errors import ReadError, UnconstrainError
 from ..demonstration import Recording
 from ..remarks import Remark
@@ -185,7 +186,7 @@ class Assembly:
             names,
             table.values[:, _as_slice(np.array(places))],
             times,
-            table.name,
+            legible(table.name),
             (*table.remarks, *remarks),
             {name: unit for name, unit in table.units.items() if name in names},
             table.attributes,
