@@ -60,5 +60,5 @@ plt.show()
 # the inconsistency. How far it is from the better of the other two:
 
 for metric in ("nupe", "ncpe"):
-    ratios = figure5.ratios(result, metric)
+    ratios = figure5.ratios(result.rows, metric)
     print(f"n{metric[1:].upper()}:", ", ".join(f"{ratio:.2g} at {angle:g} rad" for angle, ratio in ratios.items()))

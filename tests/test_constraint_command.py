@@ -138,7 +138,7 @@ def test_an_arm_is_held_by_its_hand(tmp_path):
         postures, wanted = rng.uniform(0.3, 1.8, (60, 2)), rng.standard_normal((60, 2))
         free = uc.null_space_projection(arm.jacobian(postures)[:, :1])
         write(tmp_path / f"{k}.csv", "t,a,b,va,vb", [0.1 * np.arange(60), postures, uc.project(free, wanted)])
-    options = ("--jacobian", tmp_path / "robot.urdf", "--tip", "hand", "-o", tmp_path / "d.npz")
+    options = ("--jacobian", tmp_path / "robot.urdf", "--tip", "hand", "-o", tmp_path / "c.npz")
     said = run("constraint", tmp_path / "*.csv", *options)
     assert "1 of 2 directions held, by constant features." in said
     storage.register(uc.systems.arm.Arm)

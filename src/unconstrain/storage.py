@@ -33,8 +33,10 @@ from .learners import (
     Robust,
     Segments,
     Solution,
+    secondary,
 )
 from .models import Affine, Everywhere, KMeansRBF, Model, NormalisedRBF, Polynomial, ReceptiveFields, Scale, spaces
+from .motion import Guided, Potential
 from .policies import LocallyLinearPolicy, ParametricPolicy, Policy
 from .risks import FoldedMoments, Moments
 from .training import Folds, HeldOut, Split, Training
@@ -54,8 +56,9 @@ _KNOWN: dict[str, type] = {
         *(spaces.Circle, spaces.Embedding, spaces.Euclidean, spaces.Product, spaces.Sphere),
         *(Belief, Direct, Hybrid, Inconsistency, Judged, Likelihood, NoiseCorrected, Robust, Segments, Solution),
         *(FoldedMoments, Folds, HeldOut, Moments, Split, Training),
-        *(LocallyLinearPolicy, ParametricPolicy),
+        *(Guided, LocallyLinearPolicy, ParametricPolicy, Potential),
         *STORED,
+        *secondary.STORED,
     )
 }
 
@@ -80,13 +83,13 @@ def register(kind: type) -> type:
 
 
 def save(
-    policy: Policy | LearntConstraint, path: str | os.PathLike[str], notes: Mapping[str, Any] | None = None
+    policy: Policy | Guided | LearntConstraint, path: str | os.PathLike[str], notes: Mapping[str, Any] | None = None
 ) -> None:
-    """Write a policy, or a learnt constraint, to a file, whole or not at all.
+    """Write a policy, guided or not, or a learnt constraint to a file, whole or not at all.
 
     Parameters
     ----------
-    policy : Policy or LearntConstraint
+    policy : Policy, Guided or LearntConstraint
         Fitted or not. A policy's moments go along, so that it can learn on from sums. Samples do not: what was fitted
         by a learner that looks at them, such as :class:`~unconstrain.Robust`, predicts as before, and to learn more has
         to be fitted anew, or copied or pickled in place of saved. A constraint goes without what it was learnt from,
@@ -130,7 +133,7 @@ def load(path: str | os.PathLike[str], kind: type[Any] = Policy) -> Any:
     ----------
     path : str or path-like
     kind : type
-        ``Policy`` or ``LearntConstraint``.
+        ``Policy``, ``Guided`` or ``LearntConstraint``.
 
     Raises
     ------
@@ -167,8 +170,6 @@ def _without_samples(model: Any) -> Any:
     slim = copy(model)
     for name in ("_waiting", "evidence_"):
         slim.__dict__.pop(name, None)
-    if hasattr(model, "training_"):
-        slim.training_ = model.training_.without_samples()
     return slim
 
 

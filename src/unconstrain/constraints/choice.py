@@ -104,10 +104,10 @@ class Choice:
                 "same. Record movements that cross each other, or name the features."
             )
         if max(self.held_out, self.proportional) > DOUBTFUL:
+            faster = f", {self.proportional:.0%} where movements are fast" if self.proportional > DOUBTFUL else ""
             said.append(
-                f"Along the held directions moves {self.held_out:.0%} of a mean square action, and of the square of "
-                f"the motion {self.proportional:.0%}: noise, or the constraint is not quite of this form, or differs "
-                "between demonstrations."
+                f"Along the held directions moves {self.held_out:.0%} of a mean square action{faster}: noise, or the "
+                "constraint is not quite of this form, or differs between demonstrations."
             )
         return tuple(said)
 

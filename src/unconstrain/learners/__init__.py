@@ -1,6 +1,6 @@
 """Learners, from training data to a solution: those of the paper, and the robust ones."""
 
-from . import robust
+from . import robust, secondary
 from .direct import Direct
 from .hybrid import Hybrid
 from .inconsistency import Inconsistency
@@ -24,4 +24,5 @@ __all__ = [
     "Uncertainty",
     "named",
     "robust",
+    "secondary",
 ]

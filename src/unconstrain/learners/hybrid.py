@@ -20,6 +20,7 @@ from ..risks import (
 )
 from ..training import Training
 from .learner import Learner
+from .secondary import Objective, Secondary, on
 from .solution import Solution
 from .thresholds import Averaging, check_settings, judged, solve_at_threshold, within_errors
 
@@ -50,14 +51,20 @@ class Hybrid(Learner):
         paper has 0, a hard split of the directions. On noisy recordings 0.1
         with ``threshold=0`` is better: each direction is then a weighted
         compromise of both objectives.
+    secondary : callable or Secondary, optional
+        What is minimised in the directions left undetermined, in place of the standard risk: ``towards(goal, gain)``,
+        ``like(policy)``, ``damped(gain)`` of :mod:`unconstrain.learners.secondary`, sums of them and of
+        :func:`~unconstrain.learners.secondary.standard_risk`, or a function of your own from moments to a quadratic.
     """
 
     alpha: float | Literal["auto"] = 0.1
     threshold: float | None = None
     softness: float = 0.0
     averaging: Averaging = "geometric"
+    secondary: Objective | Secondary | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "needs_samples", getattr(self.secondary, "needs_samples", False))
         if self.alpha != "auto":
             check_at_least("alpha", self.alpha, 0.0)
         elif self.threshold is not None or self.softness:
@@ -70,13 +77,15 @@ class Hybrid(Learner):
         folds = training.folds
         if self.alpha == "auto":
             return replace(self, alpha=0.0, threshold=0.0, softness=chosen_softness(folds)).learn(training)
+        path = partial(self._path, on(self.secondary, training))
         return solve_at_threshold(
-            folds, self._path, partial(_score, self.alpha), self.threshold, self.averaging, method="hybrid"
+            folds, path, partial(_score, self.alpha), self.threshold, self.averaging, method="hybrid"
         )
 
-    def _path(self, moments: Moments) -> Path:
-        consistent, risk = inconsistency(moments), standard_risk(moments)
-        return lexicographic_path(consistent + self.softness * risk if self.softness else consistent, risk)
+    def _path(self, second: Objective, moments: Moments) -> Path:
+        consistent = inconsistency(moments)
+        first = consistent + self.softness * standard_risk(moments) if self.softness else consistent
+        return lexicographic_path(first, second(moments))
 
 
 def _score(alpha: float, moments: Moments) -> Quadratic:

@@ -63,7 +63,9 @@ def rollout(
     Parameters
     ----------
     policy : callable
-        States (K, n) to actions (K, n), or as many as directions in the state space; a fitted policy is one.
+        States (K, n) to actions (K, n), or as many as directions in the state space; a fitted policy is one. Where it
+        has a method ``under``, that is called in its place, with states and the projections N (K, n, n), as
+        :class:`~unconstrain.Guided` has.
     start : array_like, shape (n,) or (K, n)
         Where to start; several starts run side by side.
     steps : int
@@ -106,9 +108,9 @@ def rollout(
     times = dt * np.arange(steps, dtype=np.float64)
     for step in range(steps):
         states[:, step] = state
-        wanted[:, step] = _action(policy, state, d)
         matrices = _matrices(constraint, state, times[step], d)
         projections[:, step] = null_space_projection(matrices)
+        wanted[:, step] = _action(policy, state, projections[:, step])
         drift = 0.0 if task is None else _drift(matrices, task(state, np.full(runs, times[step])))
         actions[:, step] = _without_rounding(project(projections[:, step], wanted[:, step]), wanted[:, step]) + drift
         state = _moved(within, state, dt * actions[:, step], step)
@@ -159,8 +161,10 @@ def _without_rounding(actions: Array, wanted: Array) -> Array:
     return np.where(rounding, 0.0, actions)
 
 
-def _action(policy: Callable[[Array], Array], state: Array, d: int) -> Array:
-    action = np.asarray(policy(state))
+def _action(policy: Callable[[Array], Array], state: Array, projections: Array) -> Array:
+    """What the policy wants, (K, d); one that can, is told what the constraint leaves."""
+    under, d = getattr(policy, "under", None), projections.shape[2]
+    action = np.asarray(policy(state) if under is None else under(state, projections))
     if action.shape != (len(state), d):
         raise SettingError(
             f"policy: got actions of shape {action.shape} for states of shape {state.shape}; a rollout expects "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 from itertools import pairwise
 from typing import ClassVar
@@ -67,7 +67,7 @@ class Training(Shown):
     split: Split
     at_rest: float
     gathered: FoldedMoments
-    batches: tuple[Batch, ...] | None = None
+    batches: tuple[Batch, ...] | None = field(default=None, metadata={"stored": False})
     action_unit: float = 1.0
     weight_unit: float = 1.0
     most: int | None = 0
@@ -147,10 +147,6 @@ class Training(Shown):
         nothing = FoldedMoments((), self.gathered.held_out)
         begun = replace(self, gathered=nothing, batches=(), longest=np.inf)  # they were tempered when kept
         return replace(begun.with_batches(batches), longest=self.longest)
-
-    def without_samples(self) -> Training:
-        """The sums alone."""
-        return replace(self, batches=None)
 
     @property
     def moments(self) -> Moments:

@@ -1,0 +1,221 @@
+"""A policy that arrives, free and under any constraint."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.optimize import check_grad, minimize
+
+import unconstrain as uc
+from recorded import needs_data
+from unconstrain.base.errors import InvalidDataError, SettingError
+from unconstrain.constraints.known import Plane, SwitchingLine
+from unconstrain.motion.potential import descended, excess
+from unconstrain.paper.datasets.handwriting import load_handwriting
+
+GOAL = np.array([0.3, -0.2, 0.1])
+STARTS = np.random.default_rng(3).uniform(-2, 2, (40, 3))
+
+
+def spiral(states):
+    """Turns about an axis while it goes down: not what a straight potential would do."""
+    z = states - GOAL
+    return np.column_stack([-z[:, 0] - 2 * z[:, 1], 2 * z[:, 0] - z[:, 1], -0.5 * z[:, 2]])
+
+
+def drifting(states):
+    """As shown near the goal, and away from it for ever elsewhere."""
+    away = np.linalg.norm(states - GOAL, axis=1, keepdims=True)
+    return spiral(states) * (1 - 0.5 * away**2) + 0.05
+
+
+SHOWN = uc.rollout(spiral, STARTS[:6] / 3, 120, 0.05)
+
+
+@pytest.fixture(scope="module")
+def guided():
+    return uc.Guided(drifting, GOAL, demonstrations=SHOWN, dt=0.02)
+
+
+@pytest.fixture(scope="module")
+def learnt():
+    """A fitted policy, guided by the demonstrations that it has kept."""
+    return uc.Guided(uc.LocallyLinearPolicy().fit_demonstrations(SHOWN))
+
+
+def least_on_plane(potential, start, normal):
+    basis = np.linalg.svd(normal[None])[2][1:]
+    return minimize(lambda y: potential((start + y @ basis)[None])[0], np.zeros(2), tol=1e-10).fun
+
+
+def test_every_movement_arrives(guided):
+    assert (drifting(STARTS) * (STARTS - GOAL)).sum(axis=1).max() > 1.0
+    for run in uc.rollout(guided, STARTS, 2000, guided.dt_):
+        assert_allclose(run.states[-1], GOAL, atol=1e-3)
+
+
+@pytest.mark.parametrize("factor", [0.1, 1.0])
+def test_the_potential_falls_at_every_step_and_movements_end_where_it_is_least_on_their_plane(guided, factor):
+    normals = np.random.default_rng(4).standard_normal((40, 3))
+    planes = [Plane(normal) for normal in normals]
+    steps = 2000 if factor == 1.0 else 300
+    for run, normal in zip(uc.rollout(guided, STARTS, steps, factor * guided.dt_, planes), normals, strict=True):
+        level = guided.potential_(run.states)
+        moving = level[:-1] > level[-1] * (1 + 1e-9)
+        assert moving[0]
+        assert (np.diff(level)[moving] < 0).all()
+        assert np.ptp(run.states @ normal) < 1e-9
+        if factor == 1.0:
+            assert level[-1] <= least_on_plane(guided.potential_, run.states[0], normal) + 1e-5 * level[0]
+
+
+def test_v_falls_as_much_as_the_ball_says_whatever_the_policy_wants():
+    rng = np.random.default_rng(5)
+    for size in (1e-6, 1.0, 1e6):
+        wild = uc.Guided(lambda x, size=size: size * rng.standard_normal(x.shape), GOAL, demonstrations=SHOWN)
+        velocities, slope = wild(STARTS), wild.potential_.gradient(STARTS)
+        half = np.linalg.norm(slope, axis=1) / 2
+        radius = np.maximum(half - wild.pace_, half / 2)
+        fall, least = -np.vecdot(slope, velocities), (velocities**2).sum(axis=1) + half**2 - radius**2
+        assert (fall >= least * (1 - 1e-9)).all()
+
+
+def test_what_is_allowed_is_not_touched_and_near_the_edge_little(guided):
+    wanted, now = drifting(STARTS / 3), guided(STARTS / 3)
+    assert_array_equal(guided(SHOWN[0].states[:5]).shape, (5, 3))
+    same = (wanted == now).all(axis=1)
+    assert 0 < same.sum() < len(same)
+    along = STARTS[0] + np.linspace(0, 1, 20001)[:, None] * (STARTS[1] - STARTS[0])
+    assert np.abs(np.diff(guided(along), axis=0)).max() < 0.02 * np.abs(guided(along)).max()
+
+
+def test_a_correction_is_in_the_null_space(guided):
+    projections = np.tile(uc.null_space_projection(np.array([[1.0, 2.0, -1.0]])), (40, 1, 1))
+    correction = guided.under(STARTS, projections) - drifting(STARTS)
+    assert np.abs(correction).max() > 0.1
+    assert_allclose(uc.project(projections, correction), correction, atol=1e-10)
+    assert_allclose(guided.under(STARTS, np.tile(np.eye(3), (40, 1, 1))), guided(STARTS))
+
+
+def test_a_constraint_that_switches_is_followed_too(guided):
+    line = SwitchingLine([[1.0, 0.3, 0.0], [0.0, 1.0, 1.0]], [0.2])
+    run = uc.rollout(guided, STARTS[0], 200, guided.dt_, line)
+    assert (np.diff(guided.potential_(run.states)) <= 1e-15).all()
+
+
+def test_the_demonstrated_motion_is_hardly_corrected(learnt):
+    states = uc.stack(SHOWN).states
+    assert np.linalg.norm(learnt.correction(states)) < 0.05 * np.linalg.norm(learnt.policy(states))
+    assert_allclose(learnt.goal_, GOAL, atol=0.02)
+
+
+def test_units_do_not_matter(guided):
+    length, time = 1024.0, 64.0  # powers of two: the same digits all the way
+    scaled = [uc.Demonstration(length * d.states, length / time * d.actions, time * d.times) for d in SHOWN]
+    other = uc.Guided(
+        lambda x: length / time * drifting(x / length), length * GOAL, demonstrations=scaled, dt=time * guided.dt_
+    )
+    assert_allclose(other(length * STARTS), length / time * guided(STARTS), rtol=1e-3, atol=1e-3 * length / time)
+    assert_allclose(other.dt_, time * guided.dt_, rtol=1e-3)
+
+
+def test_a_step_is_the_prediction(guided, learnt):
+    for policy in (guided, learnt):
+        out = np.empty(3)
+        for state, velocity in zip(STARTS, policy(STARTS), strict=True):
+            assert_allclose(policy.step(state), velocity, rtol=1e-9, atol=1e-12)
+            assert policy.step(list(state), out) is out
+            assert_allclose(out, velocity, rtol=1e-9, atol=1e-12)
+
+
+def test_a_longer_step_can_be_asked_for(guided):
+    by_itself = uc.Guided(drifting, GOAL, demonstrations=SHOWN).dt_
+    assert by_itself < 0.02 <= guided.dt_
+    assert_allclose(uc.Guided(drifting, GOAL, demonstrations=SHOWN, dt=100.0).dt_, 100.0)
+    assert uc.Guided(drifting, GOAL, demonstrations=SHOWN, dt=by_itself / 10).dt_ == by_itself
+
+
+@pytest.mark.parametrize("states", [[[0.0, 0.0]], [[1.0, 0.0]], [[0.0, 0.0], [1.0, 1.0]]])
+def test_what_was_shown_may_be_hardly_anything(states):
+    rest = uc.Demonstration(states, np.zeros_like(states))
+    guided = uc.Guided(lambda x: np.ones(x.shape), [0.0, 0.0], demonstrations=rest)
+    level = guided.potential_(uc.rollout(guided, [3.0, -1.0], 200, guided.dt_ / 2).states)
+    assert (np.diff(level)[level[:-1] > 1e-20] < 0).all()
+    assert level[-1] < level[0]
+
+
+def test_it_survives_its_file(learnt, tmp_path):
+    uc.save(learnt, tmp_path / "guided.npz")
+    again = uc.load(tmp_path / "guided.npz", uc.Guided)
+    assert_array_equal(again(STARTS), learnt(STARTS))
+    assert_array_equal(again.step(STARTS[0]), learnt.step(STARTS[0]))
+    assert (again.dt_, again.pace_) == (learnt.dt_, learnt.pace_)
+
+
+def test_the_slope_of_v_and_of_what_it_is_learnt_by_are_those_of_finite_differences(guided):
+    potential, rng = guided.potential_, np.random.default_rng(6)
+    assert check_grad(lambda x: potential(x[None])[0], lambda x: potential.gradient(x[None])[0], STARTS[0]) < 1e-5
+    for velocity, state in zip(3 * rng.standard_normal((30, 1, 3)), STARTS, strict=False):
+        half, slope = (
+            (lambda c, v=velocity: excess(v, c[None])[0][0] ** 2 / 2),
+            lambda c, v=velocity: excess(v, c[None]),
+        )
+        assert check_grad(half, lambda c, slope=slope: slope(c)[1][0], state) < 1e-5
+
+
+def test_a_potential_is_convex_and_least_at_the_goal():
+    states, velocities, _ = uc.stack(SHOWN)
+    potential = descended(states, velocities, GOAL)
+    assert potential(GOAL[None])[0] == 0.0
+    middle = potential((STARTS[::2] + STARTS[1::2]) / 2)
+    assert (middle <= (potential(STARTS[::2]) + potential(STARTS[1::2])) / 2).all()
+    assert (potential.weights >= 0).all()
+    assert (potential.offsets >= 0).all()
+
+
+@needs_data
+@pytest.mark.parametrize("shape", ["Angle", "Multi_Models_3"])
+def test_handwriting_arrives_from_everywhere_and_stays_as_it_was(monkeypatch, shape):
+    from recorded import DATA
+
+    monkeypatch.setenv("UNCONSTRAIN_DATA", str(DATA))
+    demos = load_handwriting(shape)
+    states, actions, _ = uc.stack(demos)
+    policy = uc.LocallyLinearPolicy(learner="direct").fit_demonstrations(demos)
+    guided = uc.Guided(policy, demonstrations=demos, dt=0.02)
+    low, high = states.min(axis=0), states.max(axis=0)
+    box = (low + high) / 2 + 1.5 * (np.random.default_rng(0).random((20, 2)) - 0.5) * (high - low)
+    steps = int(4 * max(demo.times[-1] for demo in demos) / 0.02)
+    runs = uc.rollout(guided, [*(demo.states[0] for demo in demos), *box], steps, 0.02)
+    reach = 0.05 * np.linalg.norm(states, axis=1).max()
+    assert max(np.linalg.norm(run.states[-1] - guided.goal_) for run in runs) < reach
+    wanted, correction = policy(states), guided.correction(states)
+    assert np.linalg.norm(correction, axis=1).sum() < 0.1 * np.linalg.norm(wanted, axis=1).sum()
+    assert np.sum((wanted + correction - actions) ** 2) < 1.1 * np.sum((wanted - actions) ** 2)
+
+
+@pytest.mark.parametrize(
+    ("policy", "arguments", "error", "sentence"),
+    [
+        (drifting, {}, SettingError, "demonstrations: got none, and the policy has not kept its own"),
+        (drifting, {"demonstrations": [d[:5] for d in SHOWN]}, SettingError, "goal: no demonstration ends at rest"),
+        (
+            drifting,
+            {"demonstrations": [SHOWN[0], uc.Demonstration(SHOWN[1].states + 1, SHOWN[1].actions)]},
+            InvalidDataError,
+            "goal: demonstrations end at rest in places up to",
+        ),
+        (drifting, {"demonstrations": SHOWN, "goal": [0.0]}, InvalidDataError, "goal: got"),
+        (drifting, {"demonstrations": SHOWN, "dt": 0.0}, SettingError, "dt: got 0.0"),
+        (lambda x: x[:, :2], {"demonstrations": SHOWN}, SettingError, "Guided expects actions that are velocities"),
+    ],
+)
+def test_what_cannot_be_guided_is_said(policy, arguments, error, sentence):
+    with pytest.raises(error, match=sentence):
+        uc.Guided(policy, **arguments)
+
+
+def test_curved_states_are_refused():
+    turns = uc.Demonstration([[0.1], [0.2], [0.3]], [[0.1], [0.05], [0.0]], space=uc.spaces.Circle())
+    policy = uc.ParametricPolicy(uc.Affine(), learner="direct").fit_demonstrations(turns)
+    with pytest.raises(SettingError, match="angles or orientations"):
+        uc.Guided(policy, demonstrations=turns)
