@@ -29,7 +29,7 @@ class Candidate:
         Weights learnt without each of R folds: those that predict ``held_out``.
     softness : float
         Of a softened hybrid, infinite for direct regression; zero where no share of the standard risk biases the
-        policy towards the actions.
+        policy towards the actions; −1 where more is known of the constraints than their actions.
     """
 
     name: str

@@ -15,11 +15,10 @@ and Lepski do (*Annals of Statistics* 39(3), 2011):
 
 Softened hybrids (eq. 6 with ``E_i + s E_2``) have the less bias the smaller
 their softness s; s is infinite for direct regression, and zero for learners
-that minimise an error of consistency alone. A candidate j that is less
+that minimise an error of consistency alone. Whoever knows the Jacobian of the
+constraints has less bias than all, and a softness of −1. A candidate j that is less
 consistent than k where held out, beyond chance, shows no bias of k; nor does
-one that is so by the residuals weighted by ‖u‖², as under noise alone. One
-that is more consistent than k, beyond chance, shows bias whatever its
-softness, unless its own variance is a good part of the motion.
+one that is so by the residuals weighted by ‖u‖², as under noise alone.
 
 Residuals have the variance ``‖π‖² (σ² / ‖u‖² + κ²)`` under any constraint:
 noise of variance σ² turns the direction of a slow action, and people vary by
@@ -48,7 +47,6 @@ from .candidate import Candidate
 from .constants import (
     COMPARED_STATES,
     LEAST_DEMONSTRATIONS,
-    MOST_VARIANCE,
     NEGLIGIBLE_LOSS,
     NEGLIGIBLE_RATIO,
     REFUTED,
@@ -98,7 +96,7 @@ class Comparison:
     def best(self) -> Candidate:
         """The candidate of least risk; of softened hybrids, the softest that is as good within chance."""
         best = int(self.risks.argmin())
-        if self._candidates[best].softness == 0.0:
+        if self._candidates[best].softness <= 0.0:
             return self._candidates[best]
         near = [
             k for k, risk in enumerate(self.risks) if risk <= self.risks[best] + TIED * _gap(self._losses, k, best)[1]
@@ -182,13 +180,9 @@ class Comparison:
         return bias
 
     def _may_show(self, one: int, other: int) -> bool:
-        """Whether the first has less bias, or refutes the second and varies little, and is not refuted by it."""
-        softness = self._candidates[one].softness
-        if self._refuted[one, other]:
-            return False
-        less = softness == 0.0 or softness < self._candidates[other].softness
-        known = self._variance[one] <= MOST_VARIANCE * self._samples.energy
-        return bool(less or (known and self._refuted[other, one]))
+        """Whether the first has less bias than the second, or as little as any, and is not refuted by it."""
+        mine, its = self._candidates[one].softness, self._candidates[other].softness
+        return (mine < its or mine == its <= 0.0) and not self._refuted[one, other]
 
     @cached_property
     def _refuted(self) -> NDArray[np.bool_]:

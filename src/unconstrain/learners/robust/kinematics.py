@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from .consistent import least_error
 from .constants import FREE_OF_KINDS, MISFITS_OF_JACOBIAN, ROUNDS_OF_KINDS
 from .held_rows import UNKNOWN, HeldRows, Kinds
 from .noise import corrected
+
+KNOWING = -1.0
+"""Softness of those who know more of the constraints than actions tell."""
 
 Jacobian = Callable[[Array], Array]
 """States (N, n) to Jacobians (N, r, d)."""
@@ -77,7 +81,7 @@ def _candidate(name: str, samples: Samples, kinds: Kinds, jacobians: Array, nois
         size, free = np.vecdot(policy, policy), ~known & _as_near(samples, policy, projections, known)
         if (free == before).all():
             break
-    return found
+    return replace(found, softness=KNOWING)
 
 
 def _size_of_policy(samples: Samples, ranks: Array) -> float:
