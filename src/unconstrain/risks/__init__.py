@@ -1,5 +1,6 @@
 """The mathematics: projections, moments (sufficient statistics), quadratics and their minima."""
 
+from .autocorrelation import autocorrelations
 from .folded_moments import FoldedMoments
 from .moments import Moments, Sums, gather, total
 from .objectives import inconsistency, standard_risk, unvec, vec
@@ -24,6 +25,7 @@ __all__ = [
     "Quadratic",
     "Sums",
     "action_projection",
+    "autocorrelations",
     "eigensystem",
     "gather",
     "inconsistency",

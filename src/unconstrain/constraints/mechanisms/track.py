@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import islice, takewhile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array
+from ...risks import autocorrelations
 from .quaternions import mean_orientation, turns_from
 
 
@@ -80,17 +82,11 @@ def correlation_time(residuals: Array, groups: NDArray[np.intp], fitted: int = 0
     fit of some parameters takes from each autocorrelation what as many means would, and that is given back.
     """
     count, columns = residuals.shape
-    energy = float((residuals**2).sum(axis=1).mean())
-    time, lag, insignificant = 1.0, 0, 1.0 / np.sqrt(residuals.size)
-    for lag in range(1, count // 2):
-        same = groups[lag:] == groups[:-lag]
-        if energy <= 0.0 or not same.any():
-            break
-        correlation = float((residuals[lag:] * residuals[:-lag]).sum(axis=1)[same].mean()) / energy
-        if correlation <= insignificant:
-            break
-        time += 2.0 * correlation
-    return time / max(1.0 - (2 * lag - 1) * fitted / columns / count, 1 / 3)
+    longest, insignificant = max(count // 2 - 1, 0), 1.0 / np.sqrt(residuals.size)
+    tried = islice(autocorrelations(residuals, groups), longest)
+    found = list(takewhile(lambda each: each > insignificant, tried))
+    lag = min(len(found) + 1, longest)
+    return (1.0 + 2.0 * sum(found)) / max(1.0 - (2 * lag - 1) * fitted / columns / count, 1 / 3)
 
 
 def noise_by_differences(values: Array, groups: NDArray[np.intp]) -> float:

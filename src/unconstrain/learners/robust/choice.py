@@ -98,16 +98,14 @@ class Comparison:
         best = int(self.risks.argmin())
         if self._candidates[best].softness <= 0.0:
             return self._candidates[best]
-        near = [
-            k for k, risk in enumerate(self.risks) if risk <= self.risks[best] + TIED * _gap(self._losses, k, best)[1]
-        ]
-        return max((self._candidates[k] for k in near), key=lambda one: one.softness)
+        near = np.flatnonzero(self.risks <= self.risks[best] + TIED * _gaps(self._losses)[1][:, best])
+        return max((self._candidates[k] for k in near.tolist()), key=lambda one: one.softness)
 
     @property
     def as_consistent(self) -> list[Candidate]:
         """The candidates after the first that are not less consistent than it, beyond chance, where held out."""
-        pairs = ((one, _gap(self._losses, k, 0)) for k, one in enumerate(self._candidates))
-        return [one for one, (gap, error) in pairs if one is not self._candidates[0] and gap <= REFUTED * error]
+        gap, error = (each[1:, 0] for each in _gaps(self._losses))
+        return [self._candidates[1 + k] for k in np.flatnonzero(gap <= REFUTED * error).tolist()]
 
     @cached_property
     def risks(self) -> Array:
@@ -228,13 +226,12 @@ def leverage(samples: Samples) -> Array:
 
 def _beyond_chance(losses: Array) -> NDArray[np.bool_]:
     """Whether each candidate's loss (K, G) is larger than each other's, by some standard errors and not negligibly."""
-    gaps, whole = losses[:, None] - losses, losses.sum(axis=1)
-    gap, error = gaps.sum(axis=2), gaps.std(axis=2, ddof=1) * np.sqrt(losses.shape[1])
+    (gap, error), whole = _gaps(losses), losses.sum(axis=1)
     large = (gap > NEGLIGIBLE_LOSS) | (whole[:, None] > NEGLIGIBLE_RATIO * np.maximum(whole, 1e-9))
     return np.asarray(large & (gap > REFUTED * error))
 
 
-def _gap(losses: Array, one: int, other: int) -> tuple[float, float]:
-    """Difference of two candidates' losses (K, G), and its standard error, paired by demonstration."""
-    gap = losses[one] - losses[other]
-    return float(gap.sum()), float(gap.std(ddof=1) * np.sqrt(len(gap)))
+def _gaps(losses: Array) -> tuple[Array, Array]:
+    """By how much each candidate's loss (K, G) is above each other's, and its standard error, paired; each (K, K)."""
+    gaps = losses[:, None] - losses
+    return gaps.sum(axis=2), gaps.std(axis=2, ddof=1) * np.sqrt(losses.shape[1])

@@ -106,8 +106,8 @@ def least_error(name: str, samples: Samples, errors: Sequence[Quadratic], odds: 
     The prior's softness is the error missed over the risk missed beside it, times the unit-information factor, by
     fixed-point iteration; ``odds`` is the number of coordinates beside the error over the number in it.
     """
-    d, ones = samples.actions.shape[1], np.ones(len(samples))
-    risks = [part.risk(part.actions, ones[: len(part)]) for part in samples.by_fold()]
+    d = samples.actions.shape[1]
+    risks = [part.risk(part.actions, np.ones(len(part))) for part in samples.by_fold()]
     sizes, everything = samples.sizes, list(range(len(errors)))
     factor = odds * unit_information(d * samples.regressors, sizes)
 

@@ -80,7 +80,7 @@ class HeldRows:
     """
 
     def __init__(self, actions: Array, jacobians: Array, groups: NDArray[np.intp], noise: float) -> None:
-        self._groups, self._noise, self._d = groups, noise, actions.shape[1]
+        self._groups, self._noise = groups, noise
         self._count, self._size = int(groups.max()) + 1, float(np.vecdot(actions, actions).mean()) / actions.shape[1]
         self._moved = np.einsum("nrd,nd->nr", jacobians, actions)  # v = J u
         self._metric = jacobians @ jacobians.swapaxes(1, 2)  # J Jᵀ
@@ -126,14 +126,17 @@ class HeldRows:
         """Rows held by some demonstrations, and by all that fit these rows, in turn."""
         rows = self._held(start, variance)
         for _ in range(3):
-            support = left[self._fits(rows, variance)[left]] if len(rows) else left[:0]
+            support = self._support(rows, left, variance)
             if len(support) == 0:
                 break
             before, rows = len(rows), self._held(support, variance)
             if len(rows) == before:
                 break
-        support = left[self._fits(rows, variance)[left]] if len(rows) else left[:0]
-        return rows, support
+        return rows, self._support(rows, left, variance)
+
+    def _support(self, rows: Array, left: NDArray[np.intp], variance: float) -> NDArray[np.intp]:
+        """Which of some demonstrations fit rows; none where there is no row."""
+        return left[self._fits(rows, variance)[left]] if len(rows) else left[:0]
 
     def _held(self, of: NDArray[np.intp], variance: float) -> Array:
         """Λ (k, r), normalised to ``Λ B Λᵀ = I``, of what some demonstrations held in common."""

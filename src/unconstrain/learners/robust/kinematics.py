@@ -72,9 +72,9 @@ def _candidate(name: str, samples: Samples, kinds: Kinds, jacobians: Array, nois
     projections = kinds.projections(jacobians, samples.groups)
     ranks, known = np.trace(projections, axis1=1, axis2=2), (kinds.labels != UNKNOWN)[samples.groups]
     size, free = np.full(len(samples), _size_of_policy(samples[known], ranks[known])), np.zeros_like(known)
+    folds = [samples.folds == fold for fold in range(int(samples.folds.max()) + 1)]
     for _ in range(ROUNDS_OF_KINDS):
         used = known | free
-        folds = [samples.folds == fold for fold in range(int(samples.folds.max()) + 1)]
         errors = [_error(samples[rows], used[rows], projections[rows], size[rows], noise) for rows in folds]
         found = least_error(name, samples, errors, _odds(samples, np.where(used, ranks, 1.0)))
         policy, before = samples.predict(found.weights), free

@@ -19,6 +19,7 @@ follows from the expectations
 and is a combination of the moments with sample weights ‖u‖² and 1.
 """
 
+from itertools import islice
 from math import comb
 
 import numpy as np
@@ -26,7 +27,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from ...base.arrays import Array
-from ...risks import Moments, standard_risk
+from ...risks import Moments, autocorrelations, standard_risk
 from ...training import Samples
 from .constants import DIFFERENCE_ORDER, LEAST_AUTOCORRELATION, LEAST_DIFFERENCES, MOST_LAGS, SPHERE_HIDDEN_BY_NOISE
 
@@ -99,13 +100,8 @@ def correlation_time(residuals: Array, groups: NDArray[np.intp]) -> float:
     float
         At least 1.
     """
-    energy = float(np.vecdot(residuals, residuals).mean()) if len(residuals) else 0.0
     time = 1.0
-    for lag in range(1, min(MOST_LAGS, len(residuals) - 1) + 1):
-        same = groups[lag:] == groups[:-lag]
-        if energy <= 0.0 or not same.any():
-            break
-        correlation = float(np.vecdot(residuals[lag:], residuals[:-lag])[same].mean()) / energy
+    for correlation in islice(autocorrelations(residuals, groups), MOST_LAGS):
         if correlation <= LEAST_AUTOCORRELATION:
             break
         time += 2.0 * correlation
