@@ -10,7 +10,16 @@ from unconstrain.base.errors import InvalidDataError
 from unconstrain.constraints import identify
 from unconstrain.constraints.mechanisms.kinds import Circle, Cylinder, Line, Plane, Point, Screw, Sphere
 from unconstrain.constraints.mechanisms.track import correlation_time
-from unconstrain.paper.experiments.mechanisms import FREE, KINDS, inside, mechanisms, normals, simulate, strokes
+from unconstrain.paper.experiments.mechanisms import (
+    FREE,
+    KINDS,
+    inside,
+    mean_normal,
+    mechanisms,
+    normals,
+    simulate,
+    strokes,
+)
 
 AT, FRAME = np.array([0.3, -0.2, 0.5]), np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0]
 FRAME = FRAME * np.sign(np.linalg.det(FRAME))
@@ -236,8 +245,19 @@ def test_what_does_not_fit_is_refused(arguments, sentence):
 @needs_rim
 def test_the_flat_rim_is_a_plane_across_the_tools_axis(monkeypatch):
     monkeypatch.setenv("UNCONSTRAIN_DATA", str(DATA))
-    flat = [row for row in normals(rate=4.0) if row["bout"].startswith("A")]
+    rows = normals(rate=4.0)
+    flat, tilted = ([row for row in rows if row["bout"].startswith("A") == is_flat] for is_flat in (True, False))
     assert max(row["angle"] for row in flat) < 3
+    assert max(abs(row["angle"] - row["angle_curved"]) for row in tilted) < 2  # no surface is nearer to the tool
+
+
+def test_the_mean_normal_of_a_curved_surface_is_that_of_its_slopes():
+    u, v = np.random.default_rng(0).uniform(-0.1, 0.1, (2, 500))
+    positions = np.column_stack([u, v, 0.2 * u - 0.1 * v + u**2 - 2 * u * v])
+    slopes = np.array([(0.2 + 2 * u - 2 * v).mean(), (-0.1 - 2 * u).mean()])
+    normal, off = mean_normal(positions, np.array([0.0, 0.0, 1.0]))
+    assert_allclose(normal * np.sign(normal[2]), np.append(-slopes, 1.0) / np.sqrt(1.0 + slopes @ slopes), atol=1e-6)
+    assert off < 1e-12
 
 
 @pytest.mark.slow

@@ -31,6 +31,7 @@ from .constants import (
     BALANCE_STEPS,
     EIGENVALUE_STANDARD_ERRORS,
     FIRST_SOFTNESS,
+    MOST_OF_LEAST,
     NOISE_ROUNDS,
     SOFTNESS_RANGE,
     SOFTNESS_STANDARD_ERRORS,
@@ -97,45 +98,61 @@ def by_segments(samples: Samples, labels: NDArray[np.intp], noise: Array) -> Can
     """
     projections = projections_of(samples.actions, labels, noise)
     errors = [part.constrained(projections[samples.folds == fold]) for fold, part in enumerate(samples.by_fold())]
-    return least_error("segments", samples, errors)
+    return least_error("segments", samples, errors, [samples.actions.shape[1] * samples.regressors])
 
 
-def least_error(name: str, samples: Samples, errors: Sequence[Quadratic], odds: float = 1.0) -> Candidate:
+def least_error(name: str, samples: Samples, errors: Sequence[Quadratic], worths: Sequence[float]) -> Candidate:
     """Minimise the sum of an error over the folds, with a prior of standard risk.
 
-    The prior's softness is the error missed over the risk missed beside it, times the unit-information factor, by
-    fixed-point iteration; ``odds`` is the number of coordinates beside the error over the number in it.
+    The prior has the information of so many samples as the first of ``worths`` under which the error held out is about
+    the least. Its softness is the error missed over the risk missed beside it, times that over the number of
+    samples, by fixed-point iteration.
     """
-    d = samples.actions.shape[1]
     risks = [part.risk(part.actions, np.ones(len(part))) for part in samples.by_fold()]
-    sizes, everything = samples.sizes, list(range(len(errors)))
-    factor = odds * unit_information(d * samples.regressors, sizes)
-
-    def posterior(of: list[int], softness: Array) -> Posterior:
-        error, risk = (reduce(add, (one[i] for i in of)) for one in (errors, risks))
-        return Posterior(error, softness * risk)
-
-    softness = np.full(len(sizes), FIRST_SOFTNESS)
-    for _ in range(BALANCE_STEPS):
-        whole = posterior(everything, softness)
-        weights = vec(whole.weights(d))
-        loss, taken = judged(whole.evidence, weights), judged(reduce(add, risks), weights)
-        softness = np.clip(factor * loss / np.maximum(taken - loss, 1e-3 * taken + 1e-300), *SOFTNESS_RANGE)
-    found = posterior(everything, softness)
-    refits = [posterior([i for i in everything if i != fold] or everything, softness).weights(d) for fold in everything]
-    best = found.weights(d)
+    tried = [_Balanced(errors, risks, samples, worth) for worth in worths]
+    most = MOST_OF_LEAST * min(one.held_out for one in tried)
+    chosen = next((one for one in tried if one.held_out <= most), tried[-1])
+    best = chosen.weights
     radial = distances(samples.actions, samples.predict(best)).radial
-    residual = np.maximum(loss, 1e-12 * reduce(add, risks).constant) / np.maximum(sizes, 1e-300)
     time = correlation_time(radial[:, None], samples.groups)
     return Candidate(
         name,
         best,
-        scaled(found, time * residual),
-        samples.held_out(refits),
+        scaled(chosen.found, time * chosen.residual),
+        samples.held_out(chosen.refits),
         samples.mean(radial**2),
         Smoothness.of(samples),
-        np.stack(refits),
+        np.stack(chosen.refits),
     )
+
+
+class _Balanced:
+    """The least of an error and a prior of standard risk, both by fold, whose softness is found with it."""
+
+    def __init__(self, errors: Sequence[Quadratic], risks: Sequence[Quadratic], samples: Samples, worth: float) -> None:
+        self._errors, self._risks, self._samples = errors, risks, samples
+        self._everything, sizes = list(range(len(errors))), samples.sizes
+        risk, factor = reduce(add, risks), unit_information(worth, sizes)
+        self._softness = np.full(len(sizes), FIRST_SOFTNESS)
+        for _ in range(BALANCE_STEPS):
+            whole = self._posterior(self._everything)
+            weights = vec(whole.weights(samples.actions.shape[1]))
+            loss, taken = judged(whole.evidence, weights), judged(risk, weights)
+            self._softness = np.clip(factor * loss / np.maximum(taken - loss, 1e-3 * taken + 1e-300), *SOFTNESS_RANGE)
+        self.found = self._posterior(self._everything)
+        self.weights = self._minimum(self.found)
+        self.residual = np.maximum(loss, 1e-12 * risk.constant) / np.maximum(sizes, 1e-300)
+        others = [[i for i in self._everything if i != fold] or self._everything for fold in self._everything]
+        self.refits = [self._minimum(self._posterior(rest)) for rest in others]
+        pairs = zip(errors, self.refits, strict=True)
+        self.held_out = float(sum(judged(error, vec(refit)).sum() for error, refit in pairs))
+
+    def _posterior(self, of: list[int]) -> Posterior:
+        error, risk = (reduce(add, (one[i] for i in of)) for one in (self._errors, self._risks))
+        return Posterior(error, self._softness * risk)
+
+    def _minimum(self, posterior: Posterior) -> Array:
+        return posterior.weights(self._samples.actions.shape[1])
 
 
 class _Folds:

@@ -58,6 +58,15 @@ SEGMENT_SIGNAL_TO_NOISE = 3.0
 LEAST_SEGMENT = 4
 """Samples of a segment found automatically, at least."""
 
+MOST_OF_LEAST = 1.02
+"""A prior of less information is taken while the error held out is at most this multiple of the least.
+
+Of the arm whose Jacobian is known, three data sets each with rows 1-2-3 and 1-…-5 held: from 100 demonstrations at 20 %
+noise, nUPE is 18.2e-2 and 9.3e-2 with the information of one sample a weight, 7.5e-2 and 4.0e-2 with that of one sample
+altogether, and the error held out differs by less than 1 %. From 25 demonstrations it is 28.7e-2 and 27.4e-2 against
+33.3e-2 and 51.5e-2, and the error held out of the latter is 1.03 to 1.6 times the least.
+"""
+
 # Likelihood
 
 ANGULAR_SPREADS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.4)

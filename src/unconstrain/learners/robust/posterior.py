@@ -12,12 +12,12 @@ from ...risks import SECONDARY_NOISE, Quadratic, eigensystem, minimum, unvec
 from .constants import LEAST_PRIOR_PRECISION
 
 
-def unit_information(weights: int, sizes: Array) -> Array:
+def unit_information(weights: float, sizes: Array) -> Array:
     """Factor P / n of the standard risk in a unit-information prior, shape (M,).
 
-    It scales the information of the n samples to that of one sample for each of
-    the P weights. For one sample altogether this is the prior of Kass and
-    Wasserman, *Journal of the American Statistical Association* 90(431), 1995.
+    It scales the information of the n samples to that of P, such as one for each
+    weight. With one sample altogether this is the prior of Kass and Wasserman,
+    *Journal of the American Statistical Association* 90(431), 1995.
     """
     return weights / np.maximum(sizes, 1.0)
 

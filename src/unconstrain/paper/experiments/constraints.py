@@ -8,6 +8,7 @@ joints), but for noise on the states. Noise on the actions is a share of the pol
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from time import perf_counter
@@ -168,7 +169,8 @@ def run(
     Result
         A row for each task, noise and features: medians of "nppe", "npoe" and "ms", the worst "nppe", the noise found
         over the true one, and how often the rank is right. ``details`` holds the recording and its constraint; the
-        table "recorded" its nPOE where held out, the table "component" the error of null-space components, the table
+        table "recorded" its nPOE where held out, the table "normals" what :func:`.mechanisms.normals` finds on a car
+        rim, the table "component" the error of null-space components, the table
         "mechanisms" what :func:`.mechanisms.mechanisms` finds.
     """
     chosen = settings or Settings()
@@ -184,6 +186,8 @@ def run(
         return Result("constraints", chosen, rows, tables=tables)
     learnt = uc.LearntConstraint().fit(demo.states, demo.actions)
     tables["recorded"] = [_held_out(demo, blocks) for blocks in chosen.blocks]
+    with suppress(ReadError):
+        tables["normals"] = mechanisms.normals()
     return Result("constraints", chosen, rows, {"demonstration": demo, "learnt": learnt}, tables)
 
 
@@ -288,6 +292,11 @@ def headlines(result: Result) -> list[str]:
     said += [
         f"recorded fingertip, blocks of {row['s_each']:.1f} s held out: nPOE {row['npoe']:.3f}"
         for row in result.tables.get("recorded", [])
+    ]
+    said += [
+        f"wiped rim, {row['bout']}: plane {row['angle']:.1f}° from the tool's axis, {1e3 * row['off_plane']:.1f} mm "
+        f"off it; quadratic surface {row['angle_curved']:.1f}°, {1e3 * row['off_curved']:.1f} mm"
+        for row in result.tables.get("normals", [])
     ]
     ways = ", ".join(f"{row['way']} {row['error']:.1e}" for row in result.tables["component"])
     every = result.tables["mechanisms"][-1]

@@ -239,23 +239,44 @@ def normals(rate: float = 20.0) -> list[dict[str, Any]]:
     -------
     list of dict
         For each bout the likeliest kind; the angle between both normals and its 95 % interval, degrees; the distance
-        from the plane, m, root mean square: where it is millimetres, the surface is no plane.
+        from the plane, m, root mean square: where it is millimetres, the surface is no plane. Beside it the same angle
+        and distance of the quadratic surface nearest to the positions, at its mean normal.
     """
     rows = []
     for bout in uc.datasets.load_rim_wiping(rate=rate):
         found = uc.constraints.identify(bout.demonstration.states)
         plane = next(one for one in found.candidates if one.kind == "plane")
-        cosine = abs(float(plane.mechanisms[0].axis @ bout.tool_normal))
+        curved, off_curved = mean_normal(bout.demonstration.states, plane.mechanisms[0].axis)
         rows.append(
             {
                 "bout": bout.name,
                 "likeliest": found.kind,
-                "angle": float(np.degrees(np.arccos(min(cosine, 1.0)))),
+                "angle": _angle(plane.mechanisms[0].axis, bout.tool_normal),
                 "margin": float(np.degrees(plane.mechanisms[0].margins["tilt"].max())),
                 "off_plane": plane.noise,
+                "angle_curved": _angle(curved, bout.tool_normal),
+                "off_curved": off_curved,
             }
         )
     return rows
+
+
+def _angle(one: Array, other: Array) -> float:
+    """Between two unit normals, whichever way they point, degrees."""
+    return float(np.degrees(np.arccos(min(abs(float(one @ other)), 1.0))))
+
+
+def mean_normal(positions: Array, normal: Array) -> tuple[Array, float]:
+    """Mean normal of the quadratic surface nearest to positions along a normal, and their distance from it, rms."""
+    frame = np.linalg.svd(normal[None])[2]  # the normal, and two directions across it
+    height, *across = frame @ (positions - positions.mean(axis=0)).T
+    surface = uc.Polynomial(2).place(np.stack(across, axis=1))
+    design = surface(np.stack(across, axis=1))
+    weights = np.linalg.lstsq(design, height, rcond=None)[0]
+    step = 1e-6 * np.eye(2)
+    slopes = [(surface(np.stack(across, axis=1) + one) - design).mean(axis=0) @ weights / 1e-6 for one in step]
+    mean = np.array([1.0, *(-slope for slope in slopes)]) @ frame
+    return mean / np.linalg.norm(mean), float(np.sqrt(np.mean((height - design @ weights) ** 2)))
 
 
 def _row(name: str, group: Sequence[dict[str, Any]]) -> dict[str, Any]:

@@ -23,6 +23,7 @@ def page(result: Result) -> str:
         *recorded,
         html.section("The part that no task moves", _components(result)),
         html.section("Mechanisms with names", _mechanisms(result)),
+        *([html.section("A wiped rim", _normals(result))] if "normals" in result.tables else []),
         html.settings_table(result.settings),
     )
 
@@ -76,3 +77,31 @@ def _mechanisms(result: Result) -> html.Markup:
     ]
     note = "Noise of 2 mm. A verdict is confident from odds of 20:1; parameters are judged where the kind is right."
     return html.table(header, rows, note=note)
+
+
+def _normals(result: Result) -> html.Markup:
+    header = [
+        "bout",
+        "likeliest",
+        "plane to tool,\ndegrees",
+        "off it, mm",
+        "curved surface\nto tool, degrees",
+        "off it, mm",
+    ]
+    rows = [
+        [
+            row["bout"],
+            row["likeliest"],
+            *(f"{row[angle]:.1f}" if angle.startswith("angle") else f"{1e3 * row[angle]:.1f}" for angle in _OF_NORMALS),
+        ]
+        for row in result.tables["normals"]
+    ]
+    note = (
+        "Angle between the normal of the surface nearest to the positions and the mean axis of the tool, and the rms "
+        "distance of the positions. A1 to A3 are flat, the others tilted and curved: a quadratic surface does not come "
+        "nearer to the tool's axis than a plane, so that there the hand held the tool off the normal."
+    )
+    return html.table(header, rows, left=2, note=note)
+
+
+_OF_NORMALS = ("angle", "off_plane", "angle_curved", "off_curved")
