@@ -1,6 +1,7 @@
 """How the documentation is built; see the `docs` target of the Makefile."""
 
 from importlib.metadata import version as installed_version
+from pathlib import Path
 
 project = "unconstrain"
 author = "The unconstrain authors"
@@ -44,7 +45,17 @@ html_static_path = ["_static"]
 html_css_files = ["custom.css"]
 html_show_sourcelink = False
 # Pages without pages below them need no list of these.
-_flat = ["architecture", "deploying", "experiments", "extending", "how_it_works", "robust", "scaling", "your_own_data"]
+_flat = [
+    "architecture",
+    "deploying",
+    "experiments",
+    "extending",
+    "how_it_works",
+    "look_and_play",
+    "robust",
+    "scaling",
+    "your_own_data",
+]
 html_sidebars: dict[str, list[str]] = {page: [] for page in _flat}
 html_theme_options = {
     "navbar_end": ["theme-switcher"],
@@ -54,3 +65,26 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": ["theme-version"],
 }
+
+
+def setup(app):
+    """Write the pages that run by themselves beside those of the documentation."""
+    app.connect("build-finished", _write_pages)
+
+
+def _write_pages(app, exception):
+    if exception is not None or app.builder.name != "html":
+        return
+    import numpy as np
+
+    import unconstrain as uc
+    from unconstrain.pages.look import look_page
+    from unconstrain.pages.play import play_page
+    from unconstrain.paper.systems import wiping
+
+    strokes = wiping.Strokes(count=2, duration=4.0)
+    demos = [wiping.demonstrate(plate, np.random.default_rng(0), strokes=strokes) for plate in wiping.PLATES]
+    policy = uc.LocallyLinearPolicy().fit_demonstrations(demos)
+    shown = look_page(demos, ("x", "y", "z"), "Wiping", units=dict.fromkeys("xyz", "m"), policy=policy)
+    for name, page in (("play", play_page()), ("look", shown)):
+        (Path(app.outdir) / f"{name}.html").write_text(page, "utf-8")

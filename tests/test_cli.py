@@ -148,7 +148,19 @@ def assert_learnt_the_policy(path, tolerance=1e-6):
 # Help
 
 
-COMMANDS = ["inspect", "diagnose", "fit", "constraint", "score", "rollout", "export", "reproduce", "demo"]
+COMMANDS = [
+    "inspect",
+    "diagnose",
+    "fit",
+    "constraint",
+    "score",
+    "rollout",
+    "export",
+    "reproduce",
+    "demo",
+    "look",
+    "play",
+]
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -593,7 +605,7 @@ def test_a_movement_far_from_the_data_is_noted(files, tmp_path):
 # export
 
 
-@pytest.mark.parametrize("name", ["swing.c", "swing.ONNX"])
+@pytest.mark.parametrize("name", ["swing.c", "swing.ONNX", "swing.js"])
 def test_export_writes_what_its_suffix_says(policy, tmp_path, name):
     said = run("export", policy, "-o", tmp_path / name)
     assert said.strip().endswith(str(tmp_path / name))
@@ -608,7 +620,7 @@ def test_export_calls_the_c_function_as_told(policy, tmp_path):
 
 def test_export_refuses_other_suffixes_and_names_where_there_are_none(policy, tmp_path):
     assert refused("export", policy, "-o", tmp_path / "swing.h").endswith(
-        "got the suffix '.h', expected .c for C source or .onnx for an ONNX graph."
+        "got the suffix '.h', expected .c for C source, .onnx for an ONNX graph, or .js for a JavaScript module."
     )
     assert refused("export", policy, "-o", tmp_path / "swing.onnx", "--name", "left").startswith("--name: belongs to C")
     assert "expected a name in C" in refused("export", policy, "-o", tmp_path / "swing.c", "--name", "a b")

@@ -30,11 +30,19 @@ from .fitting import (
     policy_of,
     scale_of,
 )
+from .looking import look, play
 from .printing import Group, keep_codes, print_table, refuse_warnings, say_fit, say_scale, say_surveys
 from .reading import numbers, options_for_reading, reading_of, recipe_of, said_recipe, stream_of
 from .writing import check_outputs, option_for_force
 
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
+
+EXPORTS = {
+    ".c": ("C source", "export_c"),
+    ".onnx": ("ONNX graph", "export_onnx"),
+    ".js": ("JavaScript module", "export_javascript"),
+}
+"""What is written, and by which method of a policy, for each ending of a file."""
 
 
 @click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -43,8 +51,10 @@ def main() -> None:
     """Learn the policy behind movements that were recorded under unknown, changing constraints.
 
     \b
+    unconstrain play                      draw, and see what this is about
     unconstrain demo                      the car-washing job, with a report
     unconstrain inspect *.csv             what is in your recordings
+    unconstrain look *.csv                see them, in space and in time
     unconstrain diagnose *.csv            noise, and what to record next
     unconstrain fit *.csv -o policy.npz   learn from them
     unconstrain constraint *.csv -o c.npz learn what held them
@@ -255,23 +265,25 @@ def rollout(
 
 @main.command(epilog="\b\nExample:\n  unconstrain export wipe.npz -o wipe.c --name wipe")
 @click.argument("policy", type=click.Path())
-@click.option("-o", "--output", required=True, type=click.Path(dir_okay=False), help="File that ends in .c or .onnx.")
+@click.option(
+    "-o", "--output", required=True, type=click.Path(dir_okay=False), help="File that ends in .c, .onnx or .js."
+)
 @click.option("--name", help="C: prefix of functions and macros, policy by default.")
 @option_for_force
 def export(policy: str, output: str, name: str | None, force: bool) -> None:
-    """Write POLICY as C99 source or as an ONNX graph."""
+    """Write POLICY as C99, ONNX or JavaScript."""
     kind = Path(output).suffix.lower()
-    if kind not in (".c", ".onnx"):
-        raise SettingError(f"{output}: got the suffix {kind!r}, expected .c for C source or .onnx for an ONNX graph.")
+    if kind not in EXPORTS:
+        raise SettingError(
+            f"{output}: got the suffix {kind!r}, expected .c for C source, .onnx for an ONNX graph, or .js for a "
+            "JavaScript module."
+        )
     if name is not None and kind != ".c":
         raise SettingError(f"--name: belongs to C source, got {output}.")
     check_outputs((output,), (policy,), force)
-    learnt = _fitted(policy)
-    if kind == ".c":
-        learnt.export_c(output, name or "policy")
-    else:
-        learnt.export_onnx(output)
-    click.echo(f"{'C source' if kind == '.c' else 'ONNX graph'}: {output}")
+    what, method = EXPORTS[kind]
+    getattr(_fitted(policy), method)(output, **({} if name is None else {"name": name}))
+    click.echo(f"{what}: {output}")
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain reproduce table1 --trials 100 --out results")
@@ -339,6 +351,8 @@ def doctor(as_json: bool) -> None:
 main.add_command(constraint)
 main.add_command(convert)
 main.add_command(diagnose)
+main.add_command(look)
+main.add_command(play)
 
 
 def _fitted(path: str) -> uc.Policy:

@@ -1,4 +1,4 @@
-"""A fitted policy where it is used: control loop, C, ONNX. One file for each target.
+"""A fitted policy where it is used: control loop, C, ONNX, JavaScript. One file for each target.
 
 All are made from a :class:`~unconstrain.ClosedForm`; a new target is one more function of it.
 """

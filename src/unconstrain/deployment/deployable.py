@@ -4,12 +4,14 @@ import os
 from abc import abstractmethod
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted
 
 from ..base.arrays import Array
 from ..models import ClosedForm, Scale
 from .c99 import export_c
+from .javascript import export_javascript, javascript
 from .onnx_graph import export_onnx
 from .stepping import Step, stepper
 
@@ -94,6 +96,29 @@ class Deployable:
         Needs the extra ``onnx``. Raises as :meth:`closed_form` does.
         """
         export_onnx(self.closed_form(), path)
+
+    def export_javascript(self, path: str | os.PathLike[str]) -> None:
+        """Write the policy as an ES module that needs nothing else, with ``policy(state)`` and ``support(state)``.
+
+        Raises as :meth:`closed_form` does.
+        """
+        export_javascript(self.closed_form(), path, self._precision())
+
+    def javascript(self) -> str:
+        """The policy as a JavaScript expression, to put into a page; it is an object of the same two functions.
+
+        Raises as :meth:`closed_form` does.
+        """
+        return javascript(self.closed_form(), self._precision())
+
+    def _precision(self) -> Array | None:
+        """One over the variance of the kernels along each coordinate; None where there are none."""
+        model = self.training_.model
+        variance = getattr(model.fields, "variance", None) or getattr(model.features, "variance", None)
+        if variance is None:
+            return None
+        units = 1.0 if self.scale_ is None else self.scale_.states
+        return np.ones(len(self.closed_form().origin)) / (variance * units**2)
 
     def __getstate__(self) -> Any:
         """Leave out buffers, which are made again where they are needed."""

@@ -98,18 +98,19 @@ def by_segments(samples: Samples, labels: NDArray[np.intp], noise: Array) -> Can
     """
     projections = projections_of(samples.actions, labels, noise)
     errors = [part.constrained(projections[samples.folds == fold]) for fold, part in enumerate(samples.by_fold())]
-    return least_error("segments", samples, errors, [samples.actions.shape[1] * samples.regressors])
+    return least_error("segments", samples, errors)
 
 
-def least_error(name: str, samples: Samples, errors: Sequence[Quadratic], worths: Sequence[float]) -> Candidate:
+def least_error(name: str, samples: Samples, errors: Sequence[Quadratic], odds: float = 1.0) -> Candidate:
     """Minimise the sum of an error over the folds, with a prior of standard risk.
 
-    The prior has the information of so many samples as the first of ``worths`` under which the error held out is about
-    the least. Its softness is the error missed over the risk missed beside it, times that over the number of
-    samples, by fixed-point iteration.
+    The prior has the information of one sample, or of one for each weight where the error held out is then clearly
+    less. Its softness is the error missed over the risk missed beside it, times that over the number of samples, by
+    fixed-point iteration; ``odds`` is the number of coordinates beside the error over the number in it.
     """
     risks = [part.risk(part.actions, np.ones(len(part))) for part in samples.by_fold()]
-    tried = [_Balanced(errors, risks, samples, worth) for worth in worths]
+    worths = (1.0, samples.actions.shape[1] * samples.regressors)
+    tried = [_Balanced(errors, risks, samples, odds * worth) for worth in worths]
     most = MOST_OF_LEAST * min(one.held_out for one in tried)
     chosen = next((one for one in tried if one.held_out <= most), tried[-1])
     best = chosen.weights

@@ -76,8 +76,7 @@ def _candidate(name: str, samples: Samples, kinds: Kinds, jacobians: Array, nois
     for _ in range(ROUNDS_OF_KINDS):
         used = known | free
         errors = [_error(samples[rows], used[rows], projections[rows], size[rows], noise) for rows in folds]
-        odds = _odds(samples, np.where(used, ranks, 1.0))
-        found = least_error(name, samples, errors, [odds, odds * samples.actions.shape[1] * samples.regressors])
+        found = least_error(name, samples, errors, _odds(samples, np.where(used, ranks, 1.0)))
         policy, before = samples.predict(found.weights), free
         size, free = np.vecdot(policy, policy), ~known & _as_near(samples, policy, projections, known)
         if (free == before).all():

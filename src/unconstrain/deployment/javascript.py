@@ -1,0 +1,69 @@
+"""A policy as one JavaScript module, for pages and whatever runs them."""
+
+import json
+import os
+from functools import singledispatch
+from importlib import resources
+from typing import Any
+
+from ..base import files
+from ..base.arrays import Array
+from ..models import ClosedForm, spaces
+
+
+def export_javascript(form: ClosedForm, path: str | os.PathLike[str], precision: Array | None = None) -> None:
+    """Write an ES module that exports ``policy(state)`` and ``support(state)``; see :func:`javascript`."""
+    (_, d, models), n = form.sizes, form.embedding.states(form.origin[None]).shape[1]
+    fill = {
+        "what": f"{n} states to {d} actions, {models} model{'s' * (models > 1)}",
+        "n": str(n),
+        "d": str(d),
+        "runtime": _template("policy.js"),
+        "formula": formula(form, precision),
+    }
+    source = _template("policy.js.in")
+    for name, text in fill.items():
+        source = source.replace(f"@{name}@", text)
+    files.write(path, source)
+
+
+def javascript(form: ClosedForm, precision: Array | None = None) -> str:
+    """JavaScript expression of an object with functions ``policy`` and ``support`` of one state.
+
+    Parameters
+    ----------
+    form : ClosedForm
+    precision : ndarray, shape (m,), optional
+        One over the variance of the kernels along each coordinate; without it ``support`` is null.
+    """
+    return f"(function () {{\n{_template('policy.js')}\nreturn policyOf({formula(form, precision)});\n}})()"
+
+
+def formula(form: ClosedForm, precision: Array | None = None) -> str:
+    """The numbers of a formula as JSON, of which no digit is lost."""
+    plain: dict[str, Any] = {"origin": form.origin.tolist(), "maps": form.maps.tolist()}
+    more = {"exponents": form.exponents, "monomials": form.monomials, "precision": precision}
+    plain |= {name: values.tolist() for name, values in more.items() if values is not None}
+    if form.embedding.frame is not None:
+        plain["frame"] = form.embedding.frame.tolist()
+        plain["factors"] = [_factor(factor) for factor in form.embedding.space.factors]
+    return json.dumps(plain, allow_nan=False)
+
+
+@singledispatch
+def _factor(space: spaces.Space) -> dict[str, Any]:
+    return {"columns": space.sizes[0]}
+
+
+@_factor.register(spaces.Circle)
+def _circle(space: spaces.Circle) -> dict[str, Any]:
+    return {"columns": 1, "radius": float(space.radius)}
+
+
+@_factor.register(spaces.Sphere)
+def _sphere(space: spaces.Sphere) -> dict[str, Any]:
+    return {"columns": 4, "places": list(map(int, space.places))}
+
+
+def _template(name: str) -> str:
+    return (resources.files(__package__) / "templates" / name).read_text("utf-8")

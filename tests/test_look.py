@@ -1,0 +1,222 @@
+"""The page of demonstrations: in space, in time, with a policy and a constraint; in Chromium."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from selenium.webdriver import ActionChains, Keys
+
+import unconstrain as uc
+from test_cli import call, refused, run
+from unconstrain.pages.look import look_page
+
+NAMES = ("x", "y", "z")
+
+
+def wipes(count=4, samples=120, dimensions=3):
+    """Movements on planes of other tilts, the second of which has a gap and the third a pause."""
+    files = []
+    for index in range(count):
+        time = np.linspace(0, 4, samples)
+        x, y = np.cos(2 * time + index), np.sin(2 * time + index)
+        columns = [x, y, 0.3 * (index - 1.5) * x, 0.1 * time]
+        if index == 2:
+            columns = [
+                np.where(np.arange(samples) < 50, c, c[np.maximum(np.arange(samples) - 30, 49)]) for c in columns
+            ]
+        table = np.column_stack([time, *columns[:dimensions]])
+        files.append(np.delete(table, slice(60, 80), axis=0) if index == 1 else table)
+    return files
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Recordings, a policy and a constraint learnt from them, and the page of all."""
+    place = tmp_path_factory.mktemp("look")
+    for index, table in enumerate(wipes()):
+        np.savetxt(place / f"wipe_{index}.csv", table, delimiter=",", header="t,x,y,z", comments="")
+    files = sorted(place.glob("wipe_?.csv"))
+    reading = ("--state", "x,y,z", "--differentiate")
+    run("fit", *files, *reading, "-o", place / "policy.npz")
+    run("constraint", files[0], *reading, "-o", place / "constraint.npz")
+    run("look", *files, *reading, place / "policy.npz", place / "constraint.npz", "-o", place / "look.html")
+    return place
+
+
+@pytest.fixture
+def page(folder, browser):
+    """The page, opened anew; at the end it has said nothing in the console."""
+    yield from opened(browser, folder / "look.html")
+
+
+def opened(browser, path):
+    browser.get_log("browser")
+    browser.get(path.as_uri())
+    yield browser
+    assert not browser.get_log("browser")
+
+
+def text(browser, name):
+    return browser.find_element("id", name).text
+
+
+def test_numbers_arrive_as_they_were(folder, page):
+    found = page.execute_script(
+        "return look.demos.map((one) => [Array.from(one.times), one.states.map((c) => Array.from(c))])"
+    )
+    assert len(found) == 4
+    for index, (times, states) in enumerate(found):
+        table = np.loadtxt(folder / f"wipe_{index}.csv", delimiter=",", skiprows=1)
+        if index != 2:  # whose pause is left out
+            assert_allclose(times, table[:, 0], atol=1e-3)
+            assert_allclose(states, table[:, 1:].T, atol=1e-4)
+
+
+def test_the_first_lines_say_what_is_there_and_what_is_odd(page):
+    assert text(page, "summary").startswith("4 demonstrations, ")
+    assert text(page, "verdict").startswith("! ")
+    notes = text(page, "notes")
+    assert "gap: wipe_1 at 1.98 s" in notes
+    assert "pause: wipe_2" in notes
+    assert "dashes: gap" in text(page, "time-says")
+
+
+def test_a_demonstration_is_left_out_by_its_tick_and_by_a_click_in_the_scene(folder, page):
+    assert text(page, "command").endswith("--state x,y,z --differentiate -o policy.npz")
+    page.find_element("id", "demo-3").click()
+    assert "--leave-out wipe_3 -o policy.npz" in text(page, "command")
+    x, y = page.execute_script(
+        "const d = look.demos[1]; return look.project(look.axes.map((k) => d.states[k][10])).map(Math.round);"
+    )
+    canvas = page.find_element("id", "scene")
+    half = canvas.size["width"] / 2, canvas.size["height"] / 2
+    ActionChains(page).move_to_element_with_offset(canvas, x - int(half[0]), y - int(half[1])).click().perform()
+    out = [index for index, one in enumerate(page.execute_script("return look.demos.map((d) => d.kept)")) if not one]
+    assert len(out) == 2
+    command = text(page, "command")
+    assert f"--leave-out wipe_{out[0]},wipe_{out[1]}" in command
+    told = command.split()[1:]
+    done = call(*told[:-1], folder / "again.npz", "--force")
+    assert done.code == 0
+    assert "2 demonstrations" in done.out
+
+
+def test_the_roll_out_in_the_page_is_that_of_python(folder, page):
+    policy = uc.load(folder / "policy.npz")
+    page.find_element("id", "plane").click()
+    script = "const one = document.getElementById('tilt'); one.value = 30; one.dispatchEvent(new Event('input'));"
+    page.execute_script(script)
+    page.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]));")
+    track, times = map(np.array, page.execute_script("return [look.roll.track, look.roll.times]"))
+    plane = uc.constraints.Plane(np.array([np.sin(np.pi / 6), 0.0, np.cos(np.pi / 6)]))
+    expected = uc.rollout(policy, track[0], 1600, float(times[-1]) / 1600, plane)  # Euler
+    along = np.column_stack([np.interp(expected.times[::4], times, column) for column in track.T])
+    assert_allclose(along, expected.states[::4], atol=0.03)
+    assert_allclose((track - track[0]) @ plane.normal, 0.0, atol=1e-9)
+
+
+def test_the_start_is_dragged_and_the_scene_is_turned(page):
+    canvas = page.find_element("id", "scene")
+    half = np.array([canvas.size["width"] / 2, canvas.size["height"] / 2])
+    before = page.execute_script("return [look.view.yaw, look.roll.start]")
+    ring = np.array(page.execute_script("return look.project(look.roll.start)"))
+    chain = ActionChains(page).move_to_element_with_offset(canvas, *map(int, ring - half))
+    chain.click_and_hold().move_by_offset(40, -25).release().perform()
+    yaw, start = page.execute_script("return [look.view.yaw, look.roll.start]")
+    assert yaw == before[0]
+    assert np.linalg.norm(np.subtract(start, before[1])) > 0.05
+    assert_allclose(page.execute_script("return look.project(look.roll.start)"), np.add(ring, [40, -25]), atol=1.5)
+    page.execute_script("look.roll.start = [9, 9, 9]; window.dispatchEvent(new Event('resize'));")
+    page.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]));")
+    assert "Grey from 0 s on: far from all data." in text(page, "policy-says")
+    canvas.send_keys(Keys.ARROW_LEFT)
+    assert page.execute_script("return look.view.yaw") != yaw
+
+
+def test_every_colour_and_time_can_be_shown(page):
+    for name in ("speed", "free", "regions", "demonstration"):
+        change = "const one = document.getElementById('colour'); one.value = arguments[0];"
+        page.execute_script(f"{change} one.dispatchEvent(new Event('change'));", name)
+        assert text(page, "legend")
+    free = page.execute_script("return Array.from(look.demos[0].free)")
+    assert 0 <= min(free) <= max(free) <= 1
+    page.execute_script(
+        "const one = document.getElementById('now'); one.value = 500; one.dispatchEvent(new Event('input'));"
+    )
+    page.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]));")
+    assert text(page, "now-says") == "2 s"
+
+
+def test_regions_count_demonstrations_not_samples(browser, tmp_path):
+    ways = np.linspace(0, 1, 50)[:, None] * [1.0, 0.0], np.linspace(0, 0.5, 80)[:, None] * [1.0, 0.0]
+    demos = [uc.Demonstration(way, np.ones((len(way), 2))) for way in ways]
+    path = tmp_path / "look.html"
+    path.write_text(look_page(demos, ("x", "y"), "two"), "utf-8")
+    for page in opened(browser, path):
+        first, second = page.execute_script("return look.demos.map((one) => Array.from(one.regions))")
+        assert_allclose(first, np.where(ways[0][:, 0] < 0.551, 2, 1))  # a twentieth of the extent is near
+        assert_allclose(second, 2)
+
+
+@pytest.mark.parametrize("dimensions", [1, 2, 4])
+def test_it_shows_any_number_of_states(browser, tmp_path, dimensions):
+    demos = []
+    for index, table in enumerate(wipes(3, dimensions=dimensions)):
+        states = table[:, 1:]
+        demos.append(
+            uc.Demonstration(
+                states, np.gradient(states, axis=0), table[:, 0] if dimensions > 1 else None, name=f"</script>{index}"
+            )
+        )
+    policy = uc.LocallyLinearPolicy(learner=uc.Direct()).fit_demonstrations(demos)
+    path = tmp_path / "look.html"
+    path.write_text(look_page(demos, [f"q{k}" for k in range(dimensions)], "<i>many</i>", policy=policy), "utf-8")
+    for page in opened(browser, path):
+        assert page.find_element("tag name", "h1").text == "<i>many</i>"
+        assert len(page.find_elements("css selector", "#list li")) == 3
+        assert len(page.execute_script("return look.roll.track")) > 1
+        selects = page.find_elements("css selector", "#axes select")
+        assert len(selects) == (3 if dimensions == 4 else 0)
+        for one in selects:
+            one.find_elements("tag name", "option")[-1].click()
+
+
+def test_a_policy_that_cannot_be_rolled_out_says_why(browser, tmp_path):
+    demos = [uc.Demonstration(table[:, 1:], table[:, 1:2], table[:, 0]) for table in wipes(3)]
+    policy = uc.ParametricPolicy(uc.Affine(), uc.Direct()).fit_demonstrations(demos)
+    path = tmp_path / "look.html"
+    path.write_text(look_page(demos, NAMES, "one action", policy=policy), "utf-8")
+    for page in opened(browser, path):
+        assert "1 actions for 3 states" in text(page, "policy-says")
+
+
+def test_a_page_of_much_data_is_small_and_drawn_soon(browser, tmp_path):
+    rng = np.random.default_rng(0)
+    demos = [
+        uc.Demonstration(np.cumsum(rng.standard_normal((2000, 3)), axis=0), np.ones((2000, 3)), np.arange(2000) / 100)
+        for _ in range(8)
+    ]
+    path = tmp_path / "look.html"
+    path.write_text(look_page(demos, NAMES, "much"), "utf-8")
+    assert path.stat().st_size < 400_000
+    for page in opened(browser, path):
+        assert (
+            page.execute_script("return performance.getEntriesByName('drawn')[0].startTime") < 2000 * 3
+        )  # shared machine
+
+
+def test_it_fits_a_phone_and_names_what_it_draws(page):
+    page.execute_cdp_cmd(
+        "Emulation.setDeviceMetricsOverride", {"width": 360, "height": 740, "deviceScaleFactor": 2, "mobile": True}
+    )
+    try:
+        assert page.execute_script("return document.documentElement.scrollWidth") <= 360
+        unnamed = "return [...document.querySelectorAll('canvas')].filter((c) => !c.getAttribute('aria-label')).length"
+        assert page.execute_script(unnamed) == 0
+    finally:
+        page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_without_a_recording_there_is_nothing_to_look_at(folder, tmp_path):
+    assert "holds no recording to look at" in refused("look", folder / "policy.npz", "-o", tmp_path / "look.html")
+    assert "--force to replace it" in refused("look", folder / "wipe_0.csv", "-o", folder / "look.html")
+    assert not list(tmp_path.iterdir())
