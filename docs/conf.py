@@ -1,6 +1,7 @@
 """How the documentation is built; see the `docs` target of the Makefile."""
 
 from importlib.metadata import version as installed_version
+from os import environ
 from pathlib import Path
 
 project = "unconstrain"
@@ -28,7 +29,10 @@ autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 
+# Recordings of others do not come with the package; pages on them are made where these are.
+_recorded = "" if "UNCONSTRAIN_DATA" in environ else "|plot_recorded_"
 sphinx_gallery_conf = {
+    "ignore_pattern": rf"__init__\.py{_recorded}",
     "examples_dirs": "../examples",
     "gallery_dirs": "auto_examples",
     "filename_pattern": r"\.py$",
@@ -47,13 +51,19 @@ html_show_sourcelink = False
 # Pages without pages below them need no list of these.
 _flat = [
     "architecture",
+    "coming_from",
     "deploying",
     "experiments",
     "extending",
+    "faq",
+    "from_zero",
+    "glossary",
     "how_it_works",
+    "install",
     "look_and_play",
     "robust",
     "scaling",
+    "which_learner",
     "your_own_data",
 ]
 html_sidebars: dict[str, list[str]] = {page: [] for page in _flat}

@@ -608,14 +608,32 @@ def test_a_movement_far_from_the_data_is_noted(files, tmp_path):
 @pytest.mark.parametrize("name", ["swing.c", "swing.ONNX", "swing.js"])
 def test_export_writes_what_its_suffix_says(policy, tmp_path, name):
     said = run("export", policy, "-o", tmp_path / name)
-    assert said.strip().endswith(str(tmp_path / name))
+    assert str(tmp_path / name) in said
+    assert (tmp_path / "swing.h").exists() == (f"header: {tmp_path / 'swing.h'}" in said) == (name == "swing.c")
     exported = (tmp_path / name).read_bytes()
-    assert (b"void policy_step(const double state[2], double action[2]);" in exported) == (name == "swing.c")
+    assert (b"void swing_step(const double state[2], double action[2]);" in exported) == (name == "swing.c")
 
 
 def test_export_calls_the_c_function_as_told(policy, tmp_path):
     run("export", policy, "-o", tmp_path / "swing.c", "--name", "left")
     assert "void left_step(" in (tmp_path / "swing.c").read_text()
+    assert "states: x, y" in (tmp_path / "swing.h").read_text()
+    assert "swing.c: is there" in refused("export", policy, "-o", tmp_path / "swing.c")
+    (tmp_path / "swing.c").unlink()
+    assert "swing.h: is there" in refused("export", policy, "-o", tmp_path / "swing.c")
+    run("export", policy, "-o", tmp_path / "swing.c", "--float", "--force")
+    assert "void swing_step(const float state[2], float action[2]);" in (tmp_path / "swing.h").read_text()
+
+
+def test_export_writes_a_package_for_ros(policy, tmp_path):
+    said = run("export", policy, "--ros2", tmp_path / "swing", "--messages", "joints")
+    assert said == f"ROS 2 package: {tmp_path / 'swing'}\n"
+    assert 'joints: ["x", "y"]' in (tmp_path / "swing" / "config" / "swing.yaml").read_text()
+    assert "swing: is there" in refused("export", policy, "--ros2", tmp_path / "swing")
+    assert "expected three of each" in refused("export", policy, "--ros2", tmp_path / "other", "--messages", "pose")
+    assert "double precision" in refused("export", policy, "--ros2", tmp_path / "other", "--float")
+    assert "got nothing to write to" in refused("export", policy)
+    assert not (tmp_path / "other").exists()
 
 
 def test_export_refuses_other_suffixes_and_names_where_there_are_none(policy, tmp_path):

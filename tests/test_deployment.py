@@ -3,6 +3,7 @@
 import copy
 import ctypes
 import pickle
+import re
 import shutil
 import subprocess
 import sys
@@ -15,8 +16,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.decomposition import PCA
 from sklearn.exceptions import NotFittedError
-from sklearn.preprocessing import PolynomialFeatures
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer, MinMaxScaler, PolynomialFeatures, StandardScaler
 
 import naive
 import unconstrain as uc
@@ -24,6 +27,7 @@ from conftest import POLICIES
 from samples import draw
 from unconstrain.base.errors import InvalidDataError, MissingExtraError, SettingError
 from unconstrain.deployment.c99 import c_source, export_c
+from unconstrain.deployment.description import Description, digest
 from unconstrain.deployment.stepping import stepper
 from unconstrain.models import Everywhere
 
@@ -259,28 +263,130 @@ def test_the_self_test_of_a_polynomial_finds_a_wrong_digit_in_its_lowest_terms_t
     form = policy.closed_form()
     wrong = form.maps.copy()
     wrong[0, 0, (form.monomials == 2).sum(axis=1) == 2] *= 1 + 1e-6  # the linear ones
-    export_c(replace(form, maps=wrong), policy, tmp_path / "wrong.c", "wrong")
+    export_c(replace(form, maps=wrong), policy, tmp_path / "wrong.c", "wrong", Description.of(form))
     subprocess.run(["gcc", "-std=c99", "-DWRONG_SELF_TEST", "wrong.c", "-lm", "-o", "test"], cwd=tmp_path, check=True)
     assert subprocess.run([tmp_path / "test"], check=False, capture_output=True).returncode == 1
 
 
 def test_the_self_test_of_a_c_file_finds_a_wrong_digit(arm, tmp_path):
     form = arm.closed_form()
-    at = states(7, 1.0, count=4)
-    expected = arm(at)
-    expected[2, 3] += 1e-6
-    (tmp_path / "wrong.c").write_text(c_source(form, "wrong", at, expected))
+
+    def wrong(at):
+        actions = arm(at)
+        actions[2, 3] += 1e-6
+        return actions
+
+    (tmp_path / "wrong.c").write_text(c_source(form, "wrong", wrong, Description.of(form)).source)
     subprocess.run(["gcc", "-std=c99", "-DWRONG_SELF_TEST", "wrong.c", "-lm", "-o", "test"], cwd=tmp_path, check=True)
     assert subprocess.run([tmp_path / "test"], check=False, capture_output=True).returncode == 1
 
 
 def test_constants_in_c_lose_no_digit(policy, tmp_path):
     policy.export_c(tmp_path / "policy.c")
-    written = set((tmp_path / "policy.c").read_text(encoding="ascii").replace(",", " ").replace("}", " ").split())
+    cells = re.findall(r"[-+.e0-9]+", (tmp_path / "policy.c").read_text(encoding="ascii"))
+    written = {float(cell) for cell in cells if re.fullmatch(r"-?\d+\.?\d*(e[-+]\d+)?", cell)}
     form = policy.closed_form()
     for values in (form.origin, form.maps, *([] if form.exponents is None else [form.exponents])):
-        for value in np.ravel(values):
-            assert {(float(value) + 0.0).hex(), "{" + (float(value) + 0.0).hex()} & written
+        assert set(np.ravel(values)) <= written
+
+
+STRICT = "-O2 -Wall -Wextra -Wconversion -Wshadow -pedantic -Werror"
+
+
+@pytest.mark.parametrize("single", [False, True], ids=["double", "float"])
+@pytest.mark.parametrize("kind", ["affine", "cubic", "kmeans", "local", "arm"])
+def test_support_limits_and_steps_of_c_and_of_cpp_are_those_of_the_policy(kind, single, arm, tmp_path):
+    one = arm if kind == "arm" else POLICIES[kind](uc.Hybrid()).fit(DATA.states, DATA.actions)
+    one.export_c(tmp_path / "its-own.c", single=single)
+    for compiler in ("gcc -std=c99 -Wmissing-prototypes", "g++ -x c++ -std=c++11"):
+        command = f"{compiler} {STRICT} -shared -fPIC its-own.c -lm -o its.so"
+        subprocess.run(command.split(), cwd=tmp_path, check=True)
+    library, real = ctypes.CDLL(str(tmp_path / "its.so")), ctypes.c_float if single else ctypes.c_double
+    step, support = library.its_own_step, library.its_own_support
+    support.restype = real
+    n, d = one.n_features_in_, one.n_outputs_
+    limits = np.array(((real * 2) * n).in_dll(library, "its_own_limits"))
+    near, far = states(7, 1.0) if kind == "arm" else DATA.states, states(n, 1e3)
+    assert ((limits[:, 0] <= near) & (near <= limits[:, 1])).all()
+    most = real.in_dll(library, "its_own_speed_limit").value
+    sizes = np.linalg.norm(one(near), axis=1)
+    assert np.median(sizes) <= most <= 3 * sizes.max()
+    for at in (near.astype(np.float32), far.astype(np.float32)):
+        action = np.zeros((len(at), d), np.float32 if single else np.float64)
+        for row, x in zip(action, at, strict=True):
+            step((real * n)(*map(float, x)), row.ctypes.data_as(ctypes.POINTER(real)))
+        found = [support((real * n)(*map(float, x))) for x in at]
+        expected = one(at)
+        assert np.abs(action - expected).max() <= (1e-5 if single else 1e-12) * np.abs(expected).max()
+        if hasattr(one.training_.model.fields, "support") or hasattr(one.features_, "support"):
+            assert_allclose(found, one.support(at), atol=1e-6 if single else 1e-14)
+        else:
+            assert_array_equal(found, ((limits[:, 0] <= at) & (at <= limits[:, 1])).all(axis=1))
+
+
+def test_the_header_says_what_the_numbers_are(policy, tmp_path):
+    notes = {
+        "recipe": {"states": ["x", "y"], "actions": None},
+        "units": {"x": "mm"},
+        "sources": "wipes/*.csv */ of ü",
+        "nothing": None,
+    }
+    policy.export_c(tmp_path / "wipe.c", notes=notes)
+    header = (tmp_path / "wipe.h").read_text()
+    assert (tmp_path / "wipe.c").read_text().startswith(header)
+    comment = header.split("*/")[0]
+    form = policy.closed_form()
+    for said in (
+        "states: x (mm), y",
+        "actions: vx, vy",
+        "learnt by: Hybrid",
+        f"relative to: {form.origin[0]:.6g}, ",
+        "sources: wipes/ *.csv * / of ü",
+        f"sha256: {digest(form)}",
+    ):
+        assert said in comment
+    assert "nothing" not in comment
+    assert digest(form) != digest(replace(form, maps=form.maps * (1 + 1e-15)))
+    subprocess.run(f"gcc -std=c99 {STRICT} -c wipe.c".split(), cwd=tmp_path, check=True)
+
+
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [("wipe", "wipe"), ("my-wipe 2", "my_wipe_2"), ("2nd", "policy_2nd"), ("ä", "policy"), ("__x", "x")],
+)
+def test_names_in_c_are_like_that_of_the_file(arm, tmp_path, file, name):
+    arm.export_c(tmp_path / f"{file}.c")
+    assert f"void {name}_step(" in (tmp_path / f"{file}.h").read_text()
+
+
+def test_two_policies_are_linked_into_one_program_by_their_headers(arm, tmp_path):
+    policy = POLICIES["grid"](uc.Hybrid()).fit(DATA.states, DATA.actions)
+    policy.export_c(tmp_path / "wipe.c")
+    arm.export_c(tmp_path / "polish.c", single=True)
+    (tmp_path / "main.c").write_text(
+        '#include "wipe.h"\n#include "polish.h"\n'
+        "int main(void)\n{\n    double state[WIPE_STATES] = {0}, action[WIPE_ACTIONS];\n"
+        "    float joints[POLISH_STATES] = {0}, turns[POLISH_ACTIONS];\n\n"
+        "    wipe_step(state, action);\n    polish_step(joints, turns);\n"
+        "    return polish_support(joints) <= 1 && wipe_support(state) <= 1 && polish_limits[0][0] < 0 ? 0 : 1;\n}\n"
+    )
+    for compiler in ("gcc -std=c99", "g++ -x c++ -std=c++11"):
+        command = f"{compiler} {STRICT} main.c wipe.c polish.c -lm -o main"
+        subprocess.run(command.split(), cwd=tmp_path, check=True)
+        subprocess.run([tmp_path / "main"], check=True)
+
+
+def test_a_header_is_no_place_for_the_source(arm, tmp_path):
+    with pytest.raises(SettingError, match=r"such as wipe\.c"):
+        arm.export_c(tmp_path / "wipe.h")
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_is_too_large_for_a_float_is_said(tmp_path):
+    fast = uc.ParametricPolicy(uc.Affine(), uc.Direct()).fit(1e-12 * DATA.states, 1e28 * DATA.actions)
+    with pytest.raises(SettingError, match="is too large for it"):
+        fast.export_c(tmp_path / "fast.c", single=True)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("name", ["", "2nd", "my-policy", "a b", "ä"])
@@ -308,6 +414,25 @@ def test_the_onnx_graph_says_what_the_policy_says_inside_and_far_outside(policy,
             assert_same(found, one, at, width)
             [alone] = graph.run(None, {"states": at[:1]})
             assert_same(alone, one, at[:1], width)
+
+
+def test_a_graph_in_single_precision_takes_and_gives_it(policy, arm, tmp_path):
+    for one in (policy, arm):
+        one.export_onnx(tmp_path / "policy.onnx", single=True)
+        graph = session(tmp_path / "policy.onnx")
+        for width in FAR[:4]:
+            at = states(one.n_features_in_, width).astype(np.float32)
+            [found] = graph.run(None, {"states": at})
+            expected = one(at)
+            assert found.dtype == np.float32
+            assert np.abs(found - expected).max() <= 1e-5 * np.abs(expected).max()
+
+
+def test_a_graph_says_what_the_numbers_are(arm, tmp_path):
+    arm.export_onnx(tmp_path / "arm.onnx", notes={"recipe": {"states": [f"q{i}" for i in range(7)]}})
+    said = session(tmp_path / "arm.onnx").get_modelmeta().custom_metadata_map
+    assert said["states"] == "q0, q1, q2, q3, q4, q5, q6"
+    assert said["sha256"] == digest(arm.closed_form())
 
 
 def test_without_onnx_the_error_names_the_extra(policy, tmp_path, monkeypatch):
@@ -389,3 +514,33 @@ def test_a_policy_compiled_as_cpp_is_called_from_c(policy, tmp_path):
     )
     for command in ("g++ -std=c++17 -c wipe.cpp", "gcc -std=c99 -c main.c", "g++ main.o wipe.o -lm -o main"):
         subprocess.run(command.split(), cwd=tmp_path, check=True)
+
+
+# Pipelines
+
+
+@pytest.mark.parametrize("kind", POLICIES)
+@pytest.mark.parametrize("scaler", [(StandardScaler(),), (MinMaxScaler((-1, 1)), FunctionTransformer(np.negative))])
+def test_a_scaler_and_a_policy_are_exported_as_one(kind, scaler, tmp_path):
+    at = DATA.states * [1000.0, 1.0] + [50.0, -2.0]
+    policy = POLICIES[kind](uc.Direct())
+    pipeline = make_pipeline(*scaler, policy).fit(at, DATA.actions)
+    one, form = pipeline[-1], pipeline[-1].closed_form(pipeline[:-1])
+    one.export_c(tmp_path / "whole.c", scaler=pipeline[:-1])
+    command = f"gcc -std=c99 {STRICT} -DWHOLE_SELF_TEST whole.c -lm -o test"
+    subprocess.run(command.split(), cwd=tmp_path, check=True)
+    subprocess.run([tmp_path / "test"], check=True)
+    one.export_onnx(tmp_path / "whole.onnx", scaler=pipeline[:-1])
+    [found] = session(tmp_path / "whole.onnx").run(None, {"states": at})
+    expected = pipeline.predict(at)
+    assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    assert (form.reach > 0).all()
+
+
+@pytest.mark.parametrize("scaler", [PCA(), PolynomialFeatures(2), FunctionTransformer(np.tanh)])
+def test_what_does_more_than_to_shift_and_scale_is_refused(scaler):
+    pipeline = make_pipeline(scaler, uc.ParametricPolicy(uc.Affine(), uc.Direct())).fit(DATA.states, DATA.actions)
+    if pipeline[-1].n_features_in_ != 2:
+        pipeline[-1].fit(DATA.states, DATA.actions)
+    with pytest.raises(SettingError, match="does more than to shift and scale each of 2 states"):
+        pipeline[-1].closed_form(pipeline[0])

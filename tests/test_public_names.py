@@ -1,6 +1,8 @@
 """What ``import unconstrain`` promises."""
 
 import ast
+import doctest
+import inspect
 import os
 import pickle
 import subprocess
@@ -8,6 +10,7 @@ import sys
 from importlib import import_module, metadata
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import unconstrain as uc
@@ -141,3 +144,15 @@ def test_every_error_of_ours_is_of_one_family():
     assert all(issubclass(error, uc.UnconstrainError) for error in errors)
     assert issubclass(uc.errors.SettingError, ValueError)
     assert issubclass(uc.errors.MissingExtraError, ImportError)
+
+
+@pytest.mark.parametrize("name", uc.__all__)
+def test_each_public_name_has_an_example_that_runs_as_printed(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # some write files
+    example = doctest.DocTestParser().get_doctest(
+        inspect.getdoc(getattr(uc, name)), {"np": np, "uc": uc}, name, None, 0
+    )
+    assert example.examples
+    said = []
+    doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE).run(example, out=said.append)
+    assert not said, "".join(said)

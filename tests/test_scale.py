@@ -108,7 +108,7 @@ def test_steps_files_and_copies_are_in_the_units_of_the_data(model, tmp_path):
     for copy in (uc.load(tmp_path / "p.npz"), pickle.loads(pickle.dumps(policy))):
         assert_array_equal(copy(states), expected)
         assert_array_equal(copy.scale_.states, MM)
-    policy.export_c(tmp_path / "p.c")
+    policy.export_c(tmp_path / "p.c", "policy")
     subprocess.run(["cc", "-std=c99", "-DPOLICY_SELF_TEST", "-o", tmp_path / "p", tmp_path / "p.c", "-lm"], check=True)
     subprocess.run([tmp_path / "p"], check=True)
 

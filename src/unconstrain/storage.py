@@ -4,6 +4,17 @@ The file is a NumPy ``.npz`` of plain arrays and one JSON header. The header
 names classes from a fixed list; arrays are never unpickled; a digest over
 everything shows damage. Writing goes to a new file that takes the old one's
 place in one step.
+
+Examples
+--------
+>>> from dataclasses import dataclass
+>>> @uc.storage.register
+... @dataclass(frozen=True)
+... class Mirrored:
+...     axis: int
+...
+...     def __call__(self, states):
+...         return np.abs(states)
 """
 
 import hashlib
@@ -106,6 +117,13 @@ def save(
         place cannot be written to.
     InvalidDataError
         If what was learnt is not finite.
+
+    Examples
+    --------
+    >>> policy = uc.ParametricPolicy(uc.Affine(), "direct").fit([[0.0], [1.0]], [[0.0], [2.0]])
+    >>> uc.save(policy, "policy.npz", notes={"of": "Monday"})
+    >>> uc.storage.load_notes("policy.npz")
+    {'of': 'Monday'}
     """
     for learnt in ("solution_", "choice_"):
         if hasattr(policy, learnt):
@@ -139,6 +157,12 @@ def load(path: str | os.PathLike[str], kind: type[Any] = Policy) -> Any:
     ------
     ModelFileError
         If the file does not exist, is damaged, of a newer version, not ours, or of another kind.
+
+    Examples
+    --------
+    >>> uc.save(uc.ParametricPolicy(uc.Affine(), "direct").fit([[0.0], [1.0]], [[0.0], [2.0]]), "policy.npz")
+    >>> uc.load("policy.npz").predict([[2.0]]).round(6)
+    array([[4.]])
     """
     header, arrays = _read(path)
     try:

@@ -2,6 +2,11 @@
 
 Each message says what was got, what was expected, and what to do about it.
 Catch :class:`UnconstrainError` to catch them all.
+
+Examples
+--------
+>>> issubclass(uc.errors.SettingError, uc.UnconstrainError)
+True
 """
 
 __all__ = [
@@ -17,7 +22,16 @@ __all__ = [
 
 
 class UnconstrainError(Exception):
-    """Root of all errors that this package raises on purpose."""
+    """Root of all errors that this package raises on purpose.
+
+    Examples
+    --------
+    >>> try:
+    ...     uc.LocallyLinearPolicy().fit([[0.0]], [[float("nan")]])
+    ... except uc.UnconstrainError as error:
+    ...     print(str(error).partition(",")[0])
+    actions: found nan at row 0
+    """
 
 
 class InvalidDataError(UnconstrainError, ValueError):

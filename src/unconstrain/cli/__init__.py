@@ -15,12 +15,13 @@ import click
 
 import unconstrain as uc
 
-from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainError
+from ..base.errors import ReadError, SettingError, UnconstrainError
 from ..base.files import write
 from ..paper import experiments
 from .constraining import constraint, held_of, options_for_held
 from .converting import convert
 from .diagnosing import diagnose
+from .exporting import export
 from .fitting import (
     alpha_of,
     default_learner,
@@ -32,17 +33,10 @@ from .fitting import (
 )
 from .looking import look, play
 from .printing import Group, keep_codes, print_table, refuse_warnings, say_fit, say_scale, say_surveys
-from .reading import numbers, options_for_reading, reading_of, recipe_of, said_recipe, stream_of
+from .reading import fitted_policy, numbers, options_for_reading, reading_of, recipe_of, said_recipe, stream_of
 from .writing import check_outputs, option_for_force
 
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
-
-EXPORTS = {
-    ".c": ("C source", "export_c"),
-    ".onnx": ("ONNX graph", "export_onnx"),
-    ".js": ("JavaScript module", "export_javascript"),
-}
-"""What is written, and by which method of a policy, for each ending of a file."""
 
 
 @click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -193,7 +187,7 @@ def score(
 
     They are prepared as the training data of the policy was.
     """
-    learnt, notes = _fitted(policy), uc.storage.load_notes(policy)
+    learnt, notes = fitted_policy(policy), uc.storage.load_notes(policy)
     recipe = uc.Recipe.from_dict(notes.get("recipe", {}))
     recordings = uc.read(files, **reading_of(**notes).roles)
     demonstrations = uc.prepare(recordings, recipe)
@@ -242,7 +236,7 @@ def rollout(
 ) -> None:
     """Roll POLICY out, freely or under a constraint, to a CSV."""
     check_outputs(() if output == "-" else (output,), (policy, constraint), force)
-    learnt, recipe = _fitted(policy), uc.Recipe.from_dict(uc.storage.load_notes(policy).get("recipe", {}))
+    learnt, recipe = fitted_policy(policy), uc.Recipe.from_dict(uc.storage.load_notes(policy).get("recipe", {}))
     if len(start) != learnt.n_features_in_:
         raise SettingError(f"--start: got {len(start)} numbers, expected {learnt.n_features_in_}, one for each state.")
     held = held_of(plane, constraint, len(start), learnt.n_outputs_, "one for each action")
@@ -261,29 +255,6 @@ def rollout(
     if support is not None and support.min() < 1e-3:
         since = dt * int((support < 1e-3).argmax())
         click.echo(f"Note: from {since:.2f} s on the movement is far from all data.", err=True)
-
-
-@main.command(epilog="\b\nExample:\n  unconstrain export wipe.npz -o wipe.c --name wipe")
-@click.argument("policy", type=click.Path())
-@click.option(
-    "-o", "--output", required=True, type=click.Path(dir_okay=False), help="File that ends in .c, .onnx or .js."
-)
-@click.option("--name", help="C: prefix of functions and macros, policy by default.")
-@option_for_force
-def export(policy: str, output: str, name: str | None, force: bool) -> None:
-    """Write POLICY as C99, ONNX or JavaScript."""
-    kind = Path(output).suffix.lower()
-    if kind not in EXPORTS:
-        raise SettingError(
-            f"{output}: got the suffix {kind!r}, expected .c for C source, .onnx for an ONNX graph, or .js for a "
-            "JavaScript module."
-        )
-    if name is not None and kind != ".c":
-        raise SettingError(f"--name: belongs to C source, got {output}.")
-    check_outputs((output,), (policy,), force)
-    what, method = EXPORTS[kind]
-    getattr(_fitted(policy), method)(output, **({} if name is None else {"name": name}))
-    click.echo(f"{what}: {output}")
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain reproduce table1 --trials 100 --out results")
@@ -351,15 +322,9 @@ def doctor(as_json: bool) -> None:
 main.add_command(constraint)
 main.add_command(convert)
 main.add_command(diagnose)
+main.add_command(export)
 main.add_command(look)
 main.add_command(play)
-
-
-def _fitted(path: str) -> uc.Policy:
-    policy = uc.load(path)
-    if not hasattr(policy, "solution_"):
-        raise ModelFileError(f"{path}: holds a policy that is not fitted. Fit it before saving.")
-    return policy
 
 
 def _csv(header: Sequence[str], path: uc.Demonstration) -> str:

@@ -12,7 +12,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.errors import SettingError
+from ..base.errors import ModelFileError, SettingError
 
 
 def names(text: str) -> tuple[str, ...]:
@@ -135,6 +135,20 @@ def recipe_of(
         **{name: others[name] for name in ("sort", "glitches", "seams", "pauses", "action_is") if name in others},
     )
     return recipe if window is None else replace(recipe, window_s=window)
+
+
+def fitted_policy(path: str) -> uc.Policy:
+    """The policy in a file.
+
+    Raises
+    ------
+    ModelFileError
+        Also if it is not fitted.
+    """
+    policy = uc.load(path)
+    if not hasattr(policy, "solution_"):
+        raise ModelFileError(f"{path}: holds a policy that is not fitted. Fit it before saving.")
+    return policy
 
 
 def said_recipe(recipe: uc.Recipe, recording: uc.Recording) -> str:

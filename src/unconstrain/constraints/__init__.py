@@ -1,4 +1,10 @@
-"""Constraint matrices A(x, t), with A u = 0: known, learnt, and mechanisms found in recordings."""
+"""Constraint matrices A(x, t), with A u = 0: known, learnt, and mechanisms found in recordings.
+
+Examples
+--------
+>>> uc.constraints.Plane(normal=[0, 0, 2])(np.zeros((1, 3)), np.zeros(1))
+array([[[0., 0., 1.]]])
+"""
 
 from .choice import Choice
 from .components import null_space_component

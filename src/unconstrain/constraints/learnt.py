@@ -50,6 +50,15 @@ class LearntConstraint(Parameters, Shown):
         The form that was taken, what all were worth where held out, and what the data does not tell.
     evidence_ : Evidence
         Sums of all samples so far.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).normal(size=(60, 2))
+    >>> actions = states * [1.0, 0.0]  # the second coordinate is held
+    >>> constraint = uc.LearntConstraint().fit(states, actions)
+    >>> constraint.rank_, np.abs(constraint.projection(states[:1])).round(3)
+    (1, array([[[1., 0.],
+            [0., 0.]]]))
     """
 
     rank_: int

@@ -1,12 +1,11 @@
-"""One C99 file for a policy, with fixed sizes, no allocation and no state."""
+"""A policy in C: a source file and its header, with fixed sizes, no allocation and no state."""
 
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
-from functools import singledispatch
-from importlib import resources
-from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from functools import partial, singledispatch
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +14,14 @@ from ..base import files
 from ..base.arrays import Array
 from ..base.errors import SettingError
 from ..models import ClosedForm, spaces
+from .description import Description
+from .filling import filled, own_version
 
 TOLERANCE = 1e-9
 """The self-test allows this share of the largest action: mathematics libraries differ in the last digit of ``exp``."""
 
+TOLERANCE_SINGLE = 1e-5
+"""The same in single precision."""
 
 SELF_TESTS = 16
 """States inside the data, and as many far outside, that the self-test of an exported file looks at."""
@@ -27,117 +30,218 @@ FAR = 100.0
 """How far outside, as a multiple of the policy's reach; for a polynomial, whose actions grow faster, its root."""
 
 
-def export_c(form: ClosedForm, policy: Callable[[Array], Array], path: str | os.PathLike[str], name: str) -> None:
-    """Write :func:`c_source` to a file, with a self-test that compares it with the policy."""
-    states = _probes(form)
-    files.write(path, c_source(form, name, states, policy(states)))
+class Source(NamedTuple):
+    """A header and the source that it belongs to; the source begins with the header, and needs no other file."""
+
+    header: str
+    source: str
 
 
-def c_source(form: ClosedForm, name: str, states: Array, actions: Array) -> str:
-    """C99 source of ``void NAME_step(const double state[n], double action[d])``.
+def export_c(
+    form: ClosedForm,
+    policy: Callable[[Array], Array],
+    path: str | os.PathLike[str],
+    name: str | None,
+    described: Description,
+    *,
+    single: bool = False,
+) -> None:
+    """Write :func:`c_source` to a file and, beside it, the header, with a self-test that compares it with the policy.
 
-    Constants are hexadecimal, so that no digit is lost. The file needs
-    nothing but ``exp``, where states are angles also ``sin`` and ``cos``, from
-    the standard library. With ``NAME_SELF_TEST`` defined, in capitals, it has a
-    ``main`` that compares itself with the given actions.
+    The name is by default that of the file. A header that is there is replaced, as the file is.
+
+    Raises
+    ------
+    SettingError
+        If the path is that of a header, and as :func:`c_source` does.
+    """
+    place = Path(path)
+    if place.suffix == ".h":
+        raise SettingError(f"{path}: got the name of a header, expected that of the source, such as {place.stem}.c.")
+    made = c_source(form, c_name(place.stem) if name is None else name, policy, described, place.name, single=single)
+    files.write(place, made.source)
+    files.write(place.with_suffix(".h"), made.header)
+
+
+def c_name(stem: str) -> str:
+    """A name in C that is like that of a file."""
+    plain = re.sub(r"[^A-Za-z0-9]+", "_", stem).strip("_")
+    return plain if plain[:1].isalpha() else f"policy_{plain}".rstrip("_")
+
+
+def c_source(
+    form: ClosedForm,
+    name: str,
+    policy: Callable[[Array], Array],
+    described: Description,
+    file: str = "FILE.c",
+    *,
+    single: bool = False,
+) -> Source:
+    """Source and header of ``void NAME_step(const double state[n], double action[d])`` and what belongs to it.
+
+    They are C99 as well as C++11. Constants have all digits. The file needs nothing but ``exp``, where states are
+    angles also ``sin`` and ``cos``, from the standard library. With ``NAME_SELF_TEST`` defined, in capitals, it has a
+    ``main`` that compares itself with the policy.
 
     Parameters
     ----------
     form : ClosedForm
     name : str
-        A C identifier.
-    states, actions : ndarray, shape (K, n) and (K, d)
-        What the self-test looks at, and what it expects there.
+        A C identifier, with which all names begin.
+    policy : callable
+        States (N, n) to actions (N, d), which the self-test expects.
+    described : Description
+        Goes into a comment.
+    file : str
+        Name of the file that the source is for.
+    single : bool
+        Compute in ``float``.
 
     Raises
     ------
     SettingError
-        If the name is none in C.
+        If the name is none in C, or a number is too large for a ``float``.
     """
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         raise SettingError(f"name: got {name!r}, expected a name in C: a letter, then letters, digits, underscores.")
-    (m, d, models), n, straight = form.sizes, states.shape[1], form.embedding.frame is None
-    defined = f"void {name}_step(const double state[{n}]"
-    if not straight:
-        defined = f"static void {name}_of_coordinates(const double state[{m}]"
-    fill = {
-        "name": name,
-        "NAME": name.upper(),
-        "macro": f"{name.upper()}_SELF_TEST",
-        "version": _version(),
+    fill = {"name": name, "NAME": name.upper(), "macro": f"{name.upper()}_SELF_TEST", "file": file}
+    fill |= _sizes(form, described) | _numbers(form, name, policy, single)
+    header = filled("header.h", fill)
+    return Source(header, header + "\n" + "".join(filled(f"{part}.c", fill) for part in _parts(form)))
+
+
+def _parts(form: ClosedForm) -> tuple[str, ...]:
+    """Names of the templates that the source consists of."""
+    relative = ("straight",) if form.embedding.frame is None else ("rotation", "coordinates")
+    if form.exponents is not None:
+        body: tuple[str, ...] = ("shares", "maps" if form.is_affine else "constants")
+    else:
+        body = ("affine",) if form.monomials is None else ("polynomial",)
+    return "head", *relative, *body, "within" if form.precisions is None else "support", "self_test"
+
+
+def _sizes(form: ClosedForm, described: Description) -> dict[str, str]:
+    """What templates say of the policy in whole numbers and words."""
+    (m, d, models), n = form.sizes, form.columns
+    needs = [] if form.exponents is None else ["exp()"]
+    needs += [] if form.embedding.frame is None else ["sin()", "cos()"]
+    kernels = "How near to the data a state is: from 1 to 0 far from all of it."
+    box = "1 where each coordinate is within the reach of the data, else 0: more is not known of such a policy."
+    return {
+        "version": own_version(),
         "what": f"{n} states to {d} actions, {models} model{'s' * (models > 1)}",
+        "about": "\n".join(f" * {line}" for line in described.comment()),
+        "support_is": box if form.precisions is None else kernels,
+        "needs": ", ".join(needs) or "nothing",
         "n": str(n),
         "d": str(d),
+        "m": str(m),
         "models": str(models),
-        "more": "" if straight else f", {name.upper()}_COORDINATES = {m}",
-        "inputs": "STATES" if straight else "COORDINATES",
-        "needs": "exp()" if straight else "exp(), sin() and cos()",
-        "defined": f"{defined}, double action[{d}])",
-        "frame": "" if form.embedding.frame is None else _braced(form.embedding.frame),
-        "own": "\n".join(_own_coordinates(form, name)),
-        "rotation": _braced(spaces.ROTATION),
-        "tests": str(len(states)),
-        "origin": _braced(form.origin),
-        "maps": _braced(form.maps if form.is_affine else form.maps[:, :, 0]),
-        "slopes": "" if form.exponents is None else _braced(form.exponents),
         "terms": str(form.maps.shape[2]),
         "degree": str(form.degree),
-        "monomials": "" if form.monomials is None else _braced(form.monomials, str),
-        "test_states": _braced(states),
-        "test_actions": _braced(actions),
-        "tolerance": float(TOLERANCE * np.abs(actions).max()).hex(),
     }
-    source = "".join(_template(part) for part in ("head", *_body(form), *_end(form), "self_test"))
-    return re.sub(r"@([a-z_]+|NAME)@", lambda found: fill[found[1]], source)
 
 
-def _body(form: ClosedForm) -> tuple[str, ...]:
-    """Names of the templates that are the policy."""
-    if form.exponents is not None:
-        return "shares", "maps" if form.is_affine else "constants"
-    return ("affine",) if form.monomials is None else ("polynomial",)
+def _numbers(form: ClosedForm, name: str, policy: Callable[[Array], Array], single: bool) -> dict[str, str]:
+    """What templates say in numbers of the asked precision."""
+    said = _single if single else _double
+    braced = partial(_braced, said=said)
+    states = _probes(form)
+    states = states.astype(np.float32).astype(np.float64) if single else states
+    actions = policy(states)
+    tolerance = (TOLERANCE_SINGLE if single else TOLERANCE) * np.abs(actions).max()
+    optional = {"slopes": form.exponents, "precisions": form.precisions, "frame": form.embedding.frame}
+    return {key: "" if table is None else braced(table) for key, table in optional.items()} | {
+        "real": "float" if single else "double",
+        "f": "f" if single else "",
+        "origin": braced(form.origin),
+        "reach": braced(form.reach),
+        "limits": braced(_limits(form)),
+        "speed_limit": said(_fastest(form, policy)),
+        "maps": braced(form.maps),
+        "map": braced(form.maps[0]),
+        "constants": braced(form.maps[:, :, 0]),
+        "monomials": "" if form.monomials is None else _braced(form.monomials, str),
+        "rotation": braced(spaces.ROTATION),
+        "own": "\n".join(_own_coordinates(form, name, said)),
+        "tests": str(len(states)),
+        "test_states": braced(states),
+        "test_actions": braced(actions),
+        "tolerance": _double(tolerance),
+    }
 
 
-def _end(form: ClosedForm) -> tuple[str, ...]:
-    """Names of the templates between the policy of coordinates and that of states."""
+def _limits(form: ClosedForm) -> Array:
+    """Range of each state column in the data, (n, 2); without an end for angles and orientations."""
+    ends = np.column_stack([form.origin - form.reach, form.origin + form.reach])
     if form.embedding.frame is None:
-        return ()
-    return "rotation", "coordinates"
+        return ends
+    parts, place = [], 0
+    for factor in form.embedding.space.factors:
+        columns, size, _ = factor.sizes
+        straight = isinstance(factor, spaces.Euclidean)
+        parts.append(ends[place : place + size] if straight else np.tile([-np.inf, np.inf], (columns, 1)))
+        place += size
+    return np.concatenate(parts)
 
 
-def _own_coordinates(form: ClosedForm, name: str) -> Iterator[str]:
+def _fastest(form: ClosedForm, policy: Callable[[Array], Array]) -> float:
+    """The largest action at the centres of the kernels, or within half of the reach, where most of the data is."""
+    if form.exponents is None or form.precisions is None:
+        z = form.reach * np.random.default_rng(0).uniform(-0.5, 0.5, (SELF_TESTS, len(form.origin)))
+    else:
+        z = form.exponents[:, :-1] / form.precisions
+    return float(np.linalg.norm(policy(form.embedding.states(form.origin + z)), axis=1).max())
+
+
+def _own_coordinates(form: ClosedForm, name: str, said: Callable[[Any], str]) -> Iterator[str]:
     """Statements that set the coordinates ``own`` of the ``state``, before they are turned."""
     column = place = 0
     for factor in form.embedding.space.factors:
         columns, size, _ = factor.sizes
-        yield from _statements(factor, [f"state[{column + i}]" for i in range(columns)], place, name)
+        yield from _statements(factor, [f"state[{column + i}]" for i in range(columns)], place, name, said)
         column, place = column + columns, place + size
 
 
 @singledispatch
-def _statements(_: spaces.Space, states: Sequence[str], place: int, _name: str) -> list[str]:
+def _statements(
+    _: spaces.Space, states: Sequence[str], place: int, _name: str, _said: Callable[[Any], str]
+) -> list[str]:
     return [f"    own[{place + i}] = {state};" for i, state in enumerate(states)]
 
 
 @_statements.register(spaces.Circle)
-def _of_angle(space: spaces.Circle, states: Sequence[str], place: int, _name: str) -> list[str]:
-    radius = _hexadecimal(space.radius)
+def _of_angle(
+    space: spaces.Circle, states: Sequence[str], place: int, _name: str, said: Callable[[Any], str]
+) -> list[str]:
+    radius, f = said(space.radius), "f" if said is _single else ""
     pairs = enumerate(("cos", "sin"), place)
-    return [f"    own[{i}] = {radius} * {function}({states[0]} / {radius});" for i, function in pairs]
+    return [f"    own[{i}] = {radius} * {function}{f}({states[0]} / {radius});" for i, function in pairs]
 
 
 @_statements.register(spaces.Sphere)
-def _of_quaternion(space: spaces.Sphere, states: Sequence[str], place: int, name: str) -> list[str]:
+def _of_quaternion(
+    space: spaces.Sphere, states: Sequence[str], place: int, name: str, _said: Callable[[Any], str]
+) -> list[str]:
     return [f"    {name}_rotation({', '.join(states[i] for i in space.places)}, own + {place});"]
 
 
-def _template(part: str) -> str:
-    """C with ``@WORDS@`` to fill in."""
-    return (resources.files(__package__) / "templates" / f"{part}.c.in").read_text()
+def _double(value: float) -> str:
+    """A number with all its digits."""
+    plain = repr(float(value) + 0.0)  # adding zero makes a minus zero plain
+    return plain.replace("inf", "HUGE_VAL")
 
 
-def _hexadecimal(value: float) -> str:
-    return (float(value) + 0.0).hex()  # adding zero makes a minus zero plain
+def _single(value: float) -> str:
+    """A number as a ``float``."""
+    near = np.float32(min(max(float(value), -_LARGEST), _LARGEST)) + np.float32(0.0)
+    if np.isfinite(value) and abs(value) > _LARGEST:
+        raise SettingError(f"float: {value:.3g} is too large for it. Export in double precision, or change the units.")
+    return f"{near}f" if np.isfinite(value) else str(value).replace("inf", "HUGE_VALF")
+
+
+_LARGEST = float(np.finfo(np.float32).max)
 
 
 def _probes(form: ClosedForm) -> Array:
@@ -147,15 +251,8 @@ def _probes(form: ClosedForm) -> Array:
     return form.embedding.states(form.origin + form.reach * drawn)
 
 
-def _braced(values: NDArray[Any], said: Callable[[Any], str] = _hexadecimal) -> str:
+def _braced(values: NDArray[Any], said: Callable[[Any], str]) -> str:
     """An initialiser, by rows."""
     if np.ndim(values) > 1:
         return "{\n" + ",\n".join(_braced(row, said) for row in values) + "}"
     return "{" + ", ".join(map(said, values)) + "}"
-
-
-def _version() -> str:
-    try:
-        return version("unconstrain")
-    except PackageNotFoundError:
-        return "from its sources"

@@ -2,6 +2,7 @@
 
 import os
 from abc import abstractmethod
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,14 +12,18 @@ from sklearn.utils.validation import check_is_fitted
 from ..base.arrays import Array
 from ..models import ClosedForm, Scale
 from .c99 import export_c
+from .description import Description
 from .javascript import export_javascript, javascript
 from .onnx_graph import export_onnx
+from .ros2 import Messages, export_ros2
+from .scaled import Scaler, scaled
 from .stepping import Step, stepper
 
 
 class Deployable:
     """A model and the weights of a solution, in control loops and on other machines."""
 
+    learner: Any
     training_: Any
     solution_: Any
     n_features_in_: int
@@ -66,59 +71,124 @@ class Deployable:
         known["_prepared"] = solution, step
         return step
 
-    def closed_form(self) -> ClosedForm:
+    def closed_form(self, scaler: Scaler | None = None) -> ClosedForm:
         """The policy as one formula: what is exported, and what other targets can be made from.
+
+        Parameters
+        ----------
+        scaler : object with ``transform``, optional
+            What the states went through before, such as the scaler in a pipeline: ``pipeline[:-1]`` where
+            ``pipeline[-1]`` is this policy. The formula is then that of both.
 
         Raises
         ------
         SettingError
-            If the features are a callable that does not say its formula.
+            If the features are a callable that does not say its formula, or the scaler does more than to shift and
+            scale each state.
         InvalidDataError
             If the weights are not finite.
         """
         check_is_fitted(self, "solution_")
         form = self.training_.model.formula(self.solution_.checked().weights)
-        return form if self.scale_ is None else self.scale_.form(form)
+        form = form if self.scale_ is None else self.scale_.form(form)
+        return form if scaler is None else scaled(form, scaler)
 
-    def export_c(self, path: str | os.PathLike[str], name: str = "policy") -> None:
-        """Write the policy as one C99 file that needs only ``exp`` (``sin``, ``cos``) of the standard library.
+    def export_c(
+        self,
+        path: str | os.PathLike[str],
+        name: str | None = None,
+        *,
+        single: bool = False,
+        scaler: Scaler | None = None,
+        notes: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Write the policy as a C source that needs only the mathematics of the standard library, and its header.
 
-        It defines ``void NAME_step(const double state[n], double action[d])``
-        and, with ``NAME_SELF_TEST`` (in capitals) defined, a ``main`` that
-        compares itself with :meth:`predict`. The name is a C identifier.
-        Raises as :meth:`closed_form` does, and for another name.
+        They are C99 and C++11, and offer ``void NAME_step(const double state[n], double action[d])``,
+        ``double NAME_support(const double state[n])``, and limits of states and speed. With ``NAME_SELF_TEST`` (in
+        capitals) defined, there is a ``main`` that compares the file with :meth:`predict`.
+
+        Parameters
+        ----------
+        path : str or path-like
+            Of the source; the header has the suffix ``.h``.
+        name : str, optional
+            What all names begin with, a C identifier; by default as the file is called.
+        single : bool
+            Compute in ``float`` rather than ``double``.
+        scaler : object, optional
+            As in :meth:`closed_form`.
+        notes : mapping, optional
+            What to say in the comment, as :func:`unconstrain.storage.load_notes` reads it from a policy's file.
+
+        Raises
+        ------
+        SettingError
+            For another name, if a number does not fit ``float``, and as :meth:`closed_form` does.
         """
-        export_c(self.closed_form(), self, path, name)
+        form = self.closed_form(scaler)
+        export_c(form, self._after(scaler), path, name, self._described(form, notes), single=single)
 
-    def export_onnx(self, path: str | os.PathLike[str]) -> None:
-        """Write the policy as an ONNX graph, ``states`` (N, n) to ``actions`` (N, d), in float64.
+    def export_onnx(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        single: bool = False,
+        scaler: Scaler | None = None,
+        notes: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Write the policy as an ONNX graph, ``states`` (N, n) to ``actions`` (N, d), in float64 or float32.
 
-        Needs the extra ``onnx``. Raises as :meth:`closed_form` does.
+        Needs the extra ``onnx``. Parameters and errors as in :meth:`export_c`; what is said goes into the metadata.
         """
-        export_onnx(self.closed_form(), path)
+        form = self.closed_form(scaler)
+        export_onnx(form, path, self._described(form, notes), single=single)
 
-    def export_javascript(self, path: str | os.PathLike[str]) -> None:
+    def export_ros2(
+        self,
+        folder: str | os.PathLike[str],
+        name: str | None = None,
+        *,
+        messages: Messages | None = None,
+        scaler: Scaler | None = None,
+        notes: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Write a ROS 2 package with a node around the C source, and a loop in Python.
+
+        Other parameters and errors are as in :meth:`export_c`; the name is by default that of the folder.
+
+        Parameters
+        ----------
+        messages : {"joints", "pose"}, optional
+            Whether states are the positions of joints (``JointState`` in, ``Float64MultiArray`` out) or of a pose
+            (``PoseStamped`` in, ``TwistStamped`` out); by default of a pose where they are called x, y and z.
+        """
+        form = self.closed_form(scaler)
+        export_ros2(form, self._after(scaler), folder, name, self._described(form, notes), messages)
+
+    def _after(self, scaler: Scaler | None) -> Callable[[ArrayLike], Array]:
+        return self if scaler is None else lambda states: self(scaler.transform(np.asarray(states)))
+
+    def _described(self, form: ClosedForm, notes: Mapping[str, Any] | None) -> Description:
+        names = getattr(self, "feature_names_in_", None)
+        told = {"recipe": {"states": None if names is None else list(names)}} | dict(notes or {})
+        learner = type(self.learner).__name__ if self.learner is not None else "Robust"
+        method = getattr(self.solution_, "method", "")
+        return Description.of(form, f"{learner}: {method}" if method else learner, told)
+
+    def export_javascript(self, path: str | os.PathLike[str], *, scaler: Scaler | None = None) -> None:
         """Write the policy as an ES module that needs nothing else, with ``policy(state)`` and ``support(state)``.
 
-        Raises as :meth:`closed_form` does.
+        The scaler and errors are as in :meth:`closed_form`.
         """
-        export_javascript(self.closed_form(), path, self._precision())
+        export_javascript(self.closed_form(scaler), path)
 
-    def javascript(self) -> str:
+    def javascript(self, scaler: Scaler | None = None) -> str:
         """The policy as a JavaScript expression, to put into a page; it is an object of the same two functions.
 
-        Raises as :meth:`closed_form` does.
+        The scaler and errors are as in :meth:`closed_form`.
         """
-        return javascript(self.closed_form(), self._precision())
-
-    def _precision(self) -> Array | None:
-        """One over the variance of the kernels along each coordinate; None where there are none."""
-        model = self.training_.model
-        variance = getattr(model.fields, "variance", None) or getattr(model.features, "variance", None)
-        if variance is None:
-            return None
-        units = 1.0 if self.scale_ is None else self.scale_.states
-        return np.ones(len(self.closed_form().origin)) / (variance * units**2)
+        return javascript(self.closed_form(scaler))
 
     def __getstate__(self) -> Any:
         """Leave out buffers, which are made again where they are needed."""

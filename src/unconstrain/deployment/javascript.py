@@ -7,11 +7,10 @@ from importlib import resources
 from typing import Any
 
 from ..base import files
-from ..base.arrays import Array
 from ..models import ClosedForm, spaces
 
 
-def export_javascript(form: ClosedForm, path: str | os.PathLike[str], precision: Array | None = None) -> None:
+def export_javascript(form: ClosedForm, path: str | os.PathLike[str]) -> None:
     """Write an ES module that exports ``policy(state)`` and ``support(state)``; see :func:`javascript`."""
     (_, d, models), n = form.sizes, form.embedding.states(form.origin[None]).shape[1]
     fill = {
@@ -19,7 +18,7 @@ def export_javascript(form: ClosedForm, path: str | os.PathLike[str], precision:
         "n": str(n),
         "d": str(d),
         "runtime": _template("policy.js"),
-        "formula": formula(form, precision),
+        "formula": formula(form),
     }
     source = _template("policy.js.in")
     for name, text in fill.items():
@@ -27,22 +26,18 @@ def export_javascript(form: ClosedForm, path: str | os.PathLike[str], precision:
     files.write(path, source)
 
 
-def javascript(form: ClosedForm, precision: Array | None = None) -> str:
+def javascript(form: ClosedForm) -> str:
     """JavaScript expression of an object with functions ``policy`` and ``support`` of one state.
 
-    Parameters
-    ----------
-    form : ClosedForm
-    precision : ndarray, shape (m,), optional
-        One over the variance of the kernels along each coordinate; without it ``support`` is null.
+    Where there are no kernels, ``support`` is null.
     """
-    return f"(function () {{\n{_template('policy.js')}\nreturn policyOf({formula(form, precision)});\n}})()"
+    return f"(function () {{\n{_template('policy.js')}\nreturn policyOf({formula(form)});\n}})()"
 
 
-def formula(form: ClosedForm, precision: Array | None = None) -> str:
+def formula(form: ClosedForm) -> str:
     """The numbers of a formula as JSON, of which no digit is lost."""
     plain: dict[str, Any] = {"origin": form.origin.tolist(), "maps": form.maps.tolist()}
-    more = {"exponents": form.exponents, "monomials": form.monomials, "precision": precision}
+    more = {"exponents": form.exponents, "monomials": form.monomials, "precision": form.precisions}
     plain |= {name: values.tolist() for name, values in more.items() if values is not None}
     if form.embedding.frame is not None:
         plain["frame"] = form.embedding.frame.tolist()

@@ -1,4 +1,4 @@
-"""A policy as a float64 ONNX graph, for any number of states at once."""
+"""A policy as an ONNX graph, for any number of states at once."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..base import files
 from ..base.arrays import Array, require_extra
 from ..models import ClosedForm, spaces
+from .description import Description
 
 OPSET = 17
 """Of the standard operators; runtimes of 2022 know it."""
@@ -19,13 +20,23 @@ OPSET = 17
 IR_VERSION = 8
 
 
-def export_onnx(form: ClosedForm, path: str | os.PathLike[str]) -> None:
+def export_onnx(
+    form: ClosedForm, path: str | os.PathLike[str], described: Description, *, single: bool = False
+) -> None:
     """Write :func:`onnx_model` to a file."""
-    files.write(path, onnx_model(form))
+    files.write(path, onnx_model(form, described, single=single))
 
 
-def onnx_model(form: ClosedForm) -> bytes:
-    """Serialised graph from ``states`` (N, n) to ``actions`` (N, d), float64, of standard operators only.
+def onnx_model(form: ClosedForm, described: Description, *, single: bool = False) -> bytes:
+    """Serialised graph from ``states`` (N, n) to ``actions`` (N, d), of standard operators only, for any N.
+
+    Parameters
+    ----------
+    form : ClosedForm
+    described : Description
+        Goes into the metadata.
+    single : bool
+        Take, compute and give float32 rather than float64.
 
     Raises
     ------
@@ -36,8 +47,7 @@ def onnx_model(form: ClosedForm) -> bytes:
     from onnx import TensorProto, checker, helper
 
     n, d, _ = form.sizes
-    columns = form.embedding.states(form.origin[None]).shape[1]
-    graph = _Graph()
+    graph = _Graph(np.float32 if single else np.float64)
     relative = graph.add("Sub", _coordinates(graph, form), graph.constant("origin", form.origin))
     if form.exponents is not None:
         exponents = graph.affine(relative, form.exponents[:, :n].T, form.exponents[:, n], "exponents")
@@ -46,17 +56,18 @@ def onnx_model(form: ClosedForm) -> bytes:
         _polynomial(graph, form, relative, form.monomials)
     else:
         graph.affine(relative, form.maps[0, :, :n].T, form.maps[0, :, n], "map", to="actions")
-    double = TensorProto.DOUBLE
+    kind = TensorProto.FLOAT if single else TensorProto.DOUBLE
     made = helper.make_graph(
         graph.nodes,
         "unconstrain_policy",
-        [helper.make_tensor_value_info("states", double, ["N", columns])],
-        [helper.make_tensor_value_info("actions", double, ["N", d])],
+        [helper.make_tensor_value_info("states", kind, ["N", form.columns])],
+        [helper.make_tensor_value_info("actions", kind, ["N", d])],
         graph.constants,
     )
     model = helper.make_model(
         made, producer_name="unconstrain", opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION
     )
+    helper.set_model_props(model, described.whole)
     checker.check_model(model, full_check=True)
     return bytes(model.SerializeToString())
 
@@ -127,14 +138,17 @@ def _polynomial(graph: _Graph, form: ClosedForm, relative: str, monomials: NDArr
 class _Graph:
     """Nodes and constants, as they come."""
 
-    def __init__(self) -> None:
+    def __init__(self, dtype: type[np.floating[Any]]) -> None:
+        self.dtype = dtype
         self.nodes: list[Any] = []
         self.constants: list[Any] = []
 
     def constant(self, name: str, values: Any) -> str:
         from onnx import numpy_helper
 
-        self.constants.append(numpy_helper.from_array(np.ascontiguousarray(values), name))
+        table = np.asarray(values)
+        kind = table.dtype if np.issubdtype(table.dtype, np.integer) else self.dtype
+        self.constants.append(numpy_helper.from_array(np.ascontiguousarray(table, kind), name))
         return name
 
     def add(self, operator: str, *inputs: str, to: str = "", **settings: Any) -> str:

@@ -8,6 +8,12 @@ over its coordinates (section IV-A).
 
 Where the truth is not known, the observed action takes the place of Nπ, and
 its variance that of the policy's.
+
+Examples
+--------
+>>> demonstration = uc.Demonstration([[0.0], [1.0]], [[1.0], [3.0]])
+>>> uc.metrics.inconsistency(lambda x: np.ones_like(x), demonstration)
+4.0
 """
 
 from collections.abc import Callable, Sequence
@@ -40,6 +46,13 @@ def upe(policy: PolicyLike, demonstrations: Demonstrations) -> float:
         If a demonstration has no truth.
     SettingError
         If the policy does not return one action for each state.
+
+    Examples
+    --------
+    >>> free = uc.Truth(policy=np.array([[1.0, 2.0], [3.0, 1.0]]), projections=np.tile(np.diag([1.0, 0.0]), (2, 1, 1)))
+    >>> demonstration = uc.Demonstration([[0.0, 0.0], [1.0, 1.0]], [[1.0, 0.0], [3.0, 0.0]], truth=free)
+    >>> uc.upe(lambda x: np.zeros_like(x), demonstration)
+    15.0
     """
     demos = _listed(demonstrations)
     predicted = _predicted(policy, demos)
@@ -61,6 +74,13 @@ def cpe(policy: PolicyLike, demonstrations: Demonstrations, constraint: Constrai
     InvalidDataError
         If neither a truth nor a constraint tells the projection, or the constraint reads times that a demonstration
         does not have.
+
+    Examples
+    --------
+    >>> free = uc.Truth(policy=np.array([[1.0, 2.0], [3.0, 1.0]]), projections=np.tile(np.diag([1.0, 0.0]), (2, 1, 1)))
+    >>> demonstration = uc.Demonstration([[0.0, 0.0], [1.0, 1.0]], [[1.0, 0.0], [3.0, 0.0]], truth=free)
+    >>> uc.cpe(lambda x: np.zeros_like(x), demonstration)
+    10.0
     """
     demos = _listed(demonstrations)
     predicted = _predicted(policy, demos)
@@ -69,24 +89,55 @@ def cpe(policy: PolicyLike, demonstrations: Demonstrations, constraint: Constrai
 
 
 def inconsistency(policy: PolicyLike, demonstrations: Demonstrations) -> float:
-    """Inconsistency, ``Σ ‖u − ûûᵀ π̃‖²`` (eq. 4). Needs no truth."""
+    """Inconsistency, ``Σ ‖u − ûûᵀ π̃‖²`` (eq. 4). Needs no truth.
+
+    Examples
+    --------
+    >>> demonstration = uc.Demonstration([[0.0, 0.0], [1.0, 1.0]], [[1.0, 0.0], [0.0, 3.0]])
+    >>> uc.inconsistency(lambda x: np.ones_like(x), demonstration)  # (1 − 1)² + (3 − 1)²
+    4.0
+    """
     demos = _listed(demonstrations)
     actions = stack(demos).actions
     return _squares(actions - project(action_projection(actions), _predicted(policy, demos)))
 
 
 def nupe(policy: PolicyLike, demonstrations: Demonstrations) -> float:
-    """Normalised unconstrained policy error; see :func:`upe`."""
+    """Normalised unconstrained policy error; see :func:`upe`.
+
+    Examples
+    --------
+    >>> free = uc.Truth(policy=np.array([[1.0, 2.0], [3.0, 1.0]]), projections=np.tile(np.diag([1.0, 0.0]), (2, 1, 1)))
+    >>> demonstration = uc.Demonstration([[0.0, 0.0], [1.0, 1.0]], [[1.0, 0.0], [3.0, 0.0]], truth=free)
+    >>> uc.nupe(lambda x: np.array([[1.0, 2.0], [3.0, 1.0]]), demonstration)  # the policy itself
+    0.0
+    """
     return upe(policy, demonstrations) / _norm(demonstrations)
 
 
 def ncpe(policy: PolicyLike, demonstrations: Demonstrations, constraint: Constraint | None = None) -> float:
-    """Normalised constrained policy error; see :func:`cpe`."""
+    """Normalised constrained policy error; see :func:`cpe`.
+
+    Examples
+    --------
+    >>> free = uc.Truth(policy=np.array([[1.0, 2.0], [3.0, 1.0]]), projections=np.tile(np.diag([1.0, 0.0]), (2, 1, 1)))
+    >>> demonstration = uc.Demonstration([[0.0, 0.0], [1.0, 1.0]], [[1.0, 0.0], [3.0, 0.0]], truth=free)
+    >>> uc.ncpe(lambda x: np.array([[1.0, 9.0], [3.0, 9.0]]), demonstration)  # wrong only where it was held
+    0.0
+    """
     return cpe(policy, demonstrations, constraint) / _norm(demonstrations)
 
 
 def ninconsistency(policy: PolicyLike, demonstrations: Demonstrations) -> float:
-    """Normalised inconsistency; see :func:`inconsistency`."""
+    """Normalised inconsistency; see :func:`inconsistency`.
+
+    Examples
+    --------
+    >>> free = uc.Truth(policy=np.array([[1.0, 2.0], [3.0, 1.0]]), projections=np.tile(np.diag([1.0, 0.0]), (2, 1, 1)))
+    >>> demonstration = uc.Demonstration([[0.0, 0.0], [1.0, 1.0]], [[1.0, 0.0], [3.0, 0.0]], truth=free)
+    >>> uc.ninconsistency(lambda x: np.array([[1.0, 9.0], [3.0, 9.0]]), demonstration)
+    0.0
+    """
     return inconsistency(policy, demonstrations) / _norm(demonstrations)
 
 
@@ -106,6 +157,13 @@ def nppe(constraint: Constraint, demonstrations: Demonstrations) -> float:
     ------
     InvalidDataError
         If a demonstration has no truth, or the constraint reads times that one does not have.
+
+    Examples
+    --------
+    >>> free = uc.Truth(policy=np.array([[1.0, 2.0], [3.0, 1.0]]), projections=np.tile(np.diag([1.0, 0.0]), (2, 1, 1)))
+    >>> demonstration = uc.Demonstration([[0.0, 0.0], [1.0, 1.0]], [[1.0, 0.0], [3.0, 0.0]], truth=free)
+    >>> uc.nppe(lambda x, t: np.tile([[[0.0, 1.0]]], (len(x), 1, 1)), demonstration)  # what really held it
+    0.0
     """
     demos = _listed(demonstrations)
     policy = _true_policy(demos)
@@ -118,6 +176,13 @@ def npoe(constraint: Constraint, demonstrations: Demonstrations) -> float:
 
     How much of the observed actions it would have taken away; zero for one that holds nothing. The variance is that of
     the actions. As :func:`nppe`, but needs no truth.
+
+    Examples
+    --------
+    >>> free = uc.Truth(policy=np.array([[1.0, 2.0], [3.0, 1.0]]), projections=np.tile(np.diag([1.0, 0.0]), (2, 1, 1)))
+    >>> demonstration = uc.Demonstration([[0.0, 0.0], [1.0, 1.0]], [[1.0, 0.0], [3.0, 0.0]], truth=free)
+    >>> uc.npoe(lambda x, t: np.tile([[[1.0, 0.0]]], (len(x), 1, 1)), demonstration)  # would have taken all away
+    5.0
     """
     demos = _listed(demonstrations)
     actions = stack(demos).actions

@@ -1,4 +1,10 @@
-"""Learners, from training data to a solution: those of the paper, and the robust ones."""
+"""Learners, from training data to a solution: those of the paper, and the robust ones.
+
+Examples
+--------
+>>> uc.learners.Hybrid(softness=0.1).softness
+0.1
+"""
 
 from . import robust, secondary
 from .direct import Direct

@@ -12,7 +12,14 @@ from .solution import Solution
 
 @dataclass(frozen=True)
 class Direct(Learner):
-    """Minimise the standard risk alone: least-squares regression on the observed actions (eq. 5)."""
+    """Minimise the standard risk alone: least-squares regression on the observed actions (eq. 5).
+
+    Examples
+    --------
+    >>> states = np.array([[0.0], [1.0], [2.0]])
+    >>> uc.ParametricPolicy(uc.Affine(), uc.Direct()).fit(states, -states).predict([[3.0]])
+    array([[-3.]])
+    """
 
     def learn(self, training: Training) -> Solution:
         """Learn from all folds; there is no setting to choose."""

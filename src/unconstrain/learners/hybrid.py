@@ -55,6 +55,15 @@ class Hybrid(Learner):
         What is minimised in the directions left undetermined, in place of the standard risk: ``towards(goal, gain)``,
         ``like(policy)``, ``damped(gain)`` of :mod:`unconstrain.learners.secondary`, sums of them and of
         :func:`~unconstrain.learners.secondary.standard_risk`, or a function of your own from moments to a quadratic.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).normal(size=(40, 2))
+    >>> actions = -states * np.eye(2)[np.arange(40) % 2]  # now one coordinate is held, now the other
+    >>> uc.ParametricPolicy(uc.Affine(), uc.Hybrid()).fit(states, actions).predict([[1.0, 2.0]]).round(3)
+    array([[-1., -2.]])
+    >>> uc.ParametricPolicy(uc.Affine(), uc.Direct()).fit(states, actions).predict([[1.0, 2.0]]).round(1)
+    array([[-0.2, -1.2]])
     """
 
     alpha: float | Literal["auto"] = 0.1

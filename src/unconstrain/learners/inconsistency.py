@@ -21,6 +21,14 @@ class Inconsistency(Learner):
         chooses by the inconsistency on held-out data.
     averaging
         See :class:`Hybrid`.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).normal(size=(40, 2))
+    >>> actions = -states * np.eye(2)[np.arange(40) % 2]  # now one coordinate is held, now the other
+    >>> policy = uc.ParametricPolicy(uc.Affine(), uc.Inconsistency()).fit(states, actions)
+    >>> policy.predict([[1.0, 2.0]]).round(3)
+    array([[-1., -2.]])
     """
 
     threshold: float | None = 0.0

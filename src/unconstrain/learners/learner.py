@@ -15,6 +15,11 @@ class Learner(Parameters, ABC):
     """Computes a solution from training data. A subclass implements ``learn``.
 
     Learners are dataclasses; their fields are their settings.
+
+    Examples
+    --------
+    >>> isinstance(uc.Hybrid(), uc.Learner), isinstance(uc.Robust(), uc.Learner)
+    (True, True)
     """
 
     needs_samples: ClassVar[bool] = False

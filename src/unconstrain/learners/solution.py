@@ -164,6 +164,14 @@ class Solution(Shown):
         Of learners that use the samples.
     notes : tuple of str
         What had to be assumed, and what could not be tried, sentence by sentence.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).normal(size=(40, 2))
+    >>> actions = -states * np.eye(2)[np.arange(40) % 2]  # now one coordinate is held, now the other
+    >>> solution = uc.ParametricPolicy(uc.Affine(), uc.Hybrid()).fit(states, actions).solution_
+    >>> solution.directions, solution.determined
+    (6, array([6]))
     """
 
     weights: Array

@@ -1,4 +1,10 @@
-"""Models of a policy: features, receptive fields, state spaces, and their closed form."""
+"""Models of a policy: features, receptive fields, state spaces, and their closed form.
+
+Examples
+--------
+>>> uc.models.Scale.of([1000.0, 1.0], 2, 2).state(np.array([[500.0, 0.5]]))
+array([[0.5, 0.5]])
+"""
 
 from . import spaces
 from .features import Affine, FeatureMap, KMeansRBF, NormalisedRBF, Placeable, Polynomial

@@ -56,6 +56,11 @@ class Affine(Shown):
     centre, scale : float or array_like, shape (n,)
         The features are ``((x − centre) / scale, 1)``. The functions they span
         do not depend on either; the condition of the solution does.
+
+    Examples
+    --------
+    >>> uc.Affine()(np.array([[2.0, 3.0]]))
+    array([[2., 3., 1.]])
     """
 
     centre: Array | float = 0.0
@@ -73,7 +78,7 @@ class Affine(Shown):
         n = weights.shape[1] - 1
         scale = np.broadcast_to(np.asarray(self.scale, np.float64), n)
         maps = np.column_stack([weights[:, :n] / scale, weights[:, n]])
-        return ClosedForm(np.broadcast_to(np.asarray(self.centre, np.float64), n), maps[None], None, np.abs(scale))
+        return ClosedForm(np.broadcast_to(np.asarray(self.centre, np.float64), n), maps[None], None, 3 * np.abs(scale))
 
     def place(self, states: Array) -> Affine:
         """Centre and scale on the data, unless centre or scale were given."""
@@ -108,6 +113,11 @@ class Polynomial(Shown, Parameters):
     ------
     SettingError
         If the degree is no whole number above zero, or states have more than :data:`MOST_MONOMIALS` monomials.
+
+    Examples
+    --------
+    >>> uc.Polynomial(2)(np.array([[2.0, 3.0]]))
+    array([[4., 6., 2., 9., 3., 1.]])
     """
 
     degree: int = 2
@@ -170,6 +180,12 @@ class Kernels(Shown):
         distances = squared_distances(states, self.centres)
         return gaussian(namespace(distances).min(distances, axis=1), self.variance)
 
+    def blend_of(self, origin: Array, maps: Array) -> ClosedForm:
+        """Closed form of maps, one for each kernel, that are blended by these."""
+        reach = np.abs(self.centres - origin).max(axis=0) + np.sqrt(self.variance)
+        slopes = exponents(self.centres, self.variance, origin)
+        return ClosedForm(origin, maps, slopes, reach, precisions=np.full(len(origin), 1.0 / self.variance))
+
     def _summary(self) -> tuple[str, ...]:
         centres, n = self.centres.shape
         return f"{counted(centres, 'centre')} in {counted(n, 'dimension')}", f"variance={self.variance:.4g}"
@@ -192,6 +208,14 @@ class NormalisedRBF(Kernels):
     ------
     InvalidDataError, SettingError
         If the centres are no finite table or the variance is not positive.
+
+    Examples
+    --------
+    >>> grid = uc.NormalisedRBF.grid(-1, 1, 3)
+    >>> grid
+    NormalisedRBF(9 centres in 2 dimensions, variance=1)
+    >>> grid(np.array([[0.3, 0.1]])).sum().round(6)
+    np.float64(1.0)
     """
 
     def __call__(self, states: Array) -> Array:
@@ -219,9 +243,7 @@ class NormalisedRBF(Kernels):
 
     def closed_form(self, weights: Array) -> ClosedForm:
         """Closed form of the policy ``W φ(x)`` with weights (d, p)."""
-        origin = self.centres.mean(axis=0)
-        reach = np.abs(self.centres - origin).max(axis=0) + np.sqrt(self.variance)
-        return ClosedForm(origin, weights.T[:, :, None], exponents(self.centres, self.variance, origin), reach)
+        return self.blend_of(self.centres.mean(axis=0), weights.T[:, :, None])
 
     def roughness(self) -> Array:
         """Roughness matrix R of the kernels' weights, shape (p, p).
@@ -343,6 +365,11 @@ class KMeansRBF(Parameters):
         See :meth:`NormalisedRBF.kmeans`.
     seed : int
         Seed of k-means.
+
+    Examples
+    --------
+    >>> uc.KMeansRBF(3).place(np.random.default_rng(0).normal(size=(100, 2))).centres.shape
+    (3, 2)
     """
 
     count: int = 25

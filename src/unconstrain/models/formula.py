@@ -37,6 +37,15 @@ class ClosedForm(Shown):
         Monomial j is the product of the entries ``monomials[j]`` of ``(z, 1)``. Without exponents only.
     embedding : Embedding
         States (n,) to coordinates (m,).
+    precisions : ndarray, shape (m,), optional
+        ``λ = 1 / σ²`` along each axis, which is ``slope_m`` over the centre of kernel m. The kernel of the nearest
+        centre, the support of a state, is ``exp(max_m e_m − ½ Σ_i λ_i z_i²)``.
+
+    Examples
+    --------
+    >>> twice = uc.ClosedForm(origin=np.zeros(1), maps=np.array([[[2.0, 0.0]]]), exponents=None, reach=np.ones(1))
+    >>> twice.sizes  # coordinates, actions, models
+    (1, 1, 1)
     """
 
     origin: Array
@@ -45,11 +54,17 @@ class ClosedForm(Shown):
     reach: Array
     monomials: NDArray[np.intp] | None = None
     embedding: Embedding = field(default_factory=Embedding)
+    precisions: Array | None = None
 
     @property
     def sizes(self) -> tuple[int, int, int]:
         """Numbers of coordinates m, of actions d, and of models M."""
         return len(self.origin), self.maps.shape[1], self.maps.shape[0]
+
+    @property
+    def columns(self) -> int:
+        """Number of state columns n."""
+        return int(self.embedding.states(self.origin[None]).shape[1])
 
     @property
     def is_affine(self) -> bool:
@@ -62,8 +77,7 @@ class ClosedForm(Shown):
         return 1 if self.monomials is None else self.monomials.shape[1]
 
     def _summary(self) -> tuple[str, ...]:
-        states = self.embedding.states(self.origin[None]).shape[1]
-        return tuple(map(counted, (states, *self.sizes[1:]), ("state", "action", "model")))
+        return tuple(map(counted, (self.columns, *self.sizes[1:]), ("state", "action", "model")))
 
 
 def exponents(centres: Array, variance: float, origin: Array) -> Array:

@@ -45,6 +45,12 @@ class Model(Shown):
     centring : ndarray, shape (M, p', p), or None
         ``T_m``: model m is solved in the features ``T_m φ``, for numerical accuracy, and on a curved space along
         its axes at the centre of the field; None for φ itself.
+
+    Examples
+    --------
+    >>> model = uc.Model.local(np.linspace(0, 1, 50)[:, None], variance=0.1)
+    >>> model.shares(np.array([[0.5]])).sum(axis=1)
+    array([1.])
     """
 
     features: FeatureMap

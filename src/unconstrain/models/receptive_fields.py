@@ -7,7 +7,7 @@ import numpy as np
 from ..base.arrays import SMALLEST_VARIANCE, Array, as_matrix, beside, check_at_least, is_foreign, namespace
 from ..base.errors import SettingError
 from .features import Affine, FeatureMap, Kernels, gaussian, shares, squared_distances
-from .formula import ClosedForm, exponents
+from .formula import ClosedForm
 from .spaces import Embedding
 
 MOST_FIELDS = 100
@@ -22,6 +22,12 @@ class ReceptiveFields(Kernels):
     centres : array_like, shape (M, n)
     variance : float
         The fields' σ², in squared units of the state.
+
+    Examples
+    --------
+    >>> fields = uc.ReceptiveFields([[0.0], [1.0]], variance=0.5)
+    >>> fields.shares(np.array([[0.5]]))
+    array([[0.5, 0.5]])
     """
 
     def weights(self, states: Array) -> Array:
@@ -58,8 +64,7 @@ class ReceptiveFields(Kernels):
             return None
         origin, scale = np.asarray(features.centre), features.scale
         maps = np.concatenate([weights[..., :-1] / scale, weights[..., -1:]], axis=2)
-        reach = np.abs(self.centres - origin).max(axis=0) + np.sqrt(self.variance)
-        return ClosedForm(origin, maps, exponents(self.centres, self.variance, origin), reach)
+        return self.blend_of(origin, maps)
 
 
 @dataclass(frozen=True)
@@ -108,6 +113,11 @@ def cover(states: Array, variance: float, at_least: float = 0.7) -> ReceptiveFie
     ------
     SettingError
         If the membership is not between 0 and 1 or the variance is not positive.
+
+    Examples
+    --------
+    >>> uc.cover(np.linspace(0, 1, 50)[:, None], variance=0.1)
+    ReceptiveFields(3 centres in 1 dimension, variance=0.1)
     """
     return _cover(as_matrix(states, "states"), variance, at_least, most=None)
 

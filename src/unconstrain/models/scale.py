@@ -109,8 +109,14 @@ class Scale:
         elif own.is_affine:
             maps = maps * factors
         exponents = None if own.exponents is None else own.exponents * factors
-        origin, reach = self.states * own.origin, self.states * own.reach
-        return replace(own, origin=origin, maps=maps, exponents=exponents, reach=reach)
+        return replace(
+            own,
+            origin=self.states * own.origin,
+            maps=maps,
+            exponents=exponents,
+            reach=self.states * own.reach,
+            precisions=None if own.precisions is None else own.precisions / self.states**2,
+        )
 
 
 class Candidate(NamedTuple):

@@ -7,6 +7,12 @@ coordinates; Gaussian kernels of chords are kernels, those of angles are none (F
 
 Actions are velocities: along a straight axis and of an angle their rates of change, of an orientation the angular
 velocity in the frame of the body, three components in rad/s. An orientation has four state columns and three actions.
+
+Examples
+--------
+>>> circle = uc.spaces.Circle()
+>>> bool(np.isclose(circle.difference(np.array([[3.1]]), np.array([[-3.1]]))[0, 0], 6.2 - 2 * np.pi))
+True
 """
 
 from __future__ import annotations

@@ -33,6 +33,13 @@ class Contained:
     speed : float, optional
         The way back is no faster than this, in units of the state per second;
         by default than the policy is anywhere at the demonstrated states.
+
+    Examples
+    --------
+    >>> safe = uc.Contained(lambda x: np.ones_like(x), states=[[0.0, 0.0]], reach=0.1)
+    >>> safe(np.array([[0.0, 0.0], [1.0, 1.0]])).round(2)
+    array([[ 1.,  1.],
+           [-1., -1.]])
     """
 
     def __init__(

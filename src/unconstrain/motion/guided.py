@@ -68,6 +68,15 @@ class Guided(Shown):
     ------
     SettingError
         If the policy gives no velocities of flat states, no demonstration is known, or no goal.
+
+    Examples
+    --------
+    >>> def around(x):
+    ...     return np.column_stack([-x[:, 1], x[:, 0]]) - 0.1 * x
+    >>> shown = uc.rollout(around, [1.0, 0.0], 40, 0.1)
+    >>> guided = uc.Guided(around, goal=[0.0, 0.0], demonstrations=shown)
+    >>> bool(np.linalg.norm(uc.rollout(guided, [3.0, -2.0], 2000, 0.02).states[-1]) < 0.01)
+    True
     """
 
     def __init__(

@@ -92,6 +92,15 @@ def rollout(
         If the policy's actions do not fit the states, or a setting is out of range.
     InvalidDataError
         If the movement leaves the finite numbers.
+
+    Examples
+    --------
+    >>> plane = uc.constraints.Plane(normal=[0, 0, 1])
+    >>> movement = uc.rollout(lambda x: -x, start=[1.0, 1.0, 1.0], steps=3, dt=0.5, constraint=plane)
+    >>> movement.states
+    array([[1.  , 1.  , 1.  ],
+           [0.5 , 0.5 , 1.  ],
+           [0.25, 0.25, 1.  ]])
     """
     check_at_least("steps", steps, 1, whole=True)
     check_at_least("dt", dt, 0.0, strict=True)

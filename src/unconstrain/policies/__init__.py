@@ -1,4 +1,10 @@
-"""Policies as scikit-learn estimators."""
+"""Policies as scikit-learn estimators.
+
+Examples
+--------
+>>> uc.policies.ParametricPolicy(uc.Polynomial(2), "hybrid")
+ParametricPolicy(features=Polynomial(degree=2), learner='hybrid')
+"""
 
 from .base import Policy
 from .local import LocallyLinearPolicy

@@ -32,15 +32,8 @@ _LOOKED_AT = 2000
 """Samples that are learnt from to choose among scales."""
 
 _FITTED = (
-    "training_",
-    "solution_",
-    "n_features_in_",
-    "feature_names_in_",
-    "n_outputs_",
-    "_flat",
-    "_waiting",
-    "_space",
-    "scale_",
+    *("training_", "solution_", "n_features_in_", "feature_names_in_"),
+    *("n_outputs_", "_flat", "_waiting", "_space", "scale_"),
 )
 
 
@@ -55,6 +48,11 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         Weights (M, d, p), and what the data determined.
     scale_ : Scale or None
         Units in which both are; None for those of the data.
+
+    Examples
+    --------
+    >>> isinstance(uc.LocallyLinearPolicy(), uc.Policy)
+    True
     """
 
     learner: Learner | str | None
@@ -86,15 +84,13 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         Parameters
         ----------
         X : array_like, shape (N, n)
-            States. These and the actions may be arrays of any library that
-            follows the array API standard; they are summed where they are.
+            States; these and actions of any library of the array API standard are summed where they are.
         y : array_like, shape (N, d) or (N,)
             Observed actions, each the projection of the policy by an unknown constraint.
         sample_weight : array_like, shape (N,), optional
             A weight of two is the same as a repetition.
         groups : array_like, shape (N,), optional
-            Which demonstration each sample is from, so that whole
-            demonstrations can be held out.
+            Which demonstration each sample is from, so that whole demonstrations can be held out.
 
         Raises
         ------
@@ -115,12 +111,9 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
     ) -> Self:
         """Learn from a further batch; the sums are those of all batches at once.
 
-        The first batch fixes features, fields, action dimensions, and the
-        spread by which samples are dealt into folds; it should be typical.
-        Batches of too few different states to tell are kept until there are
-        enough. Parameters, result and errors as in :meth:`fit`.
-
-        The solution is found anew each time. Where only the last counts,
+        The first batch fixes features, fields, action dimensions, and the spread by which samples are dealt into folds;
+        it should be typical. Batches of too few different states to tell are kept until there are enough. Parameters,
+        result and errors as in :meth:`fit`. The solution is found anew each time; where only the last counts,
         :meth:`fit_batches` is faster.
         """
         first, learner, draft = not hasattr(self, "solution_"), named(self.learner), self._draft()
@@ -138,18 +131,15 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
     def fit_batches(self, batches: Iterable[Sequence[Any]]) -> Self:
         """Learn from more than fits into memory, batch by batch, solving once.
 
-        What can be walked through twice, such as a list or
-        :class:`unconstrain.Stream`, is: first to choose features, fields and
-        folds, then to sum. The result is that of :meth:`fit` on everything,
-        to rounding, however the samples are cut into batches. A generator
-        is walked through once; its first batches fix what would have been
-        chosen, as in :meth:`partial_fit`.
+        What can be walked through twice, such as a list or :class:`unconstrain.Stream`, is: first to choose features,
+        fields and folds, then to sum. The result is that of :meth:`fit` on everything, to rounding, however the samples
+        are cut into batches. A generator is walked through once; its first batches fix what would have been chosen, as
+        in :meth:`partial_fit`.
 
         Parameters
         ----------
         batches : iterable of tuples
-            Each ``(X, y)``, ``(X, y, sample_weight)`` or ``(X, y, sample_weight, groups)``,
-            as :meth:`fit` takes them; none at all is an error.
+            Each ``(X, y)``, with ``sample_weight`` and ``groups`` or not, as :meth:`fit` takes them; at least one.
         """
         learner = self._check_speed_power(getattr(batches, "speed_power", 0.0))
         if iter(batches) is not batches:
@@ -203,10 +193,9 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         ----------
         demonstrations : Demonstration or sequence of Demonstration
         speed_power : float
-            Samples count by this power of their speed. 0 is the paper; 2
-            helps on noisy recordings, since the direction of a slow movement
-            is mostly noise. Learners that look at samples weigh speed
-            themselves: with this, the default is :class:`~unconstrain.Hybrid`.
+            Samples count by this power of their speed. 0 is the paper; 2 helps on noisy recordings, since the direction
+            of a slow movement is mostly noise. Learners that look at samples weigh speed themselves: with this, the
+            default is :class:`~unconstrain.Hybrid`.
         """
         demos = [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
         states, actions, groups = stack(demos)
@@ -272,8 +261,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
         """Share of the observed motion that the policy, projected onto each action, explains.
 
-        ``1 − E_i / Σ w uᵀu`` with the inconsistency of eq. 4; 1 is best. The
-        usual R² would punish a policy for what constraints took away.
+        ``1 − E_i / Σ w uᵀu`` (eq. 4); 1 is best. The usual R² would punish a policy for what constraints took away.
 
         Parameters
         ----------

@@ -14,14 +14,12 @@ from .base import Asked, Policy
 class LocallyLinearPolicy(Policy):
     """Linear models in Gaussian receptive fields, averaged by their weights (section III-D).
 
-    Each local model is learnt on its own, its threshold too. Its regressors
-    are ``((x − c_m) / σ, 1)``: centred on the field and free of units.
+    Each is learnt on its own, its threshold too, on ``((x − c_m) / σ, 1)``: centred on the field and free of units.
 
     Parameters
     ----------
     variance : float, optional
-        The fields' σ², in squared units of the state. By default a quarter of
-        the states' total variance, more where that takes over 100 fields.
+        The fields' σ², by default a quarter of the states' total variance, more where that takes over 100 fields.
     at_least : float
         Fields are added until every sample has at least this weight in one.
     centres : array_like, shape (M, n), optional
@@ -33,17 +31,21 @@ class LocallyLinearPolicy(Policy):
     space : Space, optional
         Which states are angles or orientations (:mod:`unconstrain.spaces`); by default as the demonstrations say.
     scale : sequence of float or "auto", optional
-        So much of each state, and of each action where they are not as many, is taken as one: ``(1000, 1)`` where
-        millimetres are beside radians. "auto" finds it where columns are unlike (:mod:`~unconstrain.models.scale`).
-        Predictions stay in the units of the data. For states without angles and orientations.
+        As in :class:`~unconstrain.ParametricPolicy`.
 
     Attributes
     ----------
     solution_ : Solution
-        Weights (M, d, n + 1) over ``((x − origin) / σ, 1)``, with one origin
-        for all fields, and what the data determined.
+        Weights (M, d, n + 1) over ``((x − origin) / σ, 1)``, with one origin, and what the data determined.
     fields_ : ReceptiveFields
         The fields in use, among the coordinates of the state space.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).normal(size=(40, 2))
+    >>> actions = -states * np.eye(2)[np.arange(40) % 2]  # now one coordinate is held, now the other
+    >>> uc.LocallyLinearPolicy(9.0, learner="hybrid").fit(states, actions).predict([[1.0, 2.0]]).round(3)
+    array([[-1., -2.]])
     """
 
     def __init__(

@@ -19,8 +19,7 @@ class ParametricPolicy(Policy):
         A feature map, such as :class:`~unconstrain.NormalisedRBF` or
         :class:`~unconstrain.Polynomial`, or anything that maps (N, n) to (N, p).
         By default 25 normalised RBFs placed on the data. "auto" chooses among
-        affine, quadratic and cubic features, these RBFs and local models by
-        estimated error (:mod:`unconstrain.learners.robust.choice`).
+        affine, quadratic and cubic features, these RBFs and local models by estimated error.
     learner : Learner or str, optional
         Or its name: "robust", "hybrid", "inconsistency", "direct"; :class:`~unconstrain.Robust` by default.
     validation : Folds or HeldOut, optional
@@ -39,6 +38,13 @@ class ParametricPolicy(Policy):
         Weights (1, d, p) and what the data determined.
     features_ : callable
         The features in use.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).normal(size=(40, 2))
+    >>> actions = -states * np.eye(2)[np.arange(40) % 2]  # now one coordinate is held, now the other
+    >>> uc.ParametricPolicy(uc.Affine(), "hybrid").fit(states, actions).predict([[1.0, 2.0]]).round(3)
+    array([[-1., -2.]])
     """
 
     def __init__(

@@ -37,6 +37,13 @@ class Recording(Shown):
         Unit of a column, as the file says it (``"mm"``, ``"deg"``), for the columns of which it says one.
     attributes : mapping of str to object
         What the file says of the whole recording: its task, the version of its environment, its rate.
+
+    Examples
+    --------
+    >>> recording = uc.Recording(("t", "x"), np.array([[0.0, 1.0], [0.1, 2.0]]), name="wipe")
+    >>> recording.select(["x"])
+    array([[1.],
+           [2.]])
     """
 
     columns: tuple[str, ...]
@@ -84,6 +91,13 @@ class Truth(Shown):
         The unconstrained policy at each state.
     projections : ndarray, shape (T, d, d)
         The projection N that the constraint applied, so that ``u = N π``.
+
+    Examples
+    --------
+    >>> held = uc.null_space_projection(np.array([[[0.0, 1.0]]]))
+    >>> truth = uc.Truth(policy=np.array([[1.0, 2.0]]), projections=held)
+    >>> uc.project(truth.projections, truth.policy)
+    array([[1., 0.]])
     """
 
     policy: Array
@@ -116,6 +130,11 @@ class Demonstration(Shown):
     ------
     InvalidDataError
         If a table is ragged, empty or not finite, the lengths differ, or the space is not one of such states.
+
+    Examples
+    --------
+    >>> uc.Demonstration(states=[[0, 0], [1, 0]], actions=[[1, 0], [1, 0]], times=[0, 1], name="wipe")
+    Demonstration('wipe', 2 samples, 2 states, 2 actions, 1 s)
     """
 
     states: Array
@@ -196,6 +215,12 @@ def stack(demonstrations: Demonstration | Sequence[Demonstration]) -> Stack:
     ------
     InvalidDataError
         If there is none, or they differ in the number of columns or in their space.
+
+    Examples
+    --------
+    >>> one = uc.Demonstration([[0.0], [1.0]], [[1.0], [1.0]])
+    >>> uc.stack([one, one]).groups
+    array([0, 0, 1, 1])
     """
     demos = [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
     if not demos:

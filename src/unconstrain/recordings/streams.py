@@ -65,6 +65,13 @@ class Stream:
         :meth:`~unconstrain.ParametricPolicy.fit_demonstrations`.
     leave_out : iterable of str
         Names of recordings to pass over.
+
+    Examples
+    --------
+    >>> t = np.linspace(0, 1, 50)
+    >>> np.savetxt("wipe.csv", np.column_stack([t, t, 1 - t]), delimiter=",", header="t,x,vx", comments="")
+    >>> uc.LocallyLinearPolicy(learner="hybrid").fit_batches(uc.Stream("wipe.csv")).n_outputs_
+    1
     """
 
     def __init__(

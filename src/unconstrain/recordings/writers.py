@@ -1,4 +1,12 @@
-"""Recordings as files for other programs: CSV, Parquet, LeRobot, MCAP."""
+"""Recordings as files for other programs: CSV, Parquet, LeRobot, MCAP.
+
+Examples
+--------
+>>> recording = uc.Recording(("x",), np.array([[0.0], [1.0]]), np.array([0.0, 0.5]), name="wipe")
+>>> uc.writers.write_recordings([recording], "wipe.csv")
+>>> uc.read("wipe.csv")[0].columns
+('x',)
+"""
 
 from __future__ import annotations
 

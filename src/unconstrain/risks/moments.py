@@ -53,6 +53,12 @@ class Moments(Shown):
         ``Σ w φφᵀ``, so that the M of eq. 11 is ``gram ⊗ I``.
     consistent : ndarray, shape (M, d p, d p)
         ``Σ w (φφᵀ ⊗ ûûᵀ)``, the H of eqs 7 and 15.
+
+    Examples
+    --------
+    >>> whole, first = (uc.gather(np.ones((count, 1)), np.ones((count, 1))) for count in (5, 2))
+    >>> (whole - first).weight
+    array([3.])
     """
 
     weight: Array
@@ -155,6 +161,12 @@ def gather(features: Array, actions: Array, weights: Array | None = None, at_res
     Returns
     -------
     Moments
+
+    Examples
+    --------
+    >>> moments = uc.gather(features=np.ones((3, 1)), actions=np.array([[1.0, 0.0], [0.0, 2.0], [0.0, 0.0]]))
+    >>> moments.weight, moments.energy
+    (array([3.]), array([5.]))
     """
     counts = namespace(features).ones_like(features[:, :1]) if weights is None else weights
     sums = Sums(counts.shape[1], actions.shape[1], features.shape[1], at_rest)

@@ -38,6 +38,13 @@ def null_space_projection(constraint_matrix: Array, tolerance: float = RANK_TOLE
     ------
     InvalidDataError
         If it is not a matrix, or holds NaN or infinity.
+
+    Examples
+    --------
+    >>> uc.null_space_projection(np.array([[0.0, 0.0, 2.0]]))
+    array([[1., 0., 0.],
+           [0., 1., 0.],
+           [0., 0., 0.]])
     """
     constraint_matrix = np.asarray(constraint_matrix, dtype=np.float64)
     if constraint_matrix.ndim < 2:
@@ -97,6 +104,12 @@ def action_projection(actions: Array) -> Array:
     -------
     ndarray, shape (..., d, d)
         Zero where the action is zero.
+
+    Examples
+    --------
+    >>> uc.action_projection(np.array([[0.0, 3.0]]))
+    array([[[0., 0.],
+            [0., 1.]]])
     """
     directions, _ = unit_actions(actions)
     return directions[..., :, None] * directions[..., None, :]
@@ -113,5 +126,10 @@ def project(projections: Array, vectors: Array) -> Array:
     Returns
     -------
     ndarray, shape (..., d)
+
+    Examples
+    --------
+    >>> uc.project(uc.null_space_projection(np.array([[0.0, 1.0]])), np.array([3.0, 4.0]))
+    array([3., 0.])
     """
     return np.einsum("...ij,...j->...i", projections, vectors)

@@ -81,6 +81,12 @@ class Quadratic(Shown):
     constant : ndarray, shape (M,)
     gram : ndarray, shape (M, p, p), optional
         Where the Hessian is ``gram ⊗ I``; makes products with it cheaper.
+
+    Examples
+    --------
+    >>> square = uc.Quadratic(hessian=np.eye(1)[None], linear=np.array([[3.0]]), constant=np.array([9.0]))
+    >>> square(np.array([[3.0]]))  # (w − 3)²
+    array([0.])
     """
 
     hessian: Array

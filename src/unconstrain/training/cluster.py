@@ -5,6 +5,15 @@ Each chunk is looked at where it is; what is chosen from all first looks
 add. No sample travels, and a chunk whose worker dies is summed again by
 another. The result is that of :meth:`~unconstrain.ParametricPolicy.fit`, to
 rounding. Needs the extra ``cluster``.
+
+Examples
+--------
+>>> uc.cluster.check_learner(uc.Hybrid())  # sums are enough for it
+>>> try:
+...     uc.cluster.check_learner(uc.Likelihood())
+... except uc.errors.SettingError as error:
+...     print(error)
+learner: Likelihood needs the samples, and a cluster sends their sums alone. Take Hybrid().
 """
 
 from collections.abc import Callable, Sequence

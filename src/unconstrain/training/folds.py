@@ -33,6 +33,11 @@ class Folds(Parameters):
         names at least two (in a stream: where it is given), and samples otherwise.
     seed : int
         Of the draw, where samples are held out.
+
+    Examples
+    --------
+    >>> uc.ParametricPolicy(uc.Affine(), uc.Hybrid(), validation=uc.Folds(5, by="demonstration")).validation
+    Folds(count=5, by='demonstration', seed=0)
     """
 
     count: int = 10
@@ -69,6 +74,11 @@ class HeldOut(Parameters):
         See :class:`Folds`.
     seed : int
         Of the draw, where samples are held out.
+
+    Examples
+    --------
+    >>> uc.ParametricPolicy(uc.Affine(), uc.Hybrid(), validation=uc.HeldOut(0.3)).validation
+    HeldOut(share=0.3, by='auto', seed=0)
     """
 
     share: float = 0.2

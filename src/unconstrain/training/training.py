@@ -57,6 +57,12 @@ class Training(Shown):
         Samples are kept up to so many, and none if there are more; None keeps all.
     longest : float
         Longest plausible action. Longer ones count less; see :mod:`.suspects`.
+
+    Examples
+    --------
+    >>> policy = uc.ParametricPolicy(uc.Affine(), uc.Direct()).fit([[0.0], [1.0]], [[0.0], [2.0]])
+    >>> float(policy.training_.moments.energy[0])
+    4.0
     """
 
     MOST_KEPT: ClassVar[int] = 200_000

@@ -99,6 +99,14 @@ class Likelihood(_Maximising):
         Most steps of expectation maximisation from each of two starts.
     most : int
         All steps but the last use at most so many samples, evenly thinned in time.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).normal(size=(40, 2))
+    >>> actions = -states * np.eye(2)[np.arange(40) % 2]  # now one coordinate is held, now the other
+    >>> policy = uc.ParametricPolicy(uc.Affine(), uc.Likelihood()).fit(states, actions)
+    >>> policy.predict([[1.0, 2.0]]).round(3)
+    array([[-1., -2.]])
     """
 
     def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
@@ -118,6 +126,14 @@ class NoiseCorrected(SampleLearner):
     ----------
     noise : float, optional
         Standard deviation of the noise on each action coordinate; estimated by default.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).normal(size=(40, 2))
+    >>> actions = -states * np.eye(2)[np.arange(40) % 2]  # now one coordinate is held, now the other
+    >>> policy = uc.ParametricPolicy(uc.Affine(), uc.NoiseCorrected()).fit(states, actions)
+    >>> policy.predict([[1.0, 2.0]]).round(3)
+    array([[-1., -2.]])
     """
 
     noise: float | None = None
@@ -144,6 +160,15 @@ class Segments(SampleLearner):
         actions, which must then be in the order of time.
     noise : float, optional
         Standard deviation of the noise on each action coordinate; by default from differences in time.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).normal(size=(80, 2))
+    >>> normals = np.array([[1.0, 0.0], [0.0, 1.0], [0.6, 0.8], [0.8, -0.6]]).repeat(20, axis=0)
+    >>> actions = uc.project(uc.null_space_projection(normals[:, None]), -states)
+    >>> policy = uc.ParametricPolicy(uc.Affine(), uc.Segments()).fit(states, actions, groups=np.repeat(range(4), 20))
+    >>> policy.predict([[1.0, 2.0]]).round(3)
+    array([[-1., -2.]])
     """
 
     labels: Literal["found", "groups"] = "found"
@@ -192,6 +217,16 @@ class Robust(_Maximising):
         whatever the policy's scale. A candidate then is the policy
         of least constrained error under ``A = Λ J``, with Λ and its rank from the demonstrations; see
         :mod:`unconstrain.learners.robust.held_rows`. It is not stored with a policy.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).normal(size=(40, 2))
+    >>> actions = -states * np.eye(2)[np.arange(40) % 2]  # now one coordinate is held, now the other
+    >>> policy = uc.ParametricPolicy(uc.Affine(), uc.Robust()).fit(states, actions)
+    >>> policy.predict([[1.0, 2.0]]).round(3)
+    array([[-1., -2.]])
+    >>> policy.solution_.free.shape  # how likely it is of each sample that it was free
+    (40,)
     """
 
     jacobian: Jacobian | None = field(default=None, metadata={"stored": False})

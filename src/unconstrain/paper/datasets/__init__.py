@@ -2,6 +2,11 @@
 
 Each loader takes ``download=True`` and keeps what it fetched, save that of the signs: nobody offers these as a plain
 file at a fixed place. Local copies are looked for in the folder named by ``UNCONSTRAIN_DATA``.
+
+Examples
+--------
+>>> [name for name in dir(uc.datasets) if name.startswith("load_")]
+['load_contour', 'load_fingertip', 'load_hand_tracks', 'load_handwriting', 'load_rim_wiping']
 """
 
 from .contours import load_contour as load_contour

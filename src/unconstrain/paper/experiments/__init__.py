@@ -1,4 +1,10 @@
-"""The paper's experiments and a benchmark beyond them, each a module with ``Settings`` and ``run(settings)``."""
+"""The paper's experiments and a benchmark beyond them, each a module with ``Settings`` and ``run(settings)``.
+
+Examples
+--------
+>>> uc.experiments.NAMES[:3]
+('table1', 'figure4', 'figure5')
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,12 @@
-"""From recordings to demonstrations: which columns are what, what is not as it seems, derivatives, trimming."""
+"""From recordings to demonstrations: which columns are what, what is not as it seems, derivatives, trimming.
+
+Examples
+--------
+>>> recording = uc.Recording(("x", "y", "vx", "vy"), np.zeros((3, 4)))
+>>> recipe, _ = uc.preparation.decide(uc.Recipe(), recording)
+>>> recipe.states, recipe.actions
+(('x', 'y'), ('vx', 'vy'))
+"""
 
 from .alignment import align
 from .decisions import decide

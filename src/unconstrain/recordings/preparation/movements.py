@@ -97,6 +97,14 @@ def prepare(recordings: Recording | Sequence[Recording], recipe: Recipe | None =
         If a selected cell is empty or not finite, stamps run backwards, or nothing is left.
     SettingError
         If the columns do not tell what is what, or times are needed and missing.
+
+    Examples
+    --------
+    >>> t = np.linspace(0, 1, 51)
+    >>> recording = uc.Recording(("x",), np.sin(t)[:, None], t, name="wipe")
+    >>> [demonstration] = uc.prepare(recording, uc.Recipe(states=("x",), differentiate="savgol"))
+    >>> bool(np.allclose(demonstration.actions[:, 0], np.cos(t), atol=1e-3))
+    True
     """
     every = [recordings] if isinstance(recordings, Recording) else list(recordings)
     if not every:

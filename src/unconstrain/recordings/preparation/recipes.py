@@ -87,6 +87,12 @@ class Recipe:
     ------
     SettingError
         If a value is out of its range, or both ``actions`` and ``differentiate`` are given.
+
+    Examples
+    --------
+    >>> recipe = uc.Recipe(states=("x", "y"), differentiate="savgol", rate=50.0)
+    >>> recipe.directions
+    ('vx', 'vy')
     """
 
     states: tuple[str, ...] | None = None

@@ -2,6 +2,12 @@
 
 A new format is one module with a :class:`~unconstrain.recordings.readers.table.Format`, listed in
 :data:`~unconstrain.recordings.readers.formats.FORMATS`.
+
+Examples
+--------
+>>> np.savetxt("wipe_1.csv", np.eye(2), delimiter=",", header="x,y", comments="")
+>>> [str(path) for path in uc.readers.expand(["wipe_*.csv"])]
+['wipe_1.csv']
 """
 
 import os
@@ -68,6 +74,13 @@ def read(
         If a file cannot be read; the message names the file, and where known the line and the column.
     SettingError
         If there is no path, or one column is to be both group and time.
+
+    Examples
+    --------
+    >>> np.savetxt("wipe.csv", [[0, 1, 2], [0.1, 3, 4]], delimiter=",", header="t,x,y", comments="")
+    >>> [recording] = uc.read("wipe.csv")
+    >>> recording.name, recording.columns
+    ('wipe', ('x', 'y'))
     """
     told = Reading(group, time, time_unit, columns, topic, episodes, task)
     found = [recording for path in expand(paths) for recording in read_blocks(path, told, whole=True)]

@@ -1,0 +1,119 @@
+"""A policy as a ROS 2 package: a node around the C source, and a loop in Python for where there is no ROS."""
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal
+
+from ..base.arrays import Array
+from ..base.errors import SettingError
+from ..base.files import put_folder, workshop
+from ..models import ClosedForm, spaces
+from .c99 import c_name, c_source
+from .description import Description
+from .filling import filled, own_version
+
+DISTRIBUTIONS = ("Humble", "Jazzy", "Rolling")
+"""Of ROS 2, whose interfaces the node is written for."""
+
+Messages = Literal["joints", "pose"]
+"""Where states come from and velocities go to."""
+
+_MESSAGES = {
+    "joints": ("sensor_msgs/JointState", "std_msgs/Float64MultiArray"),
+    "pose": ("geometry_msgs/PoseStamped", "geometry_msgs/TwistStamped"),
+}
+"""Messages that come in and go out."""
+
+_PLACES = {
+    "package.xml": "package.xml",
+    "CMakeLists.txt": "CMakeLists.txt",
+    "README.md": "README.md",
+    "node.cpp": "src/{name}_node.cpp",
+    "parameters.yaml": "config/{name}.yaml",
+    "launch.py": "launch/{name}.launch.py",
+    "loop.py": "scripts/{name}_loop.py",
+}
+"""Where in the package a template belongs."""
+
+
+def export_ros2(
+    form: ClosedForm,
+    policy: Callable[[Array], Array],
+    folder: str | os.PathLike[str],
+    name: str | None,
+    described: Description,
+    messages: Messages | None = None,
+) -> None:
+    """Write a package with a node that takes each state to a velocity.
+
+    The node limits the speed, stops where the support of the data ends, and stops when no state comes. States are
+    positions of joints, or three coordinates of a pose; by default of a pose if they are called so.
+
+    Parameters
+    ----------
+    form, policy, name, described
+        As in :func:`~unconstrain.deployment.c99.c_source`; the name, in small letters, is by default as the folder's.
+    folder : str or path-like
+        Replaced, if it is there.
+    messages : {"joints", "pose"}, optional
+
+    Raises
+    ------
+    SettingError
+        If states are orientations, or those of a pose are not three with three actions.
+    """
+    package = c_name(Path(os.path.realpath(folder)).name if name is None else name).lower()
+    kind = messages or ("pose" if _are_coordinates(described) else "joints")
+    _check(form, kind)
+    fill = _words(package, form, described, kind)
+    with workshop(folder) as made:
+        made.joinpath("new").mkdir()
+        root = made / "new"
+        source = c_source(form, package, policy, described, f"{package}.c")
+        parts = {place.format(name=package): filled(f"ros2_{part}", fill) for part, place in _PLACES.items()}
+        parts[f"include/{package}/messages.hpp"] = filled(f"ros2_{kind}.hpp", fill)
+        parts[f"include/{package}/{package}.h"] = source.header
+        parts[f"src/{package}.c"] = source.source
+        for place, text in parts.items():
+            (root / place).parent.mkdir(parents=True, exist_ok=True)
+            (root / place).write_text(text)
+        put_folder(root, folder)
+
+
+def _words(package: str, form: ClosedForm, described: Description, kind: Messages) -> dict[str, str]:
+    received, sent = _MESSAGES[kind]
+    used = sorted({each.split("/")[0] for each in (received, sent)})
+    millimetres = bool(described.units) and all(described.units.get(column) == "mm" for column in described.states)
+    joints = ", ".join(map(json.dumps, described.states))
+    return {
+        "name": package,
+        "NAME": package.upper(),
+        "version": own_version(),
+        "distributions": ", ".join(DISTRIBUTIONS),
+        "depends": "\n".join(f"  <depend>{each}</depend>" for each in used),
+        "find": "\n".join(f"find_package({each} REQUIRED)" for each in used),
+        "targets": " ".join(f"${{{each}_TARGETS}}" for each in used),
+        "own": f"joints: [{joints}]" if kind == "joints" else "frame: base_link",
+        "joints": joints,
+        "state_message": received,
+        "command_message": sent,
+        "about": "\n".join(f"- {line}" for line in described.comment()),
+        "n": str(form.columns),
+        "d": str(form.sizes[1]),
+        "scale": "1000.0" if millimetres else "1.0",
+    }
+
+
+def _are_coordinates(described: Description) -> bool:
+    """Whether the states are called after three coordinates."""
+    return [name[-1:].lower() for name in described.states] == ["x", "y", "z"]
+
+
+def _check(form: ClosedForm, kind: Messages) -> None:
+    n, d, _ = form.columns, *form.sizes[1:]
+    if any(isinstance(factor, spaces.Sphere) for factor in form.embedding.space.factors):
+        raise SettingError("ros2: states hold an orientation; the node takes joints, or the position of a pose.")
+    if kind == "pose" and (n, d) != (3, 3):
+        raise SettingError(f"ros2: got {n} states and {d} actions, expected three of each for the position of a pose.")

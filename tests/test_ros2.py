@@ -1,0 +1,174 @@
+"""The exported ROS 2 package, built and driven at the level of messages, without ROS."""
+
+import subprocess
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import unconstrain as uc
+from samples import draw
+from unconstrain.base.errors import SettingError
+
+MOCK = Path(__file__).parent / "ros2"
+STRICT = ["-O2", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"]
+REAL_TIME = ["rate=1e9", "timeout=0.01"]
+
+
+def learnt(n, columns=None):
+    data = draw(samples=300, policy=lambda x: np.sin(x @ np.eye(n)[::-1]) + 0.1 * x, dimensions=n)
+    centres = np.random.default_rng(1).uniform(-1, 1, (50, n))
+    policy = uc.LocallyLinearPolicy(0.5 * n / 3, centres=centres, learner=uc.Direct()).fit(data.states, data.actions)
+    return policy, data.states, {"recipe": {"states": columns or [f"q{i}" for i in range(n)]}}
+
+
+def node_of(policy, notes, folder, **settings):
+    """The node as a program that is driven by lines."""
+    policy.export_ros2(folder / "wiping", notes=notes, **settings)
+    include = [f"-I{folder}/wiping/include", f"-I{folder}/wiping/include/wiping", f"-I{MOCK}"]
+    subprocess.run(["gcc", "-std=c99", *STRICT, "-c", "wiping/src/wiping.c", "-o", "p.o"], cwd=folder, check=True)
+    pose = ["-DPOSE"] if "pose_stamped" in (folder / "wiping/include/wiping/messages.hpp").read_text() else []
+    sources = ["wiping/src/wiping_node.cpp", f"{MOCK}/drive.cpp", "p.o"]
+    command = ["g++", "-std=c++17", *STRICT, *pose, *include, *sources, "-lm", "-o", "node"]
+    subprocess.run(command, cwd=folder, check=True)
+
+    def drive(*lines, parameters=()):
+        text = "".join(f"{line}\n" for line in lines)
+        done = subprocess.run([folder / "node", *parameters], input=text, capture_output=True, text=True, check=True)
+        topics, *answers = done.stdout.splitlines()
+        return topics, answers, done.stderr
+
+    return drive
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    policy, states, notes = learnt(7)
+    return policy, states, node_of(policy, notes, tmp_path_factory.mktemp("arm"))
+
+
+def state(x):
+    return "state " + " ".join(repr(float(value)) for value in x)
+
+
+NAMES = "names " + " ".join(f"q{i}" for i in range(7))
+
+
+def numbers(line):
+    return np.array(line.split(), float)
+
+
+def test_the_node_commands_what_the_policy_says_whatever_the_order_of_the_joints(arm):
+    policy, states, drive = arm
+    near = states[policy.support(states) > 0.05][:5]
+    turned = [6, 0, 3, 2, 1, 5, 4]
+    lines = ["names other " + " ".join(f"q{i}" for i in turned)]
+    lines += ["state 99 " + state(x[turned]).removeprefix("state ") for x in near]
+    topics, answers, said = drive(*lines, parameters=[*REAL_TIME, "velocity_limit=1e3", "command_topic=/arm/commands"])
+    assert topics == "~/state /arm/commands"
+    assert_allclose([numbers(line) for line in answers], policy(near), atol=1e-12)
+    assert said == ""
+
+
+def test_the_node_shortens_what_is_too_fast(arm):
+    policy, states, drive = arm
+    x = states[policy.support(states) > 0.05][0]
+    wanted = policy(x[None])[0]
+    _, [line], _ = drive(NAMES, state(x), parameters=[*REAL_TIME, "velocity_limit=0.05"])
+    assert_allclose(numbers(line), 0.05 * wanted / np.linalg.norm(wanted), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ([NAMES, state(np.full(7, 30.0))], "far from all data"),
+        ([NAMES, "state nan 0 0 0 0 0 0"], "far from all data"),
+        ([NAMES.replace("q3", "elbow"), state(np.zeros(7))], "not of this policy"),
+        ([NAMES, "state 0 0 0"], "not of this policy"),
+    ],
+)
+def test_the_node_stops_where_it_cannot_know(arm, lines, said):
+    _, [line], errors = arm[2](*lines, parameters=REAL_TIME)
+    assert_array_equal(numbers(line), 0.0)
+    assert said in errors
+
+
+def test_the_node_stops_once_when_no_state_comes(arm):
+    policy, states, drive = arm
+    x = states[policy.support(states) > 0.05][0]
+    _, [moving, rest, nothing], said = drive(NAMES, state(x), "silence", "silence", parameters=REAL_TIME)
+    assert numbers(moving).any()
+    assert_array_equal(numbers(rest), 0.0)
+    assert nothing == "none"
+    assert said.count("no state has come") == 1
+
+
+def test_the_node_keeps_its_rate(arm):
+    policy, states, drive = arm
+    x = states[policy.support(states) > 0.05][0]
+    _, answers, _ = drive(NAMES, state(x), state(x), parameters=["rate=5"])
+    assert answers[1] == "none" != answers[0]
+
+
+def test_a_command_takes_less_than_fifty_microseconds(arm):
+    policy, states, drive = arm
+    x = states[policy.support(states) > 0.05][0]
+    _, [_, nanoseconds], _ = drive(NAMES, state(x), "time 2001", parameters=REAL_TIME)
+    assert float(nanoseconds) < 50e3
+
+
+def test_a_pose_is_taken_in_its_frame_and_in_metres(tmp_path):
+    policy, states, notes = learnt(3, ["tool_x", "tool_y", "tool_z"])
+    drive = node_of(policy, notes, tmp_path)
+    near = states[policy.support(states) > 0.05][:3]
+    lines = ["frame map", state(near[0] / 1000), "frame base_link", *(state(x / 1000) for x in near)]
+    _, [elsewhere, *answers], said = drive(*lines, parameters=[*REAL_TIME, "scale=1000", "velocity_limit=1"])
+    assert elsewhere.split() == ["0", "0", "0", "base_link"]
+    assert "not of this policy" in said
+    assert_allclose([numbers(line.removesuffix("base_link")) for line in answers], policy(near) / 1000, atol=1e-14)
+
+
+def test_the_package_says_what_it_needs(tmp_path):
+    policy, _, notes = learnt(3, ["x", "y", "z"])
+    policy.export_ros2(tmp_path / "My-Wiping", notes=notes | {"units": dict.fromkeys("xyz", "mm")})
+    root = tmp_path / "My-Wiping"
+    package = ET.parse(root / "package.xml").getroot()
+    assert package.findtext("name") == "my_wiping"
+    assert {each.text for each in package.findall("depend")} == {"rclcpp", "geometry_msgs"}
+    assert "find_package(geometry_msgs REQUIRED)" in (root / "CMakeLists.txt").read_text()
+    assert "scale: 1000.0" in (root / "config" / "my_wiping.yaml").read_text()
+    assert "states: x (mm), y (mm), z (mm)" in (root / "README.md").read_text()
+    for file in ("launch/my_wiping.launch.py", "scripts/my_wiping_loop.py"):
+        compile((root / file).read_text(), file, "exec")
+    assert "@" not in (root / "src" / "my_wiping_node.cpp").read_text()
+
+
+def test_the_loop_in_python_commands_the_same_and_rests_at_the_end(tmp_path):
+    policy, states, notes = learnt(3, ["x", "y", "z"])
+    policy.export_ros2(tmp_path / "wiping", notes=notes)
+    spec = spec_from_file_location("wiping_loop", tmp_path / "wiping" / "scripts" / "wiping_loop.py")
+    loop = module_from_spec(spec)
+    spec.loader.exec_module(loop)
+    loop.RATE, loop.VELOCITY_LIMIT = 1e4, 0.5
+    near = states[policy.support(states) > 0.05][:4]
+    at, commanded = iter([*near, np.full(3, 50.0)]), []
+    left = iter(range(5, -1, -1))
+    loop.run(policy, lambda: next(at), commanded.append, running=lambda: next(left) > 0)
+    wanted = policy(near)
+    share = np.minimum(1.0, 0.5 / np.linalg.norm(wanted, axis=1, keepdims=True))
+    assert_allclose(commanded, [*(wanted * share), np.zeros(3), np.zeros(3)], atol=1e-12)
+    with pytest.raises(NotImplementedError, match="how the state of your robot is read"):
+        loop.read()
+
+
+def test_an_orientation_is_refused(tmp_path):
+    data = draw(samples=60, policy=lambda x: x, dimensions=4)
+    unit = data.states / np.linalg.norm(data.states, axis=1, keepdims=True)
+    turning = uc.ParametricPolicy(uc.Affine(), "direct", space=uc.spaces.Sphere())
+    turning.fit(unit, data.actions[:, :3])
+    with pytest.raises(SettingError, match="states hold an orientation"):
+        turning.export_ros2(tmp_path / "turning")
+    assert not list(tmp_path.iterdir())
