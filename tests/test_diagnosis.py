@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 import unconstrain as uc
+from seen import opened
 from test_cli import call, refused, run, write
-from test_report import References, opened
+from test_report import References
 from unconstrain.base.errors import InvalidDataError, SettingError
 from unconstrain.evaluation.diagnosis import Diagnosis, diagnose, sentences
 from unconstrain.pages import diagnosis, fit

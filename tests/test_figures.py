@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import re
 import sys
 
+import matplotlib.colors
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from seen import contrast
 from unconstrain.base.errors import MissingExtraError
 from unconstrain.pages import figures
 from unconstrain.pages.figures.planes import arrow_lines, broken, clipped
-from unconstrain.pages.figures.style import DASHES, MARKERS
+from unconstrain.pages.figures.style import INK, MARKERS, RULE, described, power, readable, svg
 from unconstrain.paper.figures import charts, overview, plates
 from unconstrain.recordings.demonstration import Demonstration
 
@@ -19,8 +24,8 @@ NORMALS = [np.array(normal, float) for normal in ([0, 0, 1], [0, 0.3, 1], [1, 0,
 
 
 class TestMethods:
-    def test_each_has_a_colour_a_marker_and_a_dash_of_its_own(self):
-        for looks in (figures.COLOURS, MARKERS, DASHES):
+    def test_each_has_a_colour_and_a_marker_of_its_own(self):
+        for looks in (figures.COLOURS, MARKERS):
             assert len({looks[method] for method in figures.METHODS}) == len(figures.METHODS)
 
     def test_methods_are_told_apart_without_colour(self):
@@ -92,68 +97,124 @@ class TestPlates:
         assert np.isfinite(plate.corners).all()
 
 
+def lines(made, key, axes=0):
+    """Points (N, 2) of each line of a key."""
+    return [np.column_stack(one.get_data()) for one in made.axes[axes].lines if one.get_gid() == f"key:{key}"]
+
+
 class TestCharts:
     def test_a_vector_field_has_equal_axes(self):
         made = figures.vector_field(np.zeros((4, 2)), {"truth": np.ones((4, 2))}, longest=1.0, scale=1.0)
-        assert made.layout.yaxis.scaleanchor == "x"
+        assert made.axes[0].get_aspect() == 1.0
 
     def test_the_truth_is_drawn_last(self):
         fields = {key: np.ones((4, 2)) for key in ("truth", *figures.METHODS)}
         made = figures.vector_field(np.zeros((4, 2)), fields, longest=1.0, scale=1.0)
-        assert made.data[-1].legendgroup == "truth"
+        assert made.axes[0].lines[-1].get_gid() == "key:truth"
 
     def test_axes_say_what_they_show(self):
         x, ones = np.arange(3.0), np.ones(3)
         curves = dict.fromkeys(figures.METHODS, (ones, ones))
-        made = charts.bands(x, curves, title="nUPE", labels=("angle (rad)", "nUPE"))
-        assert (made.layout.xaxis.title.text, made.layout.yaxis.title.text) == ("angle (rad)", "nUPE")
+        [axes] = charts.bands(x, curves, title="nUPE", labels=("angle (rad)", "nUPE")).axes
+        assert (axes.get_xlabel(), axes.get_ylabel()) == ("angle (rad)", "nUPE")
 
     def test_bands_never_go_below_zero(self):
         x, ones = np.arange(3.0), np.ones(3)
         for log in (False, True):
-            made = charts.bands(x, {"direct": (ones, 2 * ones)}, title="", labels=("", ""), log=log)
-            assert min(made.data[0].y) >= 0.5 * log
+            [axes] = charts.bands(x, {"direct": (ones, 2 * ones)}, title="", labels=("", ""), log=log).axes
+            [band] = axes.collections
+            assert band.get_paths()[0].vertices[:, 1].min() >= 0.5 * log
 
     def test_spectra_begin_at_one_and_descend(self):
         eigenvalues = np.sort(rng.random((4, 9)), axis=1)
-        for trace in figures.spectra(eigenvalues).data:
-            assert trace.y[0] == 1.0
-            assert (np.diff(trace.y) <= 0).all()
+        made = figures.spectra(eigenvalues)
+        for line in (*lines(made, "each field"), *lines(made, "median")):
+            assert line[0, 1] == 1.0
+            assert (np.diff(line[:, 1]) <= 0).all()
 
     def test_spectra_of_nothing_are_finite(self):
-        assert np.isfinite(figures.spectra(np.zeros((2, 5))).data[0].y).all()
+        assert np.isfinite(lines(figures.spectra(np.zeros((2, 5))), "median")).all()
 
     def test_scores_that_overflowed_are_left_out(self):
         scores = np.array([[np.inf, 2.0, 1.0], [np.nan, np.inf, np.nan]])
-        made = figures.step_scores(scores, np.array([2, 0]))
-        assert len(made.data) == 2
-        np.testing.assert_array_equal(made.data[0].y, [np.nan, 2.0, 1.0])
-        assert list(made.data[1].x) == [2]
+        curve, chosen = figures.step_scores(scores, np.array([2, 0])).axes[0].lines
+        np.testing.assert_array_equal(curve.get_ydata(), [np.nan, 2.0, 1.0])
+        assert list(np.atleast_1d(chosen.get_xdata())) == [2]
 
     def test_time_series_have_a_row_for_each_component(self):
-        made = figures.over_time(np.arange(5.0), {"observed": rng.random((5, 3))}, ["vx", "vy", "vz"])
-        assert [trace.yaxis for trace in made.data] == ["y", "y2", "y3"]
-        assert made.layout.xaxis3.title.text == "time (s)"
+        values = rng.random((5, 3))
+        made = figures.over_time(np.arange(5.0), {"observed": values}, ["vx", "vy", "vz"])
+        assert [axes.get_ylabel() for axes in made.axes] == ["vx", "vy", "vz"]
+        assert [axes.get_xlabel() for axes in made.axes] == ["", "", "time (s)"]
+        for row in range(3):
+            np.testing.assert_array_equal(lines(made, "observed", row)[0][:, 1], values[:, row])
+
+    def test_movements_in_space_are_to_scale(self):
+        states = rng.uniform(size=(30, 3)) * [4.0, 2.0, 1.5]
+        [axes] = figures.movements([("training", states)]).axes
+        spans = np.array([np.ptp(getattr(axes, f"get_{name}lim")()) for name in "xyz"])
+        np.testing.assert_allclose(spans / spans.max(), axes._box_aspect / axes._box_aspect.max())
+
+
+class TestAsText:
+    """A picture as it stands in a page."""
+
+    def drawn(self, label="angle (rad)"):
+        curves = dict.fromkeys(figures.METHODS, (np.arange(1.0, 4.0), np.ones(3)))
+        made = charts.bands(np.arange(3.0), curves, title="nUPE", labels=(label, "error"))
+        return made, svg(made, 400, described(made))
+
+    def test_its_keys_can_be_found(self):
+        assert set(re.findall(r'data-key="([^"]*)"', self.drawn()[1])) == set(figures.METHODS)
+
+    def test_what_the_page_decides_is_left_to_it(self):
+        text = self.drawn()[1]
+        assert "var(--ink)" in text
+        assert INK not in text
+        assert RULE not in text
+
+    def test_names_are_text_and_never_markup_or_mathematics(self):
+        text = self.drawn("<b>$x_1$</b> & co")[1]
+        assert text.count("&lt;b&gt;$x_1$&lt;/b&gt; &amp; co") == 2  # the axis and the words for it
+        assert "<b>" not in text
+
+    def test_it_says_in_words_what_it_shows(self):
+        said = "nUPE: error over angle (rad); direct from 1 to 3, inconsistency from 1 to 3, hybrid from 1 to 3."
+        assert described(self.drawn()[0]) == said
+        assert f'role="img" aria-label="{said}"' in self.drawn()[1]
+
+    def test_the_same_picture_is_the_same_text(self):
+        assert self.drawn()[1] == self.drawn()[1]
+
+    @pytest.mark.parametrize(("value", "text"), [(0.001, "0.001"), (20.0, "20"), (1e-6, "10⁻⁶"), (1e4, "10⁴")])
+    def test_powers_are_read_without_mathematics(self, value, text):
+        assert power(value) == text
+
+    @given(st.tuples(*[st.floats(0.0, 1.0)] * 3))
+    def test_text_on_any_colour_can_be_read(self, colour):
+        assert contrast(matplotlib.colors.to_rgb(readable(colour)), colour) >= 4.5
 
 
 class TestMapOfWhatIsKnown:
     points, values = rng.normal(size=(30, 2)), rng.uniform(0, 0.5, 30)
 
     def test_what_is_known_least_lies_on_top(self):
-        made = figures.known_map(self.points, self.values, self.points[:3], labels=("x", "y"), scale="spread")
-        drawn = np.array(made.data[0].marker.color)
-        np.testing.assert_allclose(drawn, np.sort(self.values))
-        assert made.data[0].marker.cmax == self.values.max()
-        assert list(made.data[-1].text) == ["1", "2", "3"]
+        axes, bar = figures.known_map(self.points, self.values, self.points[:3], labels=("x", "y"), scale="spread").axes
+        [drawn] = axes.collections
+        np.testing.assert_allclose(drawn.get_array(), np.sort(self.values))
+        assert drawn.get_clim() == (0.0, self.values.max())
+        assert [text.get_text() for text in axes.texts] == ["1", "2", "3"]
+        assert bar.get_ylabel() == "spread"
 
     def test_colours_do_not_end_before_the_top_that_is_asked_for(self):
         made = figures.known_map(self.points, self.values, self.points[:1], labels=("x", "y"), scale="", top=2.0)
-        assert made.data[0].marker.cmax == 2.0
+        assert made.axes[0].collections[0].get_clim() == (0.0, 2.0)
 
     def test_directions_go_through_the_marked_points(self):
         marked, ways = self.points[:4], rng.normal(size=(4, 2))
         made = figures.known_map(self.points, self.values, marked, labels=("x", "y"), scale="", directions=ways)
-        ends = np.column_stack([made.data[1].x, made.data[1].y]).reshape(4, 3, 2)
+        [ends] = lines(made, "to leave free")
+        ends = ends.reshape(4, 3, 2)
         np.testing.assert_allclose(ends[:, :2].mean(axis=1), marked)
         drawn = ends[:, 1] - ends[:, 0]
         np.testing.assert_allclose(drawn[:, 0] * ways[:, 1], drawn[:, 1] * ways[:, 0], atol=1e-12)
@@ -162,9 +223,10 @@ class TestMapOfWhatIsKnown:
 class TestRatioTable:
     def test_cells_say_their_number_and_are_coloured_by_its_logarithm(self):
         values = np.array([[1.0, 0.01, np.nan], [1584.3, 3.98e6, 20.0]])
-        cells = charts.ratio_table(["a", "b"], ["x", "y", "z"], values, top=10.0).data[0]
-        assert [list(row) for row in cells.text] == [["1", "0.01", ""], ["1584", "4e6", "20"]]
-        np.testing.assert_allclose(cells.z, [[0, -1, np.nan], [1, 1, 1]])
+        axes = charts.ratio_table(["a", "b"], ["x", "y", "z"], values, top=10.0).axes[0]
+        assert [text.get_text() for text in axes.texts] == ["1", "0.01", "", "1584", "4e6", "20"]
+        found = np.ma.filled(axes.collections[0].get_array(), np.nan).reshape(2, 3)
+        np.testing.assert_allclose(found, [[0, -1, np.nan], [1, 1, 1]])
 
 
 class TestOverview:
@@ -181,7 +243,7 @@ class TestOverview:
             overview.overview(tmp_path / "a.png", [], np.tanh, {})
 
 
-def test_without_plotly_pictures_say_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
-    with pytest.raises(MissingExtraError, match=r"'plotly', which is not installed.*unconstrain\[viz\]"):
+def test_without_matplotlib_pictures_say_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.style", None)
+    with pytest.raises(MissingExtraError, match=r"'matplotlib', which is not installed.*unconstrain\[viz\]"):
         figures.bars(["a"], {"direct": [1.0]}, title="", label="")

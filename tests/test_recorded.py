@@ -8,7 +8,8 @@ import pytest
 
 import unconstrain as uc
 from recorded import DATA
-from test_report import References, opened
+from seen import opened
+from test_report import References
 from unconstrain.base.errors import ReadError, SettingError
 from unconstrain.pages import html
 from unconstrain.paper import commands

@@ -8,7 +8,8 @@ import pytest
 from scipy.stats import mannwhitneyu
 
 import unconstrain as uc
-from test_report import References, opened
+from seen import opened
+from test_report import References
 from unconstrain.base.errors import SettingError
 from unconstrain.cli.printing import print_table
 from unconstrain.pages import html

@@ -163,10 +163,10 @@ def test_pictures_show_the_arm_moving(wiped):
     assert all(frame.shape == (120, 160, 3) for frame in frames)
     assert np.abs(frames[0].astype(int) - frames[-1]).max() > 60
     moving = Image.open(io.BytesIO(pictures.animation(frames)))
-    assert (moving.format, moving.size, moving.n_frames) == ("GIF", (160, 120), 7)
+    assert (moving.format, moving.size, moving.n_frames) == ("WEBP", (160, 120), 7)
     demo = simulation.demonstrate(wiped.plate, np.random.default_rng(0), strokes=SHORT)
     still = Image.open(io.BytesIO(pictures.strip(demo, wiped, count=2, width=80, height=60)))
-    assert (still.format, still.size) == ("PNG", (160, 120))
+    assert (still.format, still.size) == ("WEBP", (160, 120))
     assert np.asarray(still).std() > 10
 
 

@@ -31,8 +31,22 @@ from .fitting import (
     policy_of,
     scale_of,
 )
+from .informing import info, provenance
 from .looking import look, play
-from .printing import Group, keep_codes, print_table, refuse_warnings, say_fit, say_scale, say_surveys
+from .printing import (
+    Group,
+    judge_fit,
+    keep_codes,
+    option_for_json,
+    print_table,
+    refuse_warnings,
+    say_fit,
+    say_scale,
+    say_surveys,
+    say_verdict,
+    say_written,
+)
+from .progress import shown
 from .reading import fitted_policy, numbers, options_for_reading, reading_of, recipe_of, said_recipe, stream_of
 from .writing import check_outputs, option_for_force
 
@@ -52,12 +66,18 @@ def main() -> None:
     unconstrain diagnose *.csv            noise, and what to record next
     unconstrain fit *.csv -o policy.npz   learn from them
     unconstrain constraint *.csv -o c.npz learn what held them
+    unconstrain info policy.npz           what a file is, and where it comes from
+
+    Completion by the tab key, here for bash (or zsh, fish):
+
+    \b
+    eval "$(_UNCONSTRAIN_COMPLETE=bash_source unconstrain)"
     """  # noqa: D301 - click's mark for lines that stay as they are
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain inspect wipe_*.csv --state x,y,z")
 @options_for_reading
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@option_for_json
 def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     """Describe each FILE: columns, rate, gaps, zero actions."""
     recipe, first = recipe_of(**reading), list[uc.Recording]()
@@ -130,6 +150,8 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
 @click.option("--report", type=click.Path(dir_okay=False), help="Also write an HTML report there.")
 @option_for_force
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on the dask cluster of this scheduler.")
+@click.option("-v", "--verbose", is_flag=True, help="Also print every candidate.")
+@option_for_json
 def fit(
     files: Sequence[str],
     output: str,
@@ -146,6 +168,8 @@ def fit(
     report: str | None,
     force: bool,
     scheduler: str | None,
+    verbose: bool,
+    as_json: bool,
     **reading: Any,
 ) -> None:
     """Learn a policy from the demonstrations in each FILE.
@@ -159,27 +183,37 @@ def fit(
     learner = learner or default_learner(paths, scheduler, alpha, softness, speed_power)
     chosen = {"learner": learner_of(learner, alpha, softness, speed_power), "validation": uc.Folds(folds, hold_out)}
     fitted = policy_of(model, variance, centres, scale=scale, **chosen)
-    stream = stream_of(paths, speed_power, **reading)
-    learn(fitted, stream, scheduler)
-    notes = {"recipe": stream.recipe.to_dict(), **reading_of(**reading).roles}
-    click.echo(f"Learnt from {said_recipe(stream.recipe, stream.first)}.")
-    say_scale(fitted, stream.recipe)
-    say_fit(fitted, stream if scheduler is None else None, learner)
+    with shown("reading, placing, learning") as progress:
+        stream = stream_of(paths, speed_power, progress, **reading)
+        learn(fitted, stream, scheduler)
+    judged = judge_fit(fitted, stream, scheduler is not None)
+    if not as_json:
+        say_verdict(judged.verdict)
+        click.echo(f"Learnt from {said_recipe(stream.recipe, stream.first)}.")
+        say_scale(fitted, stream.recipe)
+        say_fit(fitted, stream, judged, learner, verbose)
     refuse_warnings(reading["strict"])
-    uc.save(fitted, output, notes)
-    click.echo(f"policy: {output}")
-    if report is not None:
-        from ..pages.fit import policy_page
+    uc.save(fitted, output, provenance(paths, stream.recipe, stream.first, **reading))
+    written = {"policy": output} | _reported(fitted, stream, report, Path(output).stem)
+    say_written(written, judged.to_json() if as_json else None)
 
-        write(report, policy_page(fitted, stream.beginning(), Path(output).stem))
-        click.echo(f"report: {report}")
+
+def _reported(policy: uc.Policy, stream: uc.Stream, report: str | None, title: str) -> dict[str, str]:
+    """Write the page of a fit, if there is to be one; what and where."""
+    if report is None:
+        return {}
+    from ..pages.fit import policy_page
+
+    with shown("drawing"):
+        write(report, policy_page(policy, stream.beginning(), title, *stream.recipe.labels(stream.first.units)))
+    return {"report": report}
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain score wipe.npz other.csv --plane 0,0.3,1 --json")
 @click.argument("policy", type=click.Path())
 @click.argument("files", nargs=-1, required=True, metavar="FILE...")
 @options_for_held("that was held, for the errors that need one")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@option_for_json
 def score(
     policy: str, files: Sequence[str], plane: tuple[float, ...] | None, constraint: str | None, as_json: bool
 ) -> None:
@@ -199,11 +233,14 @@ def score(
             return found
         return found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(learnt, of, held)}
 
-    rows = [scores(demo, demo.name, len(demo)) for demo in demonstrations]
-    whole = scores(demonstrations, "all", sum(map(len, demonstrations)))
+    with shown("scoring"):
+        rows = [scores(demo, demo.name, len(demo)) for demo in demonstrations]
+        whole = scores(demonstrations, "all", sum(map(len, demonstrations)))
+    verdict = uc.evaluation.verdicts.of_score(1.0 - whole["ninc"], len(demonstrations))
     if as_json:
-        click.echo(json.dumps({"policy": policy, "rows": rows, "all": whole}, indent=2))
+        click.echo(json.dumps({"policy": policy, "rows": rows, "all": whole, "verdict": verdict.to_json()}, indent=2))
         return
+    say_verdict(verdict)
     rows.append(whole)
     head = ["demonstration", "samples", "normalised inconsistency", *([] if held is None else ["nPOE", "nCPE"])]
     print_table(head, [[str(v) if not isinstance(v, float) else f"{v:.4g}" for v in one.values()] for one in rows])
@@ -224,6 +261,7 @@ def score(
     help="CSV file; - prints.",
 )
 @option_for_force
+@option_for_json
 def rollout(
     policy: str,
     start: tuple[float, ...],
@@ -233,6 +271,7 @@ def rollout(
     constraint: str | None,
     output: str,
     force: bool,
+    as_json: bool,
 ) -> None:
     """Roll POLICY out, freely or under a constraint, to a CSV."""
     check_outputs(() if output == "-" else (output,), (policy, constraint), force)
@@ -242,19 +281,19 @@ def rollout(
     held = held_of(plane, constraint, len(start), learnt.n_outputs_, "one for each action")
     task = held.target if isinstance(held, uc.LearntConstraint) and held.task else None
     path = uc.rollout(learnt, list(start), steps, dt, held, task=task)
-    columns = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))
-    try:
-        support = learnt.support(path.states)
-    except SettingError:  # an affine or polynomial policy has no support
-        support = None
-    table = _csv(["t", *(columns.states or ()), *columns.directions], path)
-    if output == "-":
-        click.echo(table, nl=False)
-    else:
-        write(output, table)
-    if support is not None and support.min() < 1e-3:
-        since = dt * int((support < 1e-3).argmax())
-        click.echo(f"Note: from {since:.2f} s on the movement is far from all data.", err=True)
+    named = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))
+    verdict = _supported(learnt, path)
+    columns = ["t", *(named.states or ()), *named.directions]
+    if output != "-":
+        write(output, _csv(columns, path))
+    elif not as_json:
+        click.echo(_csv(columns, path), nl=False)
+    if as_json:
+        rows = None if output != "-" else _rows(path).tolist()
+        told = None if verdict is None else verdict.to_json()
+        click.echo(json.dumps({"columns": columns, "rows": rows, "output": output, "verdict": told}))
+    elif verdict is not None and (output != "-" or verdict.doubt):
+        say_verdict(verdict, err=output == "-")
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain reproduce table1 --trials 100 --out results")
@@ -276,6 +315,7 @@ def rollout(
     show_default=True,
     help="Folder for NAME.json and NAME.html.",
 )
+@option_for_json
 def reproduce(experiment: str, out: str, **settings: Any) -> None:
     """Run one of the paper's experiments, beside its printed values.
 
@@ -283,7 +323,7 @@ def reproduce(experiment: str, out: str, **settings: Any) -> None:
     """
     from ..paper import commands
 
-    commands.reproduce(experiment, out, print_table, **settings)
+    commands.reproduce(experiment, out, print_table, shown, **settings)
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain demo --real --download --out wiping")
@@ -294,6 +334,7 @@ def reproduce(experiment: str, out: str, **settings: Any) -> None:
 @click.option(
     "--out", type=click.Path(file_okay=False), default="demo", show_default=True, help="Folder for the report."
 )
+@option_for_json
 def demo(out: str, **settings: Any) -> None:
     """Wash a car: learn on some surfaces, test on others.
 
@@ -301,11 +342,11 @@ def demo(out: str, **settings: Any) -> None:
     """
     from ..paper import commands
 
-    commands.demo(out, print_table, **settings)
+    commands.demo(out, print_table, shown, **settings)
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain doctor")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@option_for_json
 def doctor(as_json: bool) -> None:
     """List what is installed, what is missing, and how to install it."""
     from .doctor import examine
@@ -314,25 +355,43 @@ def doctor(as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps([one.to_json() for one in found], indent=2))
         return
-    print_table(["what", "for", "found", "fix"], [list(one) for one in found])
-    missing = sum(bool(one.fix) for one in found)
-    click.echo("Everything is there." if not missing else f"{missing} of {len(found)} are missing something.")
+    missing = [one for one in found if one.fix]
+    sign = "! " if missing else "✔ "
+    said = f"{len(missing)} of {len(found)} are missing something." if missing else "Everything is there."
+    click.echo(f"{sign}{said}\n")
+    print_table(["what", "for", "found"], [[one.what, one.serves, one.found] for one in found])
+    if missing:
+        click.echo("\nTo install what is missing, paste:")
+    for command in dict.fromkeys(one.fix for one in missing):
+        click.echo(f"  {command}")
 
 
 main.add_command(constraint)
 main.add_command(convert)
 main.add_command(diagnose)
 main.add_command(export)
+main.add_command(info)
 main.add_command(look)
 main.add_command(play)
 
 
-def _csv(header: Sequence[str], path: uc.Demonstration) -> str:
-    import numpy as np
+def _supported(policy: uc.Policy, path: uc.Demonstration) -> uc.evaluation.verdicts.Verdict | None:
+    """How near data is along a movement; None of an affine or polynomial policy, which has no support."""
+    try:
+        return uc.evaluation.verdicts.of_support(policy.support(path.states), path.times)
+    except SettingError:
+        return None
 
+
+def _csv(header: Sequence[str], path: uc.Demonstration) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(header)
-    rows = np.column_stack([*([] if path.times is None else [path.times]), path.states, path.actions])
-    writer.writerows([f"{value:.9g}" for value in row] for row in rows)
+    writer.writerows([f"{value:.9g}" for value in row] for row in _rows(path))
     return text.getvalue()
+
+
+def _rows(path: uc.Demonstration) -> Any:
+    import numpy as np
+
+    return np.column_stack([*([] if path.times is None else [path.times]), path.states, path.actions])

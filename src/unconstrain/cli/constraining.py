@@ -12,8 +12,10 @@ import unconstrain as uc
 
 from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
-from .printing import print_table, refuse_warnings
-from .reading import numbers, options_for_reading, reading_of, recipe_of, said_recipe
+from .informing import provenance
+from .printing import option_for_json, print_table, refuse_warnings, say_verdict, say_written
+from .progress import shown
+from .reading import numbers, options_for_reading, prepared, said_recipe
 from .writing import check_outputs, option_for_force
 
 MOST_POSITIONS = 4000
@@ -32,6 +34,7 @@ FEATURES = ("auto", "constant", "affine", "quadratic", "rbf")
 @click.option("--surface", is_flag=True, help="Learn from the positions alone: they lie on a surface.")
 @click.option("--report", type=click.Path(dir_okay=False), help="Also write an HTML page there.")
 @option_for_force
+@option_for_json
 def constraint(
     files: Sequence[str],
     output: str,
@@ -42,6 +45,7 @@ def constraint(
     surface: bool,
     report: str | None,
     force: bool,
+    as_json: bool,
     **reading: Any,
 ) -> None:
     """Learn what held the demonstrations in each FILE.
@@ -50,31 +54,53 @@ def constraint(
     """
     paths = uc.readers.expand(files)
     check_outputs((output, report), (*paths, jacobian), force)
+    _check_asked(jacobian, tip, surface, with_task)
+    with shown("reading, learning"):
+        demonstrations, recipe, first = prepared(paths, reading)
+        states, actions, groups = uc.stack(demonstrations)
+        arm = None if jacobian is None else _arm(jacobian, tip).jacobian
+        learnt = uc.LearntConstraint(features, arm, task=with_task)
+        learnt.fit(states, None if surface else actions, groups=groups)
+    refuse_warnings(reading["strict"])
+    if recipe.angles:
+        click.echo(f"Note: {', '.join(recipe.angles)} as unwrapped: a turn more is another state to it.", err=True)
+    verdict = uc.evaluation.verdicts.of_constraint(learnt)
+    if not as_json:
+        say_verdict(verdict)
+        click.echo(f"Learnt from {said_recipe(recipe, first)}.")
+        _say(learnt, "distance from it" if surface else "action")
+    named = mechanism_of(states, groups) if jacobian is None and _are_positions(recipe) else None
+    if named is not None and not as_json:
+        click.echo(f"Mechanism, if these are positions in m: {named}.")
+    uc.save(learnt, output, provenance(paths, recipe, first, **reading))
+    if report is not None:
+        from ..pages.constraint import constraint_page
+
+        names = recipe.labels(first.units)[0]
+        write(report, constraint_page(learnt, demonstrations, Path(report).stem, names, named))
+    written = {"constraint": output} | ({} if report is None else {"report": report})
+    say_written(written, _told(learnt, verdict, named) if as_json else None)
+
+
+def _check_asked(jacobian: str | None, tip: str | None, surface: bool, with_task: bool) -> None:
     if (jacobian is None) != (tip is None):
         raise SettingError("--jacobian and --tip belong together: a URDF file, and the link that is held.")
     if surface and (with_task or jacobian is not None):
         raise SettingError("--surface: got --with-task or --jacobian too; positions alone show neither.")
-    every = uc.read(paths, **reading_of(**reading).arguments)
-    recordings = [one for one in every if one.name not in reading["leave_out"]]
-    asked = recipe_of(**reading)
-    demonstrations = uc.prepare(recordings, asked)
-    recipe, _ = uc.preparation.decide(asked, recordings[0])
-    states, actions, groups = uc.stack(demonstrations)
-    learnt = uc.LearntConstraint(features, None if jacobian is None else _arm(jacobian, tip).jacobian, task=with_task)
-    learnt.fit(states, None if surface else actions, groups=groups)
-    refuse_warnings(reading["strict"])
-    if recipe.angles:
-        click.echo(f"Note: {', '.join(recipe.angles)} as unwrapped: a turn more is another state to it.", err=True)
-    click.echo(f"Learnt from {said_recipe(recipe, recordings[0])}.")
-    _say(learnt, "distance from it" if surface else "action")
-    named = mechanism_of(states, groups) if jacobian is None and _are_positions(recipe) else None
-    uc.save(learnt, output, {"recipe": recipe.to_dict(), **reading_of(**reading).roles})
-    click.echo(f"constraint: {output}")
-    if report is not None:
-        from ..pages.constraint import constraint_page
 
-        write(report, constraint_page(learnt, demonstrations, Path(report).stem, recipe.states, named))
-        click.echo(f"report: {report}")
+
+def _told(learnt: uc.LearntConstraint, verdict: uc.evaluation.verdicts.Verdict, named: str | None) -> dict[str, Any]:
+    choice = learnt.choice_
+    return {
+        "rank": learnt.rank_,
+        "noise": learnt.noise_,
+        "held_out": choice.held_out,
+        "features": choice.name,
+        "candidates": dict(choice.candidates),
+        "doubts": list(choice.doubts),
+        "mechanism": named,
+        "verdict": verdict.to_json(),
+    }
 
 
 def options_for_held(what: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -118,14 +144,13 @@ def _arms() -> Any:
 
 
 def mechanism_of(positions: Any, groups: Any) -> str | None:
-    """Say which mechanism may have held positions; None where too little was recorded."""
+    """Which mechanism may have held positions, in words; None where too little was recorded."""
     every = -(-len(positions) // MOST_POSITIONS)
     try:
         found = uc.constraints.identify(positions[::every], groups=groups[::every])
     except InvalidDataError as error:
         click.echo(f"Note: no mechanism is named: {error}", err=True)
         return None
-    click.echo(f"Mechanism, if these are positions in m: {found.sentence}.")
     return found.sentence
 
 

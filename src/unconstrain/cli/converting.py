@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -10,6 +11,7 @@ import click
 
 import unconstrain as uc
 
+from .printing import option_for_json
 from .reading import options_for_reading, reading_of, recipe_of
 from .writing import check_outputs, option_for_force
 
@@ -19,7 +21,8 @@ from .writing import check_outputs, option_for_force
 @click.argument("output", type=click.Path())
 @click.option("--align", is_flag=True, help="Bring all recordings onto one clock, beside each other.")
 @option_for_force
-def convert(files: Sequence[str], output: str, align: bool, force: bool, **options: Any) -> None:
+@option_for_json
+def convert(files: Sequence[str], output: str, align: bool, force: bool, as_json: bool, **options: Any) -> None:
     """Write the recordings in each FILE to OUTPUT: .csv, .parquet, .mcap, or a folder for LeRobot.
 
     With --state or --action only those columns are written.
@@ -34,7 +37,11 @@ def convert(files: Sequence[str], output: str, align: bool, force: bool, **optio
     kept = (*states, *actions) or recordings[0].columns
     chosen = [replace(each, columns=kept, values=each.select(kept)) for each in recordings]
     uc.writers.write_recordings(chosen, output, states, actions)
-    click.echo(f"{len(chosen)} recordings, {sum(map(len, chosen))} samples: {output}")
+    counts = {"recordings": len(chosen), "samples": sum(map(len, chosen))}
+    if as_json:
+        click.echo(json.dumps({"output": output, **counts}))
+    else:
+        click.echo(f"✔ {counts['recordings']} recordings, {counts['samples']} samples: {output}")
 
 
 def _columns(recording: uc.Recording, options: dict[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -13,8 +13,9 @@ import unconstrain as uc
 
 from ..base.files import write
 from .fitting import options_for_model, policy_of
-from .printing import print_table, refuse_warnings, say
-from .reading import options_for_reading, reading_of, recipe_of, said_recipe
+from .printing import option_for_json, print_table, refuse_warnings, say, say_verdict
+from .progress import shown
+from .reading import options_for_reading, prepared, said_recipe
 from .writing import check_outputs, option_for_force
 
 MOST_ROWS = 8
@@ -25,7 +26,8 @@ MOST_ROWS = 8
 @options_for_model
 @click.option("-o", "--report", type=click.Path(dir_okay=False), help="Also write an HTML page there.")
 @option_for_force
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@click.option("-v", "--verbose", is_flag=True, help="Print all regions.")
+@option_for_json
 def diagnose(
     files: Sequence[str],
     model: str,
@@ -33,6 +35,7 @@ def diagnose(
     centres: int | None,
     report: str | None,
     force: bool,
+    verbose: bool,
     as_json: bool,
     **reading: Any,
 ) -> None:
@@ -42,36 +45,36 @@ def diagnose(
     """
     paths = uc.readers.expand(files)
     check_outputs((report,), paths, force)
-    every = uc.read(paths, **reading_of(**reading).arguments)
-    recordings = [one for one in every if one.name not in reading["leave_out"]]
-    asked = recipe_of(**reading)
-    demonstrations = uc.prepare(recordings, asked)
-    recipe, _ = uc.preparation.decide(asked, recordings[0])
-    policy = policy_of(model, variance, centres, learner=uc.Robust()).fit_demonstrations(demonstrations)
-    found = uc.evaluation.diagnose(policy, demonstrations)
+    with shown("reading, placing, learning"):
+        demonstrations, recipe, first = prepared(paths, reading)
+        policy = policy_of(model, variance, centres, learner=uc.Robust()).fit_demonstrations(demonstrations)
+        found = uc.evaluation.diagnose(policy, demonstrations)
     missed = 1.0 - policy.score(*uc.stack(demonstrations)[:2])
     say(uc.preparation.doubts(len(demonstrations), missed), "diagnose")
     refuse_warnings(reading["strict"])
     states = recipe.states or ()
     actions = recipe.actions or recipe.directions
+    verdict = uc.evaluation.verdicts.of_diagnosis(found)
     if as_json:
-        click.echo(json.dumps(found.to_json() | {"states": states, "actions": actions}, indent=2))
+        named = {"states": states, "actions": actions, "verdict": verdict.to_json()}
+        click.echo(json.dumps(found.to_json() | named, indent=2))
     else:
-        used = said_recipe(recipe, recordings[0])
+        say_verdict(verdict)
+        used = said_recipe(recipe, first)
         click.echo(f"{len(demonstrations)} demonstrations, {len(found.undetermined)} samples; {used}.")
-        _say(found, states, actions)
+        _say(found, states, actions, len(found.regions) if verbose else MOST_ROWS)
     if report is not None:
         from ..pages.diagnosis import diagnosis_page
 
-        write(report, diagnosis_page(found, demonstrations, Path(report).stem, states, actions))
+        write(report, diagnosis_page(found, demonstrations, Path(report).stem, *recipe.labels(first.units)))
         click.echo(f"report: {report}", err=as_json)
 
 
-def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequence[str]) -> None:
+def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequence[str], most: int) -> None:
     named = uc.evaluation.diagnosis.named
     for line in uc.evaluation.diagnosis.sentences(found, states, actions):
         click.echo(line)
-    shown = found.regions[:MOST_ROWS]
+    shown = found.regions[:most]
     click.echo(f"\nThe {len(shown)} regions of largest undetermined spread, of {len(found.regions)}, largest first:")
     head = ["demonstrate around", "in", "samples", "determined", "spread", "leave free"]
     rows = [

@@ -7,7 +7,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import NamedTuple
 
 EXTRAS = {
-    "viz": ("figures and reports", ("plotly", "jinja2", "matplotlib")),
+    "viz": ("figures and reports", ("jinja2", "matplotlib")),
     "data": ("Parquet, HDF5, public recordings", ("pyarrow", "h5py", "pooch")),
     "formats": ("ROS and Excel files", ("rosbags", "python-calamine")),
     "arm": ("arms from URDF files", ("yourdfpy",)),

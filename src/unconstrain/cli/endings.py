@@ -13,6 +13,8 @@ from ..base.errors import UnconstrainError
 REFUSED, FAULT, INTERRUPTED = 2, 1, 130
 """Exit codes: what was asked cannot be done; a fault of this program; as shells say of Ctrl-C."""
 
+_NOTHING = "What is not named above was not written, and nothing is half written."
+
 _PACKAGE = Path(__file__).parents[1]
 
 TRACE = "UNCONSTRAIN_TRACEBACK"
@@ -27,6 +29,10 @@ def ending(error: BaseException) -> tuple[str, int]:
 
 def _of_the_system(error: OSError) -> str:
     return f"{os.fsdecode(error.filename)}: {error.strerror}." if error.filename and error.strerror else str(error)
+
+
+def _interrupted(error: KeyboardInterrupt) -> str:
+    return f"interrupted. {error if error.args else _NOTHING}"
 
 
 def _of_memory(error: MemoryError) -> str:
@@ -50,7 +56,7 @@ def _fault(error: Exception) -> str:
 
 _ENDINGS: tuple[tuple[type[BaseException], Callable[[Any], str], int], ...] = (
     (UnconstrainError, str, REFUSED),
-    (KeyboardInterrupt, lambda _: "interrupted.", INTERRUPTED),
+    (KeyboardInterrupt, _interrupted, INTERRUPTED),
     (MemoryError, _of_memory, REFUSED),
     (RecursionError, lambda _: "something that was read is nested too deeply.", REFUSED),
     (OSError, _of_the_system, REFUSED),

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import errno
+import json
 import sys
 import warnings
 from collections.abc import Iterable, Sequence
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -57,6 +58,7 @@ class Group(click.Group):
 
 def say_surveys(surveys: Sequence[Any]) -> None:
     """Print what was found in recordings: a line for each, their columns, and what is not as it seems."""
+    say_verdict(uc.evaluation.verdicts.of_surveys(surveys))
     rows = [
         [
             found.name,
@@ -84,44 +86,89 @@ def say_surveys(surveys: Sequence[Any]) -> None:
             click.echo(f"'{found.name}': {note.message}")
 
 
-def say_fit(policy: uc.Policy, stream: uc.Stream | None, learner: str) -> None:
-    """Print the solution, the share that the data determined, and the held-out inconsistency.
+option_for_json = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 
-    Without a stream, whatever needs a further pass over the samples is left out.
-    """
-    solution = policy.solution_
-    models = f", {len(solution.weights)} local models" if len(solution.weights) > 1 else ""
-    names, training = 0, 0.0
-    if stream is not None:
-        names, samples, training = _walked(policy, stream)
-        click.echo(f"{names} demonstrations, {samples} samples{models}.")
-    elif models:
-        click.echo(f"{models.removeprefix(', ')}.")
+
+def say_written(places: dict[str, str], told: dict[str, Any] | None) -> None:
+    """Print where files were written, or, with what else is told, all as JSON."""
+    if told is not None:
+        click.echo(json.dumps(told | places, indent=2))
+        return
+    for what, place in places.items():
+        click.echo(f"{what}: {place}")
+
+
+class Judged(NamedTuple):
+    """How much of the motion a policy explains."""
+
+    verdict: uc.evaluation.verdicts.Verdict
+    demonstrations: int
+    samples: int
+    training: float
+    held_out: float
+
+    def to_json(self) -> dict[str, Any]:
+        """With None for what is not known."""
+        plain = self._asdict() | {"verdict": self.verdict.to_json()}
+        return {name: None if value != value else value for name, value in plain.items()}
+
+
+def judge_fit(policy: uc.Policy, stream: uc.Stream, on_cluster: bool) -> Judged:
+    """Walk through the demonstrations once more; on a cluster only the sums are there."""
+    held_out, nan = policy.held_out_score(), float("nan")
+    count, samples, missed = (len(stream.paths), 0, nan) if on_cluster else _walked(policy, stream)
+    belief = policy.solution_.belief
+    told = None if belief is None else policy.solution_.determined_share
+    return Judged(uc.evaluation.verdicts.of_explained(held_out, count, told), count, samples, 1.0 - missed, held_out)
+
+
+def say_fit(policy: uc.Policy, stream: uc.Stream, judged: Judged, learner: str, verbose: bool) -> None:
+    """Print what a policy explains, and what the data determined."""
+    solution, known = policy.solution_, isfinite(judged.training)
+    models = f"{len(solution.weights)} local models" if len(solution.weights) > 1 else ""
+    counts = f"{judged.demonstrations} demonstrations, {judged.samples} samples" if known else ""
+    if counts or models:
+        click.echo(f"{', '.join(filter(None, (counts, models)))}.")
     if getattr(policy, "features", None) == "auto":
         click.echo(f"Features of least estimated error: {policy.training_.model.features}.")
     if solution.belief is not None:
         click.echo(_said_of_samples(solution))
-        _say_suspects(solution.belief.suspects, stream)
+        if known:
+            _say_suspects(solution.belief.suspects, stream)
     elif learner != "direct":
-        rest = "."
-        if learner == "hybrid" and solution.determined_share < 1:
-            rest = "; along the others the policy is as close to the recorded actions as can be."
-        click.echo(
-            f"The inconsistency determined {solution.determined_share:.0%} of {solution.directions} weight directions"
-            + (" of each model" if len(solution.weights) > 1 else "")
-            + rest
-        )
-        if solution.determined_share == 0.0:
-            click.echo("Note: nothing was determined, so this is the same as --learner direct.", err=True)
-    held_out = 1.0 - policy.held_out_score()
+        _say_determined(solution, learner)
     click.echo(
         "share of the observed motion left unexplained (inconsistency): "
-        + ("" if stream is None else f"{training:.4g} on the training data, ")
-        + (f"{held_out:.4g} where held out." if isfinite(held_out) else "nothing could be held out.")
+        + (f"{1.0 - judged.training:.4g} on the training data, " if known else "")
+        + (
+            f"{1.0 - judged.held_out:.4g} where held out."
+            if isfinite(judged.held_out)
+            else "nothing could be held out."
+        )
     )
-    if stream is not None:
-        say(uc.preparation.doubts(names, training), "fit")
-    if stream is not None and held_out > 0.05 + 2.0 * training:
+    if verbose and solution.belief is not None:
+        rows = sorted((one.risk, name) for name, one in solution.candidates.items())
+        print_table(["candidate", "estimated squared error"], [[name, f"{risk:.4g}"] for risk, name in rows])
+    if known:
+        _say_doubts(judged, learner)
+
+
+def _say_determined(solution: uc.Solution, learner: str) -> None:
+    rest = "."
+    if learner == "hybrid" and solution.determined_share < 1:
+        rest = "; along the others the policy is as close to the recorded actions as can be."
+    click.echo(
+        f"The inconsistency determined {solution.determined_share:.0%} of {solution.directions} weight directions"
+        + (" of each model" if len(solution.weights) > 1 else "")
+        + rest
+    )
+    if solution.determined_share == 0.0:
+        click.echo("Note: nothing was determined, so this is the same as --learner direct.", err=True)
+
+
+def _say_doubts(judged: Judged, learner: str) -> None:
+    say(uc.preparation.doubts(judged.demonstrations, 1.0 - judged.training), "fit")
+    if 1.0 - judged.held_out > 0.05 + 2.0 * (1.0 - judged.training):
         faster = "" if learner == "robust" else "--speed-power 2 or "
         click.echo(
             "Note: much of the held-out motion is unexplained. If the noise at low speed is large, try a wider "
@@ -178,6 +225,11 @@ def _walked(policy: uc.Policy, stream: uc.Stream) -> tuple[int, int, float]:
         energy += motion
         unexplained += motion * (1.0 - policy.score(demonstration.states, demonstration.actions))
     return len(names), samples, unexplained / energy if energy > 0 else 1.0
+
+
+def say_verdict(verdict: uc.evaluation.verdicts.Verdict, err: bool = False) -> None:
+    """Print a verdict, and a line below it."""
+    click.echo("\n".join([*verdict.lines(), ""]), err=err)
 
 
 def number(value: Any, form: str) -> str:

@@ -13,6 +13,7 @@ import click
 import unconstrain as uc
 
 from ..base.errors import ModelFileError, SettingError
+from .progress import Progress
 
 
 def names(text: str) -> tuple[str, ...]:
@@ -169,9 +170,25 @@ def reading_of(**options: Any) -> uc.readers.Reading:
     return uc.readers.Reading(**{name: value for name, value in options.items() if name in known})
 
 
-def stream_of(paths: Sequence[str | Path], speed_power: float, **options: Any) -> uc.Stream:
+def stream_of(
+    paths: Sequence[str | Path], speed_power: float, progress: Progress | None = None, **options: Any
+) -> uc.Stream:
     """Files as batches to learn from, as the options say."""
     left_out = options.get("leave_out") or ()
     return uc.Stream(
-        paths, recipe_of(**options), reading=reading_of(**options), speed_power=speed_power, leave_out=left_out
+        paths,
+        recipe_of(**options),
+        reading=reading_of(**options),
+        speed_power=speed_power,
+        leave_out=left_out,
+        progress=progress,
     )
+
+
+def prepared(paths: Sequence[Any], reading: dict[str, Any]) -> tuple[list[uc.Demonstration], uc.Recipe, uc.Recording]:
+    """Demonstrations, the recipe that made them, and the first recording."""
+    every = uc.read(paths, **reading_of(**reading).arguments)
+    recordings = [one for one in every if one.name not in reading["leave_out"]]
+    asked = recipe_of(**reading)
+    demonstrations = uc.prepare(recordings, asked)
+    return demonstrations, uc.preparation.decide(asked, recordings[0])[0], recordings[0]

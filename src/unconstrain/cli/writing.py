@@ -11,6 +11,8 @@ import click
 from ..base.errors import SettingError
 from ..base.files import check
 
+PICKLES = (".pkl", ".pickle", ".joblib")
+
 option_for_force = click.option("--force", is_flag=True, help="Replace what is there.")
 
 
@@ -32,6 +34,8 @@ def check_outputs(outputs: Iterable[str | None], inputs: Iterable[str | Path | N
     read = [Path(path) for path in inputs if path is not None]
     before: list[Path] = []
     for path in (Path(output) for output in outputs if output is not None):
+        if path.suffix.lower() in PICKLES:
+            raise SettingError(f"{path}: nothing here writes pickles, which run code when opened; name it .npz.")
         if any(_overlap(path, other) for other in read):
             raise SettingError(f"{path}: is one of the files to read; give another name to write to.")
         if any(_same(path, other) for other in before):

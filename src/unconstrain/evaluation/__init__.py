@@ -9,7 +9,7 @@ Examples
 True
 """
 
-from . import diagnosis
+from . import diagnosis, verdicts
 from .diagnosis import Diagnosis, diagnose
 from .metrics import cpe, inconsistency, ncpe, ninconsistency, nnpe, npoe, nppe, nupe, upe
 
@@ -27,4 +27,5 @@ __all__ = [
     "nppe",
     "nupe",
     "upe",
+    "verdicts",
 ]

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.arrays import Array
-from ..evaluation import npoe
+from ..evaluation import npoe, verdicts
 from ..recordings import Demonstration, stack
 from . import figures, html
 
@@ -52,7 +51,7 @@ def constraint_page(
     Raises
     ------
     MissingExtraError
-        If plotly or jinja2 is not installed.
+        If matplotlib or jinja2 is not installed.
     """
     choice, demos = learnt.choice_, list(demonstrations)
     tiles = [
@@ -71,11 +70,12 @@ def constraint_page(
     doubts = [html.section("What the data does not tell", html.bullets(choice.doubts))] if choice.doubts else []
     return html.document(
         title,
+        verdicts.of_constraint(learnt),
         html.words("constraint_lead"),
-        html.tiles(tiles),
         *([html.section("The mechanism", html.bullets([mechanism]))] if mechanism else []),
         *parts,
         *doubts,
+        html.section("Numbers", html.tiles(tiles)),
         html.section("How its form was chosen", html.table(["features", "missed"], rows, note=note)),
     )
 
@@ -85,21 +85,19 @@ def held_directions(
 ) -> html.Markup:
     """Held directions through recorded states, over the first two or three columns."""
     states, _, _ = stack(demos)
-    labels = [escape(name) for name in columns or (f"state {column + 1}" for column in range(states.shape[1]))]
+    labels = list(columns or (f"state {column + 1}" for column in range(states.shape[1])))
     few = states[:: -(-len(states) // MOST_NORMALS)]
     shown = min(states.shape[1], 3)
     reach = float(np.ptp(states[:, :shown], axis=0).max()) / 25
     lines = np.concatenate([_strokes(few, reach * learnt(few)[:, row]) for row in range(learnt.rank_)])[:, :shown]
     every = -(-len(states) // MOST_POINTS)
     tracks = [demo.states[::every, :shown] for demo in demos]
-    if shown == 3:
-        named = [("training", escape(demo.name), track) for demo, track in zip(demos, tracks, strict=True)]
-        panel = figures.movements([*named, (_HELD, "held", lines)], labels=(labels[0], labels[1], labels[2]))
-    else:
-        panel = figures.vector_field(
-            few, {}, longest=1.0, scale=1.0, trajectories=tracks, labels=(labels[0], labels[1])
-        )
-        panel.add_trace(figures.line_through(lines, _HELD, width=1.6))
+    drawn = [*(("training", track) for track in tracks), (_HELD, lines)]
+    panel = (
+        figures.movements(drawn, labels=(labels[0], labels[1], labels[2]))
+        if shown == 3
+        else figures.paths(drawn, labels=(labels[0], labels[1]))
+    )
     caption = "Grey lines are the demonstrations. Strokes are directions in which they were held at these states."
     words = {_HELD: "held directions", "training": "demonstrations"}
     return html.picture("held", [panel], caption, keys=(_HELD, "training"), labels=words)

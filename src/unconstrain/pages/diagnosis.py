@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.errors import InvalidDataError
-from ..evaluation import Diagnosis, diagnose, diagnosis
+from ..evaluation import Diagnosis, diagnose, diagnosis, verdicts
 from ..recordings import Demonstration, stack
 from . import figures, html
 
@@ -44,31 +43,34 @@ def diagnosis_page(
     Raises
     ------
     MissingExtraError
-        If plotly or jinja2 is not installed.
+        If matplotlib or jinja2 is not installed.
     """
     demos = list(demonstrations)
     return html.document(
         title,
+        verdicts.of_diagnosis(found),
         html.words("diagnosis_lead"),
-        _tiles(found, demos),
-        html.bullets(diagnosis.sentences(found, states, actions)),
-        html.section("Where the policy is not determined", _map(found, demos, states, actions)),
         html.section("What to record next", _next(found, states, actions)),
+        html.section("Where three demonstrations do not tell", _map(found, demos, states, actions)),
+        html.section("In sentences", html.bullets(diagnosis.sentences(found, states, actions)), _tiles(found, demos)),
         html.section("Free or constrained", _freedom(found)),
         html.section("How the policy was chosen", _chosen(found)),
     )
 
 
-def unknown(policy: Policy, demos: list[Demonstration]) -> list[html.Markup]:
+def unknown(
+    policy: Policy, demos: list[Demonstration], states: Sequence[str], actions: Sequence[str]
+) -> list[html.Markup]:
     """The map and what to record next, for the page of a fit."""
     try:
         found = diagnose(policy, demos)
     except InvalidDataError as error:
         return [html.paragraph(f"Nothing can be said about that: {error}")]
-    states = [f"state {index + 1}" for index in range(demos[0].states.shape[1])]
-    actions = [f"action {index + 1}" for index in range(demos[0].actions.shape[1])]
-    told = map(html.paragraph, diagnosis.sentences(found, states, actions))
-    return [*told, _map(found, demos, states, actions), _next(found, states, actions)]
+    return [
+        html.bullets(diagnosis.sentences(found, states, actions)),
+        _map(found, demos, states, actions),
+        _next(found, states, actions),
+    ]
 
 
 def _tiles(found: Diagnosis, demos: list[Demonstration]) -> html.Markup:
@@ -89,8 +91,6 @@ def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], ac
     recorded = stack(demos).states
     regions = found.regions[:MOST_REGIONS]
     worst = np.array([region.state for region in regions])
-    named = diagnosis.named
-    texts = [escape(f"{named(one.state, states)}: leave {named(one.direction, actions)} free") for one in regions]
     if recorded.shape[1] == 1:
         recorded, worst = (np.column_stack([one, np.zeros(len(one))]) for one in (recorded, worst))
         states = [*states, ""]
@@ -104,9 +104,8 @@ def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], ac
         recorded[rows][:, shown],
         found.undetermined[rows],
         worst[:, shown],
-        labels=(escape(states[shown[0]]), escape(states[shown[1]])),
+        labels=(states[shown[0]], states[shown[1]]),
         scale="undetermined spread / typical action",
-        texts=texts,
         directions=ways,
         top=diagnosis.SMALL,
     )
@@ -125,26 +124,31 @@ def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> ht
             f"{one.along:.1%}",
             f"{one.spread:.1%}",
             f"{one.determined:.0%}",
+            _shown_by(one.shown_by),
             str(one.samples),
         ]
         for number, one in enumerate(shown, 1)
     ]
     around, along = (", ".join(names) for names in (states, actions))
     header = ["", f"demonstrate around\n({around})", f"with motion left free along\n({along})", "recorded in"]
-    header += ["spread\nalong it", "spread in\nthe region", "states\ndetermined", "samples"]
+    header += ["spread\nalong it", "spread in\nthe region", "states\ndetermined", "moved\nalong it by", "samples"]
     note = html.words("diagnosis_next", shown=len(shown), every=len(found.regions))
     return html.table(header, rows, left=4, note=note)
+
+
+def _shown_by(names: Sequence[str]) -> str:
+    """How many demonstrations moved along a direction; of one, what it says cannot be told from what held it."""
+    return {0: "none", 1: f"only {''.join(names)}"}.get(len(names), str(len(names)))
 
 
 def _freedom(found: Diagnosis) -> html.Markup:
     if found.free is None:
         return html.paragraph("The policy was fitted to other demonstrations.")
     shown = found.movements[:MOST_MOVEMENTS]
-    names = [escape(one.name) for one in shown]
+    names = [one.name for one in shown]
     free = [one.free or 0.0 for one in shown]
-    picture = figures.bars(names, {"hybrid": free}, title="", label="probability of being free", height=360)
-    picture.update_yaxes(range=[0.0, 1.0])
-    picture.update_xaxes(showticklabels=len(shown) <= 40, tickangle=-90 if len(shown) > 12 else 0)
+    picture = figures.bars(names, {"hybrid": free}, title="", label="probability of being free")
+    picture.axes[0].set_ylim(0.0, 1.0)
     caption = html.words(
         "diagnosis_freedom",
         free=diagnosis.FREE,

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import is_dataclass
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InvalidDataError, SettingError
-from ..evaluation import ncpe, ninconsistency, nupe
+from ..evaluation import ncpe, ninconsistency, nupe, verdicts
 from ..learners import named
+from ..motion import rollout
 from ..recordings import Demonstration, stack
 from ..risks import action_projection, project
 from . import figures, html
@@ -26,8 +27,20 @@ MOST_ROWS = 30
 MOST_POINTS = 2000
 ARROWS = 15
 
+FOLDS, MOST_REFITTED = 5, 5000
+"""Demonstrations are held out in so many parts, where there are no more samples than the second."""
 
-def policy_page(policy: Policy, demonstrations: Sequence[Demonstration], title: str) -> str:
+TILT = 20.0
+"""Of the new plane against the recorded motion, degrees."""
+
+
+def policy_page(
+    policy: Policy,
+    demonstrations: Sequence[Demonstration],
+    title: str,
+    states: Sequence[str] | None = None,
+    actions: Sequence[str] | None = None,
+) -> str:
     """Make the page of a fitted policy.
 
     Parameters
@@ -38,6 +51,8 @@ def policy_page(policy: Policy, demonstrations: Sequence[Demonstration], title: 
         What it was fitted to, or others.
     title : str
         Of the page.
+    states, actions : sequence of str, optional
+        Names of the columns, with their units.
 
     Returns
     -------
@@ -47,28 +62,46 @@ def policy_page(policy: Policy, demonstrations: Sequence[Demonstration], title: 
     Raises
     ------
     MissingExtraError
-        If plotly or jinja2 is not installed.
+        If matplotlib or jinja2 is not installed.
     """
     demos = list(demonstrations)
-    learner = named(policy.learner)
+    n, d = demos[0].states.shape[1], demos[0].actions.shape[1]
+    xs = list(states or (f"state {index + 1}" for index in range(n)))
+    us = list(actions or (f"action {index + 1}" for index in range(d)))
+    learner, held_out = named(policy.learner), _held_out(policy, demos)
     parts = [
-        _summary(policy, demos),
-        html.section("The demonstrations", _movements(policy, demos)),
-        html.section("Predicted and observed actions", _actions(policy, demos)),
-        html.section("Errors and support", _errors(policy, demos)),
-        html.section("What the data determined", _determined(policy)),
+        html.section("The demonstrations", _movements(policy, demos, xs)),
+        *_reproduced(policy, demos, xs),
+        html.section("Predicted and observed actions", _actions(policy, demos, us)),
+        html.section("Errors and support", _errors(policy, demos, held_out)),
     ]
     if policy.solution_.belief is not None:
-        parts.append(html.section("Where the policy is not determined", *unknown(policy, demos)))
+        parts.append(html.section("What the demonstrations do not tell", *unknown(policy, demos, xs, us)))
+    parts += [html.section("Numbers", _summary(policy, demos), _determined(policy))]
     if is_dataclass(learner):
         parts.append(html.settings_table(learner))
-    return html.document(title, _lead(policy, demos, type(learner).__name__), *parts)
+    told = None if policy.solution_.belief is None else policy.solution_.determined_share
+    verdict = verdicts.of_explained(policy.held_out_score(), len(demos), told)
+    return html.document(title, verdict, _lead(policy, type(learner).__name__, xs, us), *parts)
 
 
-def _lead(policy: Policy, demos: list[Demonstration], learner: str) -> html.Markup:
-    n, d = demos[0].states.shape[1], demos[0].actions.shape[1]
+def _lead(policy: Policy, learner: str, states: Sequence[str], actions: Sequence[str]) -> html.Markup:
     kind = "Locally linear" if hasattr(policy, "fields_") else "Parametric"
-    return html.words("fit_lead", kind=kind, learner=learner, states=n, actions=d)
+    return html.words("fit_lead", kind=kind, learner=learner, states=", ".join(states), actions=", ".join(actions))
+
+
+def _held_out(policy: Policy, demos: list[Demonstration]) -> list[float] | None:
+    """What each demonstration, with others, left unexplained while it was held out; None where that takes too long."""
+    count = min(FOLDS, len(demos))
+    if count < 2 or sum(map(len, demos)) > MOST_REFITTED:
+        return None
+    found = [float("nan")] * len(demos)
+    for fold in range(count):
+        rest = [demo for index, demo in enumerate(demos) if index % count != fold]
+        learnt = copy(policy).fit_demonstrations(rest)
+        for index in range(fold, len(demos), count):
+            found[index] = _or_nan(ninconsistency, learnt, [demos[index]])
+    return found
 
 
 def _summary(policy: Policy, demos: list[Demonstration]) -> html.Markup:
@@ -86,38 +119,65 @@ def _summary(policy: Policy, demos: list[Demonstration]) -> html.Markup:
     )
 
 
-def _movements(policy: Policy, demos: list[Demonstration]) -> html.Markup:
+def _movements(policy: Policy, demos: list[Demonstration], names: Sequence[str]) -> html.Markup:
     n, d = demos[0].states.shape[1], demos[0].actions.shape[1]
     tracks = [_thin(demo) for demo in demos]
-    if n >= 3:
-        panel = figures.movements(
-            [("training", escape(demo.name), demo.states[:, :3]) for demo in tracks],
-            labels=("state 1", "state 2", "state 3"),
-        )
-        rest = f" The other {n - 3} columns are not drawn." if n > 3 else ""
-        return html.picture("movements", [panel], f"The first three state columns.{rest} Drag to turn, scroll to zoom.")
     if n == 2 and d == 2:
         return html.picture(
             "movements",
-            [_field(policy, tracks)],
+            [_field(policy, tracks, names)],
             "Grey lines are the demonstrations, green arrows the learnt policy, unconstrained. Arrows are "
             "not to the scale of the axes; those longer than the longest observed action are cut to it.",
             keys=("hybrid", "training"),
             labels={"hybrid": "learnt policy", "training": "demonstrations"},
         )
-    panel = figures.vector_field(
-        np.zeros((1, 2)),
-        {},
-        longest=1.0,
-        scale=1.0,
-        trajectories=[demo.states if n == 2 else np.column_stack([_times(demo), demo.states]) for demo in tracks],
-        labels=("state 1", "state 2") if n == 2 else (_time_label(demos[0]), "state 1"),
-        equal=n == 2,
-    )
-    return html.picture("movements", [panel], "All demonstrations.")
+    return html.picture("movements", [_drawn([("training", one) for one in tracks], names)], _which(n, names))
 
 
-def _field(policy: Policy, demos: list[Demonstration]) -> object:
+def _which(n: int, names: Sequence[str]) -> str:
+    rest = f" of {', '.join(names[:3])}; the other {n - 3} columns are not drawn" if n > 3 else ""
+    return f"All demonstrations{rest}. 'unconstrain look' turns them and plays them."
+
+
+def _drawn(tracks: list[tuple[str, Demonstration]], names: Sequence[str]) -> object:
+    """Keys and movements over two or three states, or one state over time."""
+    first = tracks[0][1]
+    n = first.states.shape[1]
+    if n >= 3:
+        axes = (names[0], names[1], names[2])
+        return figures.movements([(key, demo.states[:, :3]) for key, demo in tracks], labels=axes)
+    flat = [(key, demo.states if n == 2 else np.column_stack([_times(demo), demo.states])) for key, demo in tracks]
+    labels = (names[0], names[1]) if n == 2 else (_time_label(first), names[0])
+    return figures.paths(flat, labels=labels, equal=n == 2)
+
+
+def _reproduced(policy: Policy, demos: list[Demonstration], names: Sequence[str]) -> list[html.Markup]:
+    """A roll-out from where a demonstration starts, free and under a constraint that nobody recorded."""
+    demo = max(demos, key=len)
+    n, d = demo.states.shape[1], demo.actions.shape[1]
+    if n != d or n < 2 or demo.times is None or not np.any(demo.actions):
+        return []
+    _, axes = np.linalg.eigh(demo.actions.T @ demo.actions)
+    tilt = np.radians(TILT)
+    normal = np.cos(tilt) * axes[:, 0] + np.sin(tilt) * axes[:, -1]
+    step = float(np.median(np.diff(demo.times)))
+    runs = {}
+    for key, held in (("roll-out, free", None), ("roll-out, new plane", lambda states, _: _rows(normal, states))):
+        try:
+            runs[key] = rollout(policy, demo.states[0], len(demo), step, held)
+        except InvalidDataError:  # it runs away
+            continue
+    picture = _drawn([("observed", _thin(demo)), *runs.items()], names)
+    keys = ("observed", *runs)
+    caption = html.words("fit_rollout", name=demo.name, seconds=f"{step * len(demo):.3g}", tilt=f"{TILT:g}", runs=runs)
+    return [html.section("A new surface", html.picture("rollout", [picture], caption, keys=keys))]
+
+
+def _rows(normal: Array, states: Array) -> Array:
+    return np.broadcast_to(normal, (len(states), 1, len(normal)))
+
+
+def _field(policy: Policy, demos: list[Demonstration], names: Sequence[str]) -> object:
     states, actions, _ = stack(demos)
     low, high = states.min(axis=0), states.max(axis=0)
     points = np.stack(np.meshgrid(*np.linspace(low, high, ARROWS).T), axis=-1).reshape(-1, 2)
@@ -128,24 +188,19 @@ def _field(policy: Policy, demos: list[Demonstration]) -> object:
         longest=longest,
         scale=1.3 * float((high - low).max()) / (ARROWS - 1) / longest,
         trajectories=[demo.states for demo in demos],
-        labels=("state 1", "state 2"),
-        height=560,
+        labels=(names[0], names[1]),
+        height=520,
     )
 
 
-def _actions(policy: Policy, demos: list[Demonstration]) -> html.Markup:
+def _actions(policy: Policy, demos: list[Demonstration], names: Sequence[str]) -> html.Markup:
     shown = demos[:MOST_PANELS]
     panels = []
     for demo in map(_thin, shown):
         predicted = policy(demo.states)
         along = project(action_projection(demo.actions), predicted)
-        names = [f"action {index + 1}" for index in range(demo.actions.shape[1])]
         series = {"hybrid": predicted, "direct": along, "observed": demo.actions}
-        panels.append(
-            figures.over_time(
-                _times(demo), series, names, title=escape(demo.name), time_label=_time_label(demo), row_height=130
-            )
-        )
+        panels.append(figures.over_time(_times(demo), series, names, title=demo.name, time_label=_time_label(demo)))
     return html.picture(
         "actions",
         panels,
@@ -155,26 +210,36 @@ def _actions(policy: Policy, demos: list[Demonstration]) -> html.Markup:
     )
 
 
-def _errors(policy: Policy, demos: list[Demonstration]) -> html.Markup:
+def _errors(policy: Policy, demos: list[Demonstration], held_out: list[float] | None) -> html.Markup:
     known = all(demo.truth is not None for demo in demos)
     support = _support(policy, demos)
-    header = ["demonstration", "samples", "norm. inconsistency"]
+    header = ["demonstration", "samples", "explained\nheld out", "explained\nlearnt from"]
     header += ["nCPE", "nUPE"] if known else []
-    header += ["median support", "least support"] if support is not None else []
-    metrics = (ninconsistency, ncpe, nupe) if known else (ninconsistency,)
+    header += ["median\nsupport", "least\nsupport"] if support is not None else []
 
-    def cells(name: str, of: list[Demonstration], near: Array | None) -> list[str]:
-        row = [name, str(sum(map(len, of))), *(html.number(_or_nan(metric, policy, of)) for metric in metrics)]
+    def cells(name: str, of: list[Demonstration], missed: float, near: Array | None) -> list[str]:
+        row = [name, str(sum(map(len, of))), *map(_share, (missed, _or_nan(ninconsistency, policy, of)))]
+        row += [html.number(_or_nan(metric, policy, of)) for metric in (ncpe, nupe) if known]
         return row if near is None else [*row, html.number(float(np.median(near))), html.number(float(near.min()))]
 
-    shown = demos[:MOST_ROWS]
+    shown, none = demos[:MOST_ROWS], float("nan")
     rows = [
-        cells(demo.name or f"demonstration {index + 1}", [demo], None if support is None else support[index])
+        cells(
+            demo.name or f"demonstration {index + 1}",
+            [demo],
+            none if held_out is None else held_out[index],
+            None if support is None else support[index],
+        )
         for index, demo in enumerate(shown)
     ]
-    rows.append(cells("all", demos, None if support is None else np.concatenate(support)))
-    note = html.words("fit_errors", shown=len(shown), every=len(demos), support=support is not None, truth=known)
+    rows.append(cells("all", demos, none, None if support is None else np.concatenate(support)))
+    words = {"support": support is not None, "truth": known, "held_out": held_out is not None}
+    note = html.words("fit_errors", shown=len(shown), every=len(demos), **words)
     return html.table(header, rows, note=note, rules=(len(shown),))
+
+
+def _share(missed: float) -> str:
+    return f"{1.0 - missed:.1%}" if np.isfinite(missed) else "–"
 
 
 def _determined(policy: Policy) -> html.Markup:

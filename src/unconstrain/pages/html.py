@@ -15,21 +15,28 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.arrays import require_extra
-from .figures.style import COLOURS, LABELS, MARKERS, PALETTE, plotly
+from .figures.style import COLOURS, LABELS, MARKERS, PALETTE, THEMED, described, svg
 
 if TYPE_CHECKING:
     from markupsafe import Markup as Markup
 
+    from ..evaluation import verdicts
+
+ALONE, WIDER = 620, 50
+"""Width for which the text of a picture is made where it is alone in its row, and by how much it is wider than the
+least width where it is not, pixels."""
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def document(title: str, lead: str, *parts: Markup) -> str:
+def document(title: str, verdict: verdicts.Verdict, lead: str, *parts: Markup) -> str:
     """A whole page that needs nothing else.
 
     Parameters
     ----------
     title : str
+    verdict : Verdict
+        What comes first.
     lead : str
         What one sees, in plain words.
     *parts : Markup
@@ -38,10 +45,10 @@ def document(title: str, lead: str, *parts: Markup) -> str:
     Raises
     ------
     MissingExtraError
-        If plotly or jinja2 is not installed.
+        If jinja2 is not installed.
     """
-    library = plotly("offline").get_plotlyjs()
-    return str(_templates().get_template("page.html").render(title=title, lead=lead, parts=parts, plotly=library))
+    page = _templates().get_template("page.html")
+    return str(page.render(title=title, parts=[_part("verdict", verdict), _part("lead", lead), *parts]))
 
 
 def markup(source: str) -> Markup:
@@ -100,19 +107,19 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def table(
-    header: Sequence[str], rows: Sequence[Sequence[str]], *, left: int = 1, note: str = "", rules: Collection[int] = ()
+    header: Sequence[str], rows: Sequence[Sequence[str]], *, note: str, left: int = 1, rules: Collection[int] = ()
 ) -> Markup:
-    """A table that scrolls sideways on a narrow screen.
+    """A table that scrolls sideways on a narrow screen; the first cell of each row names it.
 
     Parameters
     ----------
     header : sequence of str
         A line break is kept, here and in the cells.
     rows : sequence of sequences of str
+    note : str
+        Its caption, below it.
     left : int
         So many columns are aligned to the left; the others hold numbers.
-    note : str
-        Below the table.
     rules : collection of int
         Rows with a line above.
     """
@@ -129,16 +136,16 @@ def picture(
     labels: dict[str, str] | None = None,
     least: int = 420,
 ) -> Markup:
-    """Plotly figures side by side, or below each other where the screen is narrow, with one key.
+    """Pictures side by side, or below each other where the screen is narrow, with one key.
 
     Parameters
     ----------
     name : str
         Of the picture within the page, such as ``"errors"``.
-    panels : sequence of plotly.graph_objects.Figure
+    panels : sequence of matplotlib.figure.Figure
     caption : str
     keys : sequence of str
-        Groups of traces that can be switched off.
+        Keys of artists that can be switched off.
     colours : dict, optional
         Of keys that have no colour of their own.
     labels : dict, optional
@@ -146,7 +153,8 @@ def picture(
     least : int
         Width below which panels go below each other, pixels.
     """
-    drawn = [_graph(panel, f"{name}-{index}") for index, panel in enumerate(panels, 1)]
+    width = least + WIDER if len(panels) > 1 else ALONE
+    drawn = [svg(panel, width, described(panel)) for panel in panels]
     named, coloured = LABELS | (labels or {}), COLOURS | (colours or {})
     shown = [_key(key, named.get(key, key), coloured.get(key, PALETTE[0])) for key in keys]
     return _part("picture", name, drawn, caption, shown, least)
@@ -155,8 +163,12 @@ def picture(
 def settings_table(settings: Any) -> Markup:
     """All settings of an experiment, folded away, with what their docstring says of them."""
     meanings = _meanings(type(settings))
-    rows = [(name, _plain(value), meanings.get(name, "")) for name, value in asdict(settings).items()]
-    return folded("Settings", _part("settings", rows))
+    rows = [
+        (markup("<code>{}</code>").format(name), _plain(value), meanings.get(name, ""))
+        for name, value in asdict(settings).items()
+    ]
+    header = ("setting", "value", "meaning")
+    return folded("Settings", table(header, rows, left=3, note="Everything that was set, and what it means."))
 
 
 @cache
@@ -177,25 +189,10 @@ def _part(macro: str, *values: Any) -> Markup:
     return made
 
 
-def _graph(panel: Any, name: str) -> str:
-    """A figure as HTML."""
-    panel.update_layout(showlegend=False)
-    again = "resetCameraDefault3d" if any(trace.type == "scatter3d" for trace in panel.data) else "resetScale2d"
-    return str(
-        panel.to_html(
-            full_html=False,
-            include_plotlyjs=False,
-            config={"responsive": True, "displaylogo": False, "modeBarButtons": [["toImage", again]]},
-            div_id=name,
-            default_height=f"{panel.layout.height}px",
-        )
-    )
-
-
 def _key(value: str, name: str, colour: str) -> dict[str, str]:
     # A method that goes by another name here is a line like any other.
     marker = MARKERS.get(value, "") if name == LABELS.get(value) else ""
-    return {"value": value, "name": name, "colour": colour, "marker": marker}
+    return {"value": value, "name": name, "colour": THEMED.get(colour, colour), "marker": marker}
 
 
 def _plain(value: Any) -> str:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
+
+import unconstrain as uc
 
 from ..base.errors import MissingExtraError, ReadError, SettingError
 from . import experiments, pages
@@ -18,8 +19,14 @@ from .experiments import washing
 from .experiments.journal import Journal
 from .experiments.trials import LABELS, Progress, Result
 
+Verdict = uc.evaluation.verdicts.Verdict
 Table = Callable[[Sequence[str], Sequence[Sequence[str]]], None]
 """Prints a head and rows."""
+
+Shown = Callable[[str], AbstractContextManager[Progress]]
+"""Shows how far something of a name is while its block runs."""
+
+_KEPT = "What was finished is kept in {}; the same command goes on from there."
 
 TITLES = {
     "constraint": "constr.",
@@ -34,7 +41,16 @@ TITLES = {
 
 
 def reproduce(
-    experiment: str, out: str, table: Table, *, trials: int | None, seed: int, only: tuple[str, ...], workers: int
+    experiment: str,
+    out: str,
+    table: Table,
+    shown: Shown,
+    *,
+    trials: int | None,
+    seed: int,
+    only: tuple[str, ...],
+    workers: int,
+    as_json: bool,
 ) -> None:
     """Run an experiment, going on where an earlier run was interrupted; print the result and write it to a folder.
 
@@ -57,10 +73,13 @@ def reproduce(
         settings = replace(settings, only=only)
     journal = Journal(Path(out) / f".{experiment}.trials", settings)
     kept = (journal,) if experiment in experiments.JOURNALED else ()
-    with progress_bar(experiment) as progress:
-        result = module.run(settings, workers, progress, *kept)
+    with shown(experiment) as progress:
+        try:
+            result = module.run(settings, workers, progress, *kept)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(*([_KEPT.format(journal.path)] if kept else [])) from None
     said = [*module.headlines(result), *_beside(experiment, Path(out))]
-    if deliver(result, said, out, table) and kept:
+    if deliver(result, module.verdict(result), said, out, table, as_json) and kept:
         journal.finish()
 
 
@@ -79,7 +98,17 @@ def _beside(experiment: str, folder: Path) -> list[str]:
         return [f"{other}: {path} is of another version; reproduce it again"]
 
 
-def demo(out: str, table: Table, *, real: bool, download: bool, plate: tuple[float, ...] | None, seed: int) -> None:
+def demo(
+    out: str,
+    table: Table,
+    shown: Shown,
+    *,
+    real: bool,
+    download: bool,
+    plate: tuple[float, ...] | None,
+    seed: int,
+    as_json: bool,
+) -> None:
     """Wash a car, simulated or recorded; print the result and write it to a folder.
 
     Raises
@@ -94,26 +123,26 @@ def demo(out: str, table: Table, *, real: bool, download: bool, plate: tuple[flo
     tilts = None if plate is None else (plate[0], plate[1])
     settings = washing.Settings(real=real, download=download, trials=1, seed=seed, plate=tilts)
     try:
-        with progress_bar("washing") as progress:
+        with shown("washing") as progress:
             result = washing.run(settings, 1, progress)
     except ReadError as error:
         raise error if download else ReadError(f"{error} On the command line, --download allows it.") from error
-    if not real:
-        click.echo("Seven plates were wiped, five to learn from, two to be tested on.")
-    deliver(result, washing.headlines(result), out, table)
+    before = [] if real else ["Seven plates were wiped, five to learn from, two to be tested on."]
+    deliver(result, washing.verdict(result), [*before, *washing.headlines(result)], out, table, as_json)
 
 
-def deliver(result: Result, headlines: Sequence[str], out: str, table: Table) -> bool:
+def deliver(result: Result, verdict: Verdict, headlines: Sequence[str], out: str, table: Table, as_json: bool) -> bool:
     """Print and write a result; False where it could not be written."""
-    table(*summary(result))
-    for line in headlines:
-        click.echo(line)
+    if not as_json:
+        click.echo("\n".join([*verdict.lines(), ""]))
+        table(*summary(result))
+        click.echo("\n".join(headlines))
     try:
         data, page = pages.write(result, Path(out))
     except MissingExtraError as error:
         click.echo(f"No report: {error}", err=True)
         return False
-    click.echo(f"numbers: {data}\nreport:  {page}")
+    click.echo(data.read_text("utf-8") if as_json else f"numbers: {data}\nreport:  {page}")
     return True
 
 
@@ -135,14 +164,3 @@ def _cell(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:.3g}" if isinstance(value, float) else str(value)
-
-
-@contextmanager
-def progress_bar(title: str) -> Iterator[Progress]:
-    """Show a bar on stderr while the block runs; yields what to call with (done, of)."""
-    from rich.console import Console
-    from rich.progress import Progress as Bar
-
-    with Bar(console=Console(file=sys.__stderr__), transient=True, disable=not sys.stderr.isatty()) as bar:
-        job = bar.add_task(title, total=None)
-        yield lambda done, of: bar.update(job, completed=done, total=of)

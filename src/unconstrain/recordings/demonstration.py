@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -67,8 +68,10 @@ class Recording(Shown):
         """
         missing = [name for name in names if name not in self.columns]
         if missing:
+            near = dict.fromkeys(column for name in missing for column in _near(name, self.columns))
+            meant = f" Did you mean {' or '.join(map(repr, near))}?" if near else ""
             raise InvalidDataError(
-                f"'{self.name}' has no column {', '.join(map(repr, missing))}; it has {', '.join(self.columns)}."
+                f"'{self.name}' has no column {', '.join(map(repr, missing))}; it has {', '.join(self.columns)}.{meant}"
             )
         return self.values[:, [self.columns.index(name) for name in names]]
 
@@ -259,3 +262,9 @@ def noise_of(demonstrations: Sequence[Demonstration]) -> Array | None:
 def _time(times: Array | None) -> tuple[str, ...]:
     """How long a movement takes."""
     return () if times is None or not len(times) else (f"{float(times[-1] - times[0]):.4g} s",)
+
+
+def _near(name: str, columns: Sequence[str]) -> list[str]:
+    """Columns that somebody may have meant by a name, the nearest first."""
+    plain = {column.casefold(): column for column in reversed(columns)}
+    return [plain[found] for found in get_close_matches(name.casefold(), plain, n=2, cutoff=0.7)]

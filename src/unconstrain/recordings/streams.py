@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -65,6 +65,8 @@ class Stream:
         :meth:`~unconstrain.ParametricPolicy.fit_demonstrations`.
     leave_out : iterable of str
         Names of recordings to pass over.
+    progress : callable, optional
+        Called with how many files of a walk were read, and of how many.
 
     Examples
     --------
@@ -84,12 +86,14 @@ class Stream:
         reading: Reading | None = None,
         speed_power: float = 0.0,
         leave_out: Iterable[str] = (),
+        progress: Callable[[int, int], None] | None = None,
     ) -> None:
         check_at_least("speed_power", speed_power, 0.0)
         self.paths = expand(paths)
         self.reading = reading or Reading(group, time)
         self.speed_power = speed_power
         self.leave_out = frozenset(leave_out)
+        self._progress = progress
         self._asked = recipe or Recipe()
         self._first_file = 0
         self._held: list[tuple[str, Demonstration]] | None = None
@@ -188,6 +192,8 @@ class Stream:
                         warnings.simplefilter("ignore", UserWarning)
                     demonstration = self._prepared(recording)
                 yield f"{number}/{recording.name}", demonstration
+            if self._progress is not None:
+                self._progress(number - self._first_file + 1, len(self.paths))
 
     def _blocks(self, path: Path, whole: bool = False) -> Iterator[Recording]:
         for recording in read_blocks(path, self.reading, whole=whole):
@@ -224,4 +230,4 @@ class Stream:
         return counts
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_held": None}
+        return {**self.__dict__, "_held": None, "_progress": None}

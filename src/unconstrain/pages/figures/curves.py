@@ -7,19 +7,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array
-from .style import COLOURS, DASHES, LABELS, dress, figure, legend, log_axis, plotly, translucent
+from .style import COLOURS, DASHES, figure, keyed, log_axis
 
 
 def bars(
-    groups: Sequence[str], values: Mapping[str, Sequence[float]], *, title: str, label: str, height: int = 380
+    groups: Sequence[str], values: Mapping[str, Sequence[float]], *, title: str, label: str, height: int = 320
 ) -> Any:
-    """One bar for each method in each group; parameters as in :func:`dots`."""
-    made = figure(title, "", label, height=height, barmode="group", bargap=0.28, bargroupgap=0.06)
-    for key, heights in values.items():
-        made.add_bar(x=list(groups), y=list(heights), marker_color=COLOURS[key], **legend(key),
-                     hovertemplate=f"{LABELS[key]}, %{{x}}: %{{y:.3g}}<extra></extra>")  # fmt: skip
-    made.update_xaxes(showgrid=False, ticks="", type="category")
-    made.update_yaxes(rangemode="tozero")
+    """One bar for each method in each group.
+
+    Parameters
+    ----------
+    groups : sequence of str
+        Of the horizontal axis.
+    values : dict
+        Key to the height of its bar in each group.
+    title, label : str
+        Of the picture and its vertical axis.
+    height : int
+        Pixels.
+    """
+    made = figure(title, "", label, height)
+    [axes] = made.axes
+    at, wide = np.arange(len(groups)), 0.76 / max(len(values), 1)
+    for index, (key, heights) in enumerate(values.items()):
+        for place, tall in zip(at - 0.38 + wide * (index + 0.5), heights, strict=True):
+            axes.bar(place, tall, 0.9 * wide, **keyed(key))
+    axes.set_xticks(at, groups if len(groups) <= 40 else [""] * len(groups), rotation=90 if len(groups) > 8 else 0)
+    axes.grid(axis="x", visible=False)
     return made
 
 
@@ -30,7 +44,7 @@ def over_time(
     *,
     title: str = "",
     time_label: str = "time (s)",
-    row_height: int = 150,
+    row_height: int = 110,
 ) -> Any:
     """Several vectors over time, one row for each component.
 
@@ -45,20 +59,12 @@ def over_time(
     row_height : int
         Pixels.
     """
-    rows = len(names)
-    made = plotly("subplots").make_subplots(rows=rows, cols=1, shared_xaxes=True, vertical_spacing=0.12 / rows)
-    dress(made, title, row_height * rows + 90)
-    for row, name in enumerate(names):
+    made = figure(title, time_label, height=row_height * len(names) + 60, rows=len(names))
+    for row, (axes, name) in enumerate(zip(made.axes, names, strict=True)):
+        axes.set_ylabel(name)
         for key, values in series.items():
-            line = {
-                "color": COLOURS.get(key),
-                "dash": DASHES.get(key, "solid"),
-                "width": 1.2 if key == "observed" else 1.8,
-            }
-            where = legend(key, first=row == 0) | {"row": row + 1, "col": 1}
-            made.add_scatter(x=times, y=values[:, row], mode="lines", line=line, **where)
-        made.update_yaxes(title_text=name, row=row + 1, col=1)
-    made.update_xaxes(title_text=time_label, row=rows, col=1)
+            thin = 1.1 if key == "observed" else 1.6
+            axes.plot(times, values[:, row], DASHES.get(key, "-"), **keyed(key, linewidth=thin))
     return made
 
 
@@ -71,25 +77,14 @@ def spectra(eigenvalues: Array, *, title: str = "") -> Any:
         Ascending.
     title : str
     """
-    made = figure(title, "weight direction, best determined first", "λ / largest λ", height=380)
+    made = figure(title, "weight direction, best determined first", "λ / largest λ")
+    [axes] = made.axes
     largest = np.maximum(eigenvalues[:, -1:], 1e-300)
     shares = np.maximum(eigenvalues / largest, 1e-16)[:, ::-1]
     order = np.arange(1, shares.shape[1] + 1)
-    for index, share in enumerate(shares):
-        line = {"color": translucent(COLOURS["inconsistency"], 0.35), "width": 1.2}
-        where = {"name": "each field", "legendgroup": "each field", "showlegend": index == 0}
-        made.add_scatter(
-            x=order,
-            y=share,
-            mode="lines",
-            line=line,
-            hovertemplate=f"field {index + 1}: %{{y:.2g}}<extra></extra>",
-            **where,
-        )
-    middle = np.exp(np.median(np.log(shares), axis=0))
-    look = {"line": {"color": COLOURS["truth"], "width": 2}, "marker": {"size": 6}}
-    made.add_scatter(x=order, y=middle, mode="lines+markers", name="median", legendgroup="median", **look)
-    log_axis(made)
+    axes.plot(order, shares.T, **keyed("each field", color=COLOURS["inconsistency"], alpha=0.35, linewidth=1.1))
+    axes.plot(order, np.exp(np.median(np.log(shares), axis=0)), ".-", **keyed("median", color=COLOURS["truth"]))
+    log_axis(axes)
     return made
 
 
@@ -104,17 +99,14 @@ def step_scores(scores: Array, chosen: NDArray[np.intp], *, title: str = "") -> 
         What was chosen in each model.
     title : str
     """
-    made = figure(title, "undetermined weight directions", "held-out score / best", height=380)
+    made = figure(title, "undetermined weight directions", "held-out score / best")
+    [axes] = made.axes
     scores = np.where(np.isfinite(scores) & (scores > 0), scores, np.nan)
-    for index, score in enumerate(scores):
+    for score, at in zip(scores, chosen, strict=True):
         if np.isnan(score).all():
             continue
         ratio = score / np.nanmin(score)
-        group = {"name": f"field {index + 1}", "legendgroup": f"field {index + 1}", "showlegend": False}
-        line = {"color": translucent(COLOURS["truth"], 0.35 if len(scores) > 1 else 1.0), "width": 1.4}
-        made.add_scatter(x=np.arange(len(ratio)), y=ratio, mode="lines", line=line, **group)
-        at = int(chosen[index])
-        marker = {"color": COLOURS["hybrid"], "size": 10, "line": {"color": "white", "width": 1}}
-        made.add_scatter(x=[at], y=ratio[at : at + 1], mode="markers", marker=marker, **group)
-    log_axis(made, dtick=None)
+        axes.plot(ratio, color=COLOURS["truth"], alpha=0.35 if len(scores) > 1 else 1.0, linewidth=1.3)
+        axes.plot(int(at), ratio[at], "o", color=COLOURS["hybrid"], markersize=7)
+    log_axis(axes)
     return made

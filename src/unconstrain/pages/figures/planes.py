@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from ...base.arrays import Array
-from .style import COLOURS, figure, legend, plotly
+from ...base.arrays import Array, require_extra
+from .style import COLOURS, DASHES, INK, figure, keyed
 
 # In the order in which they are drawn, with their widths: what lies below shows at the edges.
-_ARROWS = {"inconsistency": 1.4, "direct": 3.2, "hybrid": 1.9, "truth": 0.9, "observed": 0.9}
+_ARROWS = {"inconsistency": 1.8, "direct": 1.8, "hybrid": 1.8, "robust": 1.8, "truth": 0.8, "observed": 0.8}
 
 
 def vector_field(
@@ -22,7 +22,7 @@ def vector_field(
     trajectories_are: str = "training",
     title: str = "",
     labels: tuple[str, str] = ("x₁ (m)", "x₂ (m)"),
-    height: int = 520,
+    height: int = 430,
     equal: bool = True,
 ) -> Any:
     """Arrows of several fields at the same points, with equal axes.
@@ -49,16 +49,52 @@ def vector_field(
         Both axes to one scale.
     """
     made = figure(title, *labels, height=height)
+    [axes] = made.axes
     if trajectories:
-        made.add_trace(line_through(_joined(trajectories), trajectories_are, width=1.2))
+        axes.plot(*_joined(trajectories).T, **keyed(trajectories_are, linewidth=1.1))
     for key in sorted(fields, key=list(_ARROWS).index):
         vectors = scale * clipped(fields[key], longest)
-        made.add_trace(line_through(arrow_lines(points, vectors), key, width=_ARROWS[key]))
-    made.update_traces(hoverinfo="skip")
+        axes.plot(*arrow_lines(points, vectors).T, **keyed(key, linewidth=_ARROWS[key]))
     if equal:
-        equal_axes(made)
+        axes.set_aspect("equal")
     if fields:
-        _show(made, points)
+        low, high = points.min(axis=0), points.max(axis=0)
+        edge = np.maximum(0.12 * (high - low), 1e-12)
+        axes.set(xlim=(low[0] - edge[0], high[0] + edge[0]), ylim=(low[1] - edge[1], high[1] + edge[1]))
+    return made
+
+
+def paths(
+    lines: Sequence[tuple[str, Array]],
+    *,
+    reach: float | None = None,
+    title: str = "",
+    labels: tuple[str, str] = ("first axis (m)", "second axis (m)"),
+    height: int = 400,
+    equal: bool = True,
+) -> Any:
+    """Paths in a plane, each with a dot where it starts.
+
+    Parameters
+    ----------
+    lines : sequence of (key, points)
+        Points (T, 2).
+    reach : float, optional
+        The axes span [−reach, reach]; what is beyond is not drawn.
+    title, labels, height, equal
+        As in :func:`vector_field`.
+    """
+    made = figure(title, *labels, height=height)
+    [axes] = made.axes
+    for key, line in lines:
+        recorded = key in ("observed", "training")
+        shown = broken(line) if recorded else line
+        axes.plot(*shown.T, **keyed(key, linewidth=1.0 if recorded else 1.9, linestyle=DASHES.get(key, "-")))
+        axes.plot(*line[:1].T, **keyed(key, marker="o", markersize=4 if recorded else 6))
+    if equal:
+        axes.set_aspect("equal")
+    if reach is not None:
+        axes.set(xlim=(-reach, reach), ylim=(-reach, reach))
     return made
 
 
@@ -69,7 +105,6 @@ def known_map(
     *,
     labels: tuple[str, str],
     scale: str,
-    texts: Sequence[str] = (),
     directions: Array | None = None,
     top: float = 0.0,
 ) -> Any:
@@ -86,34 +121,29 @@ def known_map(
         Of the axes, with their unit.
     scale : str
         Of the colours, with the unit.
-    texts : sequence of str
-        What each marked point says when it is pointed at.
     directions : ndarray, shape (K, 2), optional
         Drawn through the marked points as lines, the longest as long as an eighth of the picture.
     top : float
         Colours end there, or at the largest value if that is larger.
     """
-    made = figure("", *labels, height=520)
+    made = figure("", *labels, height=430)
+    [axes] = made.axes
     order = np.argsort(values, kind="stable")  # what is known least lies on top
-    bar = {"title": {"text": scale, "side": "right"}, "thickness": 14, "outlinewidth": 0, "tickformat": ".2~g"}
-    bar |= {"len": 0.92, "y": 0.0, "yanchor": "bottom"}
-    look = {"color": values[order], "colorscale": "Cividis", "cmin": 0.0, "size": 5, "colorbar": bar}
-    made.add_scatter(
-        x=points[order, 0], y=points[order, 1], mode="markers", marker=look | {"cmax": max(float(values.max()), top)},
-        name="recorded states", hovertemplate="(%{x:.3g}, %{y:.3g}): %{marker.color:.3g}<extra></extra>",
-    )  # fmt: skip
+    shades = require_extra("matplotlib.colors", "viz").LinearSegmentedColormap.from_list(
+        "known", [COLOURS["training"], COLOURS["inconsistency"]]
+    )
+    end = max(float(values.max()), top)
+    drawn = axes.scatter(*points[order].T, 9, values[order], cmap=shades, vmin=0.0, vmax=end, rasterized=True)
+    made.colorbar(drawn, label=scale).outline.set_visible(False)
     if directions is not None and len(marked):
         reach = float(np.ptp(points, axis=0).max()) / 16
         ways = directions * reach / max(float(np.linalg.norm(directions, axis=1).max()), 1e-300)
         ends = np.stack([marked - ways, marked + ways, np.full_like(marked, np.nan)], axis=1).reshape(-1, 2)
-        line = {"color": COLOURS["inconsistency"], "width": 2.5}
-        made.add_scatter(x=ends[:, 0], y=ends[:, 1], mode="lines", line=line, hoverinfo="skip", name="to leave free")
-    ring = {"color": "white", "size": 17, "line": {"color": COLOURS["inconsistency"], "width": 2}}
-    made.add_scatter(
-        x=marked[:, 0], y=marked[:, 1], mode="markers+text", marker=ring, textfont={"size": 11},
-        text=[str(number) for number in range(1, len(marked) + 1)], hovertext=list(texts), hoverinfo="text",
-        name="to record",
-    )  # fmt: skip
+        axes.plot(*ends.T, **keyed("to leave free", color=COLOURS["inconsistency"], linewidth=2))
+    ring = {"markersize": 14, "markerfacecolor": "#ffffff", "markeredgecolor": COLOURS["inconsistency"]}
+    axes.plot(*marked.T, "o", **ring)
+    for number, place in enumerate(marked, 1):
+        axes.annotate(str(number), place, ha="center", va="center", color=INK, fontsize=9)
     return made
 
 
@@ -157,25 +187,6 @@ def broken(states: Array) -> Array:
     return np.insert(states, jumps + 1, np.nan, axis=0)
 
 
-def line_through(points: Array, key: str, width: float, dash: str = "solid") -> Any:
-    """A trace through points (N, 2); NaN interrupts it."""
-    line = {"color": COLOURS.get(key), "width": width, "dash": dash}
-    return plotly().Scatter(x=points[:, 0], y=points[:, 1], mode="lines", line=line, **legend(key))
-
-
 def _joined(trajectories: Sequence[Array]) -> Array:
     gap = np.full((1, trajectories[0].shape[1]), np.nan)
     return np.concatenate([part for one in trajectories for part in (broken(one), gap)])
-
-
-def _show(made: Any, points: Array) -> None:
-    low, high = points.min(axis=0), points.max(axis=0)
-    edge = 0.12 * (high - low)
-    made.update_xaxes(range=[low[0] - edge[0], high[0] + edge[0]])
-    made.update_yaxes(range=[low[1] - edge[1], high[1] + edge[1]])
-
-
-def equal_axes(made: Any) -> None:
-    """Draw both axes to one scale."""
-    made.update_xaxes(constrain="domain")
-    made.update_yaxes(constrain="domain", scaleanchor="x", scaleratio=1)

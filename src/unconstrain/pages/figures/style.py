@@ -1,11 +1,17 @@
-"""One look for all pictures: a colour, a marker and a dash for each method."""
+"""One look for all pictures: a colour, a marker and a dash for each method; and pictures as text."""
 
-import json
+import io
+import re
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from html import escape
 from importlib import resources
-from types import ModuleType
 from typing import Any
 
-from ...base.arrays import require_extra
+import numpy as np
+
+from ...base.arrays import Array, require_extra
 
 METHODS = ("direct", "inconsistency", "hybrid")
 
@@ -14,76 +20,149 @@ COLOURS = {
     "direct": "#0072b2",
     "inconsistency": "#d55e00",
     "hybrid": "#009e73",
+    "robust": "#8a63d2",
     "truth": "#1a1a1a",
     "observed": "#1a1a1a",
     "training": "#9aa0a6",
     "held out": "#cc79a7",
+    "roll-out, free": "#56b4e9",
+    "roll-out, new plane": "#e69f00",
 }
 """The same on every page."""
 
-PALETTE = ("#56b4e9", "#e69f00", "#cc79a7", "#6f4e9c", "#7a6a2f", "#8a8f96")
+PALETTE = ("#56b4e9", "#e69f00", "#cc79a7", "#8a63d2", "#7a6a2f", "#8a8f96")
 """For what is not a method: surfaces, demonstrations, fields."""
 
 LABELS = {
     "direct": "direct",
     "inconsistency": "inconsistency",
     "hybrid": "hybrid",
+    "robust": "robust (default)",
     "truth": "true policy",
     "observed": "demonstration",
     "training": "training data",
     "held out": "held out",
 }
 
-MARKERS = {"direct": "circle", "inconsistency": "square", "hybrid": "diamond"}
-DASHES = {"direct": "dash", "inconsistency": "dot", "hybrid": "solid", "truth": "solid", "observed": "solid"}
+MARKERS = {"direct": "o", "inconsistency": "s", "hybrid": "D", "robust": "^"}
+DASHES = {"direct": "--", "inconsistency": ":", "hybrid": "-", "robust": "-"}
 
 INK = "#33373d"
 RULE = "#e3e6ea"
 
+THEMED = {INK: "var(--ink)", COLOURS["truth"]: "var(--ink)", RULE: "var(--rule)", "#ffffff": "var(--paper)"}
+"""Colours that the page decides, by its variables: they are others in the dark."""
 
-def plotly(module: str = "graph_objects") -> ModuleType:
-    """Import a module of plotly, or say which extra brings it."""
-    return require_extra(f"plotly.{module}", "viz")
+_KEY = "key:"
+_POWERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def figure(title: str = "", x: str = "", y: str = "", height: int = 400, **layout: Any) -> Any:
-    """An empty plotly figure in the house style.
+@contextmanager
+def _look() -> Iterator[None]:
+    sheet = str(resources.files(__package__) / "look.mplstyle")
+    with require_extra("matplotlib.style", "viz").context(sheet), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of limits that are too near to draw
+        yield
+
+
+def figure(title: str = "", x: str = "", y: str = "", height: int = 320, rows: int = 1, **axes: Any) -> Any:
+    """An empty picture in the house style, one pixel for each of its points.
 
     Parameters
     ----------
     title, x, y : str
-        Of the figure and its axes.
+        Of the picture and its axes.
     height : int
         Pixels; the width is that of the page.
-    **layout
-        Anything else for plotly's layout.
+    rows : int
+        Axes below each other, with one horizontal axis.
+    **axes
+        For matplotlib's axes.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
     """
-    made = plotly().Figure()
-    dress(made, title, height)
-    made.update_layout(xaxis_title_text=x, yaxis_title_text=y, **layout)
+    with _look():
+        made = require_extra("matplotlib.figure", "viz").Figure(figsize=(1.0, height / 72))
+        made.subplots(rows, sharex=True, subplot_kw=axes)
+        made.axes[0].set_title(title)
+        made.axes[-1].set_xlabel(x)
+        made.axes[0].set_ylabel(y)
     return made
 
 
-def dress(made: Any, title: str, height: int) -> None:
-    """Put the house style on a plotly figure."""
-    look = json.loads((resources.files(__package__) / "look.json").read_text())
-    made.update_layout(look["layout"], title_text=title, height=height, font_color=INK, margin_t=38 if title else 14)
-    for each in (made.update_xaxes, made.update_yaxes):
-        each(look["axis"], gridcolor=RULE)
+def keyed(key: str, **look: Any) -> dict[str, Any]:
+    """Arguments of an artist that a key of the page shows and hides, in the colour of the key."""
+    return {"gid": f"{_KEY}{key}", "color": COLOURS.get(key, PALETTE[0])} | look
 
 
-def legend(key: str, first: bool = True) -> dict[str, Any]:
-    """Arguments that put a trace into the legend under a key, so that one click hides all of that key."""
-    return {"name": LABELS.get(key, key), "legendgroup": key, "showlegend": first}
+def log_axis(axes: Any, axis: str = "y") -> None:
+    """Make an axis logarithmic, with powers as text."""
+    with _look():
+        getattr(axes, f"set_{axis}scale")("log")
+    own = getattr(axes, f"{axis}axis")
+    own.set_major_formatter(lambda value, _: power(value))
+    own.set_minor_formatter(lambda *_: "")
 
 
-def translucent(colour: str, opacity: float) -> str:
-    """A colour such as ``#0072b2`` with an opacity."""
-    red, green, blue = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
-    return f"rgba({red},{green},{blue},{opacity})"
+def power(value: float) -> str:
+    """A number of an axis, such as ``0.1``, ``20`` or ``10⁻⁶``."""
+    exponent = round(float(np.log10(value)))
+    return f"{value:g}" if abs(exponent) < 4 else f"10{str(exponent).translate(_POWERS)}"
 
 
-def log_axis(made: Any, **axis: Any) -> None:
-    """Make the vertical axis logarithmic, with a tick for each power of ten unless told otherwise."""
-    # plotly writes powers a quarter larger than other ticks.
-    made.update_yaxes(**{"type": "log", "dtick": 1, "tickfont_size": 10, **axis})
+def readable(colour: Sequence[float]) -> str:
+    """Black or white, whichever is read better on a colour (red, green, blue from 0 to 1, with or without alpha)."""
+    linear = [((value + 0.055) / 1.055) ** 2.4 if value > 0.04045 else value / 12.92 for value in colour[:3]]
+    light = float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
+    return "#fefefe" if 1.05 / (light + 0.05) > (light + 0.05) / 0.05 else "#000000"  # themed colours would change
+
+
+def svg(made: Any, width: int, alternative: str) -> str:
+    """A picture as SVG to stand in a page: its text is text, its colours follow the page, and its keys can be hidden.
+
+    Parameters
+    ----------
+    made : matplotlib.figure.Figure
+    width : int
+        Pixels; the page scales it.
+    alternative : str
+        What it shows, for those who cannot see it.
+    """
+    made.set_figwidth(width / 72)
+    stream = io.StringIO()
+    with _look():
+        made.savefig(stream, format="svg", metadata={"Date": None})
+    text = stream.getvalue()
+    text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text[text.index("<svg") :], flags=re.DOTALL)
+    text = re.sub(r"\n\s*", "\n", text)
+    text = re.sub(rf'<g id="{_KEY}([^"]*)"', r'<g data-key="\1"', re.sub(rf'<g id="(?!{_KEY})[^"]*"', "<g", text))
+    text = re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d)\d+|\n", r"\1", path[0]), text)
+    for colour, variable in THEMED.items():
+        text = text.replace(colour, variable)
+    opening = re.search(r'viewBox="[^"]*"', text)[0]  # type: ignore[index]
+    return f'<svg {opening} role="img" aria-label="{escape(alternative)}">' + text[text.index(">") + 1 :]
+
+
+def described(made: Any) -> str:
+    """What a picture shows, in words: titles, axes, and how far each of its lines reaches."""
+    return " ".join(_described(axes) for axes in made.axes if axes.get_label() != "<colorbar>")
+
+
+def _described(axes: Any) -> str:
+    title, x, y = axes.get_title(loc="left"), axes.get_xlabel(), axes.get_ylabel()
+    flat = axes.name != "3d"
+    lines: dict[str, list[Array]] = {}
+    for line in axes.lines if flat else ():
+        if str(line.get_gid()).startswith(_KEY):
+            lines.setdefault(line.get_gid().removeprefix(_KEY), []).append(np.asarray(line.get_ydata(), float))
+    said = [f"{LABELS.get(key, key)} {_reach(np.concatenate(values))}" for key, values in lines.items()]
+    plotted = f"{y} over {x}" if x and y else x or y
+    head = ": ".join(filter(None, (title, plotted))) or "Movements in three dimensions"
+    return f"{head}{'; ' if said else ''}{', '.join(said)}."
+
+
+def _reach(values: Array) -> str:
+    values = values[np.isfinite(values)]
+    return f"from {values.min():.3g} to {values.max():.3g}" if len(values) else "empty"

@@ -25,7 +25,7 @@ from ..datasets import load_fingertip
 from ..systems.arm import LWR3, Arm
 from . import mechanisms
 from .journal import Journal
-from .trials import Progress, Result, run_trials
+from .trials import Progress, Result, reproduced, run_trials
 from .truths import spread, with_noise
 
 Demos = Sequence[uc.Demonstration]
@@ -280,6 +280,21 @@ def _circling(states: Array) -> Array:
     """CCL's limit cycle."""
     radial = (0.75 - (states**2).sum(axis=1))[:, None] * states
     return -radial + np.column_stack([states[:, 1], -states[:, 0]])
+
+
+def verdict(result: Result) -> uc.evaluation.verdicts.Verdict:
+    """Whether what held simulated movements is found, and nothing wrong said with confidence."""
+    found = [row for row in result.rows if row["features"] == "auto"]
+    right = float(np.mean([row["rank_right"] for row in found]))
+    every = result.tables["mechanisms"][-1]
+    wrong = every["confident_and_wrong"] / max(every["confident"], 1)
+    return reproduced(
+        {
+            f"the number of held directions is right in {right:.0%}": right >= uc.evaluation.verdicts.GOOD,
+            f"{wrong:.1%} of confident verdicts on mechanisms are wrong": wrong <= 0.05,
+        },
+        "What is learnt with features of its own choice (“auto”).",
+    )
 
 
 def headlines(result: Result) -> list[str]:

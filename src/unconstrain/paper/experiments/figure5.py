@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+import unconstrain as uc
+
 from . import toy
 from .journal import Journal
-from .trials import LABELS, Progress, Result, errors, row, run_trials
+from .trials import CLOSE, LABELS, Progress, Result, errors, reproduced, row, run_trials
 
 DRAWN: dict[str, int | None] = {"step": None, "trajectory": 1}
 """How many angles a trajectory has: one for each step, or one. The paper does not say; the first is reported."""
@@ -67,6 +69,16 @@ def ratios(rows: Sequence[dict[str, Any]], metric: str) -> dict[float, float]:
     mean = {(row["method"], row["theta_max"]): row[f"{metric}_mean"] for row in rows}
     widest = dict.fromkeys(row["theta_max"] for row in rows)
     return {w: mean["hybrid", w] / min(mean["direct", w], mean["inconsistency", w]) for w in widest}
+
+
+def verdict(result: Result) -> uc.evaluation.verdicts.Verdict:
+    """Whether the hybrid follows the better of the other two along the whole axis."""
+    by_angle = ratios(result.rows, "nupe")
+    worst = max(by_angle, key=by_angle.__getitem__)
+    claim = (
+        f"the hybrid follows the better of the two: nUPE at worst {by_angle[worst]:.2f} times, at θmax {worst:g} rad"
+    )
+    return reproduced({claim: by_angle[worst] <= CLOSE}, "Ratios of means over the data sets.")
 
 
 def headlines(result: Result) -> list[str]:

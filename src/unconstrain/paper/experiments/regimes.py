@@ -33,7 +33,7 @@ from ..systems.limit_cycle import LimitCycle
 from ..systems.pendulum import Pendulum
 from . import toy
 from .journal import Journal
-from .trials import Progress, Result, errors_of, row, run_trials
+from .trials import Progress, Result, errors_of, reproduced, row, run_trials
 from .truths import true_policy, true_projections, was_free, with_noise
 
 PLANAR = ("none", "random", "half", "quarter free", "0.1", "0.3", "0.6", "1", "1.5")
@@ -171,6 +171,22 @@ def demonstrate(
         constraints = None if drawn is None else [drawn]
         demos += uc.rollout(flow, start[None], settings.steps, settings.dt, constraints, name=system)
     return toy.split(demos, settings.test_share, rng)
+
+
+def verdict(result: Result) -> uc.evaluation.verdicts.Verdict:
+    """Whether the default learner is better than the paper's hybrid at every noise level."""
+    ours = [one for one in result.tables["summary"] if one["method"] == DEFAULT]
+    claims = {
+        f"at {one['noise']:.0%} noise {DEFAULT} has {one['to_paper']:.2f} times the nUPE of the paper’s hybrid": bool(
+            one["to_paper"] < 1.0
+        )
+        for one in ours
+    }
+    worst = max(ours, key=lambda one: one["worst_to_oracle"])
+    trust = (
+        f"Geometric means; single regimes are up to {worst['worst_to_oracle']:.1f} times the oracle ({worst['worst']})."
+    )
+    return reproduced(claims, trust)
 
 
 def headlines(result: Result) -> list[str]:

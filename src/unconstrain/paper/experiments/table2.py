@@ -188,6 +188,22 @@ def agreement(rows: Sequence[dict[str, Any]]) -> tuple[int, int]:
     return sum(near), len(near)
 
 
+def verdict(result: Result) -> uc.evaluation.verdicts.Verdict:
+    """How many of the printed values are found, read as the paper words it."""
+    verdicts = uc.evaluation.verdicts
+    near, count = agreement([one for one in result.rows if one["method"] in METHODS])
+    mark, word = verdicts.Mark.DOUBTFUL, "in part"
+    if near >= verdicts.GOOD * count or near < count / 2:
+        mark, word = (verdicts.Mark.GOOD, "yes") if near >= count / 2 else (verdicts.Mark.BAD, "no")
+    return verdicts.Verdict(
+        mark,
+        f"Reproduced: {word}. {near} of {count} printed values within one printed s.d. or 10 %.",
+        "The order of the methods, and the values that are near.",
+        "" if word == "yes" else "Single values: the paper leaves weights, α and the kind of test samples open.",
+        "Compare the readings below; test samples and fresh trajectories stand apart.",
+    )
+
+
 def headlines(result: Result) -> list[str]:
     """What agrees with the paper; the hybrid beside it, in a sentence for each constraint; and what knows more."""
     said = []

@@ -20,6 +20,7 @@ METRICS = ("nupe", "ncpe", "ninc")
 LABELS = {"nupe": "nUPE", "ncpe": "nCPE", "ninc": "normalised inconsistency"}
 """What people call them."""
 
+
 Progress = Callable[[int, int], None]
 """Called with how many trials are done, and of how many."""
 
@@ -124,3 +125,33 @@ def row(method: str, values: Sequence[Sequence[float]], **where: Any) -> dict[st
 def _on_one_thread(trial: Callable[..., Any], call: Sequence[Any]) -> Any:
     with threadpool_limits(1):
         return trial(*call)
+
+
+CLOSE = 1.25
+"""A method follows another whose error it exceeds by no more than a quarter: figures in print show no finer."""
+
+FAILS = 10.0
+"""And fails where it has so many times the error of another."""
+
+
+def reproduced(claims: Mapping[str, bool], trust: str = "", then: str = "") -> uc.evaluation.verdicts.Verdict:
+    """Judge whether an experiment shows what the paper says.
+
+    Parameters
+    ----------
+    claims : mapping
+        Claims in words, and whether they hold here.
+    trust, then : str
+        What the numbers can be trusted in, and what to do next.
+    """
+    mark = uc.evaluation.verdicts.Mark
+    missed = [claim for claim, holds in claims.items() if not holds]
+    if not missed:
+        told = "; ".join(claims)
+        said = f"Reproduced: yes. {told[:1].upper()}{told[1:]}."
+        return uc.evaluation.verdicts.Verdict(mark.GOOD, said, trust, next=then)
+    held = len(claims) - len(missed)
+    word = "in part" if 2 * held >= len(claims) else "no"
+    said = f"Reproduced: {word}, {held} of {len(claims)} claims."
+    doubt = f"That {'; that '.join(missed)}."
+    return uc.evaluation.verdicts.Verdict(mark.DOUBTFUL if word == "in part" else mark.BAD, said, trust, doubt, then)

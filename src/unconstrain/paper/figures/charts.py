@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...pages.figures.style import COLOURS, LABELS, MARKERS, METHODS, figure, legend, log_axis, translucent
+from ...base.arrays import Array, require_extra
+from ...pages.figures.style import COLOURS, DASHES, MARKERS, METHODS, figure, keyed, log_axis, power, readable
 
 
 def bands(
@@ -39,21 +39,20 @@ def bands(
         Pixels.
     """
     made = figure(title, *labels, height=height)
+    [axes] = made.axes
     means = np.concatenate([mean for mean, _ in curves.values()])
     floor = 0.5 * means[means > 0].min() if log and (means > 0).any() else 0.0
     for key, (mean, sd) in curves.items():
-        edge = np.concatenate([mean + sd, np.maximum(mean - sd, floor)[::-1]])
-        shade = {"fill": "toself", "fillcolor": translucent(COLOURS[key], 0.15), "line": {"width": 0}}
-        around = np.concatenate([x, x[::-1]])
-        made.add_scatter(x=around, y=edge, mode="lines", hoverinfo="skip", **shade, **legend(key, first=False))
+        axes.fill_between(x, np.maximum(mean - sd, floor), mean + sd, **keyed(key, alpha=0.15, linewidth=0))
     for key, (mean, _) in curves.items():
-        look = {"line": {"color": COLOURS[key], "width": 2}, "marker": {"symbol": MARKERS[key], "size": 7}}
-        made.add_scatter(x=x, y=mean, mode="lines+markers", **look, **legend(key))
+        look = {"marker": MARKERS[key], "linestyle": DASHES.get(key, "-"), "markersize": 5}
+        axes.plot(x, mean, **keyed(key, **look))
     if log:
+        log_axis(axes)
         high = max(float((mean + sd).max()) for mean, sd in curves.values())
-        log_axis(made, range=[np.log10(floor or 1e-12), np.log10(1.5 * (high or 1.0))])
+        axes.set_ylim(floor or 1e-12, 1.5 * (high or 1.0))
     elif top is not None:
-        made.update_yaxes(range=[0.0, top])
+        axes.set_ylim(0.0, top)
     return made
 
 
@@ -82,32 +81,26 @@ def dots(
         Pixels.
     """
     made = figure(title, "", label, height=height)
+    [axes] = made.axes
     place = dict(zip(METHODS, (-0.24, 0.0, 0.24), strict=True))
     at = np.arange(len(groups), dtype=np.float64)
     for key, pairs in values.items():
         mean, sd = np.array(pairs, dtype=np.float64).T
-        marker = {"color": COLOURS[key], "symbol": MARKERS[key], "size": 12}
-        bar = {"type": "data", "symmetric": False, "array": sd, "arrayminus": 0 * sd, "thickness": 1.4, "width": 5}
-        made.add_scatter(
-            x=at + place[key] - 0.045, y=mean, error_y=bar, mode="markers", marker=marker, **legend(key),
-            hovertemplate=f"{LABELS[key]}, ours: %{{y:.3g}}<extra></extra>",
-        )  # fmt: skip
+        look = {"marker": MARKERS[key], "markersize": 8}
+        for where, value, more in zip(at + place[key] - 0.045, mean, sd, strict=True):
+            axes.plot([where, where], [value, value + more], **keyed(key, linewidth=1.3))
+        axes.plot(at + place[key] - 0.045, mean, **keyed(key, linestyle="", **look))
         theirs = [np.nan if value is None else value for value in printed.get(key, [None] * len(at))]
-        empty = marker | {"symbol": f"{MARKERS[key]}-open", "line": {"width": 2}}
-        made.add_scatter(
-            x=at + place[key] + 0.045, y=theirs, mode="markers", marker=empty, **legend(key, first=False),
-            hovertemplate=f"{LABELS[key]}, paper: %{{y:.3g}}<extra></extra>",
-        )  # fmt: skip
-    made.update_xaxes(tickvals=at, ticktext=list(groups), range=[-0.5, len(groups) - 0.5], showgrid=False, ticks="")
-    log_axis(made)
+        axes.plot(at + place[key] + 0.045, theirs, **keyed(key, linestyle="", fillstyle="none", **look))
+    axes.set_xticks(at, groups)
+    axes.set_xlim(-0.5, len(groups) - 0.5)
+    axes.grid(axis="x", visible=False)
+    log_axis(axes)
     return made
 
 
 RATIO_COLOURS = {"nUPE": "#56b4e9", "nCPE": "#e69f00"}
 """Of errors rather than methods, in :func:`ratios`."""
-
-
-_ROUND = [digit * 10.0**power for power in range(-3, 5) for digit in (1, 2, 5)]
 
 
 def ratios(x: Array, curves: Mapping[str, Array], *, labels: tuple[str, str], height: int = 380) -> Any:
@@ -124,11 +117,12 @@ def ratios(x: Array, curves: Mapping[str, Array], *, labels: tuple[str, str], he
         Pixels.
     """
     made = figure("", *labels, height=height)
-    for (name, values), symbol in zip(curves.items(), ("circle", "square", "diamond"), strict=False):
-        look = {"line": {"color": RATIO_COLOURS.get(name), "width": 2}, "marker": {"symbol": symbol, "size": 7}}
-        made.add_scatter(x=x, y=values, mode="lines+markers", **look, name=name, legendgroup=name)
-    made.add_hline(y=1.0, line={"color": COLOURS["truth"], "width": 1, "dash": "dash"})
-    made.update_yaxes(type="log", tickvals=_ROUND, ticktext=[f"{tick:g}" for tick in _ROUND])
+    [axes] = made.axes
+    for (name, values), marker in zip(curves.items(), "osD", strict=False):
+        axes.plot(x, values, **keyed(name, color=RATIO_COLOURS.get(name), marker=marker, markersize=5))
+    axes.axhline(1.0, color=COLOURS["truth"], linewidth=1, linestyle="--")
+    log_axis(axes)
+    axes.yaxis.set_minor_formatter(lambda value, _: power(value) if f"{value:e}"[0] in "25" else "")
     return made
 
 
@@ -148,21 +142,24 @@ def ratio_table(
     top : float
         What is beyond has the colour of the end.
     """
-    made = figure(title, "", "", height=30 * len(rows) + 190)
+    made = figure(title, height=26 * len(rows) + 150)
+    [axes] = made.axes
     logs = np.log10(np.where(values > 0, values, np.nan))
     end = float(np.log10(top))
-    texts = [[_short(one) for one in line] for line in values]
-    ticks = [-end, -end / 2, 0.0, end / 2, end]
-    bar = {"title": {"text": scale, "side": "right"}, "thickness": 14, "outlinewidth": 0, "tickvals": ticks}
-    bar |= {"ticktext": [f"{10.0**tick:.2g}" for tick in ticks], "len": 0.92, "y": 0.0, "yanchor": "bottom"}
-    made.add_heatmap(
-        x=list(columns), y=list(rows), z=np.clip(logs, -end, end), zmin=-end, zmax=end, xgap=1, ygap=1,
-        colorscale=[[0.0, COLOURS["direct"]], [0.5, "#ffffff"], [1.0, COLOURS["inconsistency"]]], colorbar=bar,
-        text=texts, texttemplate="%{text}", textfont={"size": 11}, hoverongaps=False,
-        hovertemplate="%{y}, %{x}: %{text}<extra></extra>",
-    )  # fmt: skip
-    made.update_xaxes(showgrid=False, ticks="", type="category", tickangle=-35)
-    made.update_yaxes(showgrid=False, ticks="", type="category", autorange="reversed")
+    shades = require_extra("matplotlib.colors", "viz").LinearSegmentedColormap.from_list(
+        "ratios", [COLOURS["direct"], "#f7f7f7", COLOURS["inconsistency"]]
+    )
+    cells = axes.pcolormesh(np.clip(logs, -end, end), cmap=shades, vmin=-end, vmax=end, edgecolor="none")
+    for row, column in np.ndindex(*values.shape):
+        text, colour = _short(float(values[row, column])), readable(cells.to_rgba(logs[row, column]))
+        axes.text(column + 0.5, row + 0.5, text, ha="center", va="center", fontsize=9, color=colour)
+    axes.set_xticks(np.arange(len(columns)) + 0.5, columns, rotation=35, ha="right")
+    axes.set_yticks(np.arange(len(rows)) + 0.5, rows)
+    axes.invert_yaxis()
+    axes.grid(visible=False)
+    bar = made.colorbar(cells, label=scale, ticks=[-end, 0.0, end])
+    bar.ax.set_yticklabels([f"{1 / top:g}", "1", f"{top:g}"])
+    bar.outline.set_visible(False)
     return made
 
 

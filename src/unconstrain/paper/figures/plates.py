@@ -1,16 +1,12 @@
-"""Plates that are wiped, and paths seen from above them."""
+"""Plates that are wiped."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ...base.arrays import Array
-from ...pages.figures.planes import broken, equal_axes, line_through
-from ...pages.figures.style import COLOURS, DASHES, figure, legend
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,39 +60,3 @@ class Quad:
     def flatten(self, states: Array) -> Array:
         """From space (N, 3) into the plane's coordinates (N, 2)."""
         return (states - self.centre) @ self.axes
-
-
-def paths(
-    lines: Mapping[str, Array],
-    *,
-    reach: float | None = None,
-    title: str = "",
-    labels: tuple[str, str] = ("first axis (m)", "second axis (m)"),
-    height: int = 460,
-) -> Any:
-    """Paths in a plane, each with a dot where it starts, with equal axes.
-
-    Parameters
-    ----------
-    lines : dict
-        Key to points (T, 2).
-    reach : float, optional
-        The axes span [−reach, reach]; what is beyond is not drawn.
-    title, labels, height
-        As in :func:`~unconstrain.pages.figures.vector_field`.
-    """
-    made = figure(title, *labels, height=height)
-    for key, line in lines.items():
-        seen = key == "observed"
-        made.add_trace(
-            line_through(broken(line) if seen else line, key, width=1.1 if seen else 2.2, dash=DASHES.get(key, "solid"))
-        )
-    for key, line in lines.items():
-        start = line[:1]
-        marker = {"color": COLOURS.get(key), "size": 8}
-        made.add_scatter(x=start[:, 0], y=start[:, 1], mode="markers", marker=marker, **legend(key, first=False))
-    equal_axes(made)
-    if reach is not None:
-        made.update_xaxes(range=[-reach, reach])
-        made.update_yaxes(range=[-reach, reach])
-    return made

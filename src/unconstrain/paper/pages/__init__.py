@@ -46,7 +46,7 @@ def page(result: Result) -> str:
     Raises
     ------
     MissingExtraError
-        If plotly or jinja2 is not installed.
+        If matplotlib or jinja2 is not installed.
     """
     return _PAGES.get(result.name, plain.page)(result)
 
@@ -67,7 +67,7 @@ def write(result: Result, directory: str | os.PathLike[str]) -> tuple[Path, Path
     Raises
     ------
     MissingExtraError
-        If plotly or jinja2 is not installed; the JSON is written all the same.
+        If matplotlib or jinja2 is not installed; the JSON is written all the same.
     WriteError
         If a file cannot be written.
     """

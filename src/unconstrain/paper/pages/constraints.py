@@ -15,6 +15,7 @@ def page(result: Result) -> str:
     recorded = [html.section("The recording", _recording(result))] if result.details else []
     return html.document(
         "The constraint, learnt",
+        constraints.verdict(result),
         "Nobody says what held these movements: it is learnt from them, in closed form, and then compared with the "
         "truth on fresh trajectories. nPPE is how far the learnt projection is from the true one as the policy sees "
         "it, nPOE how much of the observed motion it would take away. Systems and counts are those of the library CCL.",
@@ -52,7 +53,7 @@ def _recording(result: Result) -> html.Markup:
     rows = [
         [str(row["blocks"]), html.number(row["s_each"]), html.number(row["npoe"])] for row in result.tables["recorded"]
     ]
-    table = html.table(["blocks", "s each", "nPOE where held out"], rows)
+    table = html.table(["blocks", "s each", "nPOE where held out"], rows, note="One block held out at a time.")
     return html.markup("{}{}").format(held_directions(details["learnt"], [details["demonstration"]]), table)
 
 

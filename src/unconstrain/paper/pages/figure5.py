@@ -14,7 +14,7 @@ from ..figures import charts
 from . import parts, table1
 
 TITLES = {metric: LABELS[metric] for metric in ("nupe", "ncpe")}
-ANGLE = "how far constraints vary, θ<sub>max</sub> (rad)"
+ANGLE = "how far constraints vary, θmax (rad)"
 
 
 def page(result: Result) -> str:
@@ -23,6 +23,7 @@ def page(result: Result) -> str:
     per_step, per_trajectory = (_curves(rows) for rows in (result.rows, result.tables["per_trajectory"]))
     return html.document(
         "Figure 5: from one constraint to many",
+        figure5.verdict(result),
         html.markup(
             "Movement is allowed only along the policy turned by a random angle of at most θ<sub>max</sub>. At 0 the "
             "recordings are the policy itself; to the right the constraint takes away more, and differently at each "

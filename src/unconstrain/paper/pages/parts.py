@@ -30,7 +30,7 @@ def image(name: str, data: bytes, kind: str, alternative: str, caption: str) -> 
     name : str
         Of the picture within the page.
     data : bytes
-    kind : {"png", "gif"}
+    kind : {"png", "webp"}
     alternative : str
         What it shows, for those who cannot see it.
     caption : str

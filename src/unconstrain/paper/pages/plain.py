@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import unconstrain as uc
+
 from ...pages import html
 from ..experiments.trials import Result
+
+verdicts = uc.evaluation.verdicts
 
 
 def page(result: Result) -> str:
@@ -18,8 +22,9 @@ def page(result: Result) -> str:
     rows = [[_cell(row.get(name)) for name in header] for row in result.rows]
     return html.document(
         result.name,
+        verdicts.Verdict(verdicts.Mark.DOUBTFUL, "No verdict: nobody has said what these numbers should be."),
         "The numbers of this experiment, in plain units, one row for each method and setting.",
-        html.table(header, rows, left=len(texts)),
+        html.table(header, rows, note="All rows of the experiment.", left=len(texts)),
         html.settings_table(result.settings),
     )
 

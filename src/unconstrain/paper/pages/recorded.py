@@ -25,6 +25,7 @@ def page(result: Result) -> str:
     kinds = result.tables["kinds"]
     return html.document(
         "Learners on what people really do",
+        recorded.verdict(result),
         html.markup(
             "Movements that people made freely are hidden behind constraints that were drawn, and simulated "
             "demonstrators get into awkward situations: how near does each learner come to what was done, or would "
@@ -83,13 +84,20 @@ def _judgement(kinds: Sequence[Row]) -> html.Markup:
 def _errors(kinds: Sequence[Row]) -> html.Markup:
     methods = [*LEARNERS, DEFAULT]
     rows = [[_name(one), *(html.number(one[method]) for method in methods)] for one in kinds]
-    return html.folded("nUPE of every learner", html.table(["kind", *map(_broken, methods)], rows, rules=_rules(kinds)))
+    return html.folded(
+        "nUPE of every learner",
+        html.table(
+            ["kind", *map(_broken, methods)], rows, note="Geometric means over the data sets.", rules=_rules(kinds)
+        ),
+    )
 
 
 def _meanings(kinds: Sequence[Row]) -> html.Markup:
     names = dict.fromkeys(one["kind"] for one in kinds)
     rows = [[name, described(name)] for name in names]
-    return html.folded("What each kind is", html.table(["kind", "what happens"], rows, left=2))
+    return html.folded(
+        "What each kind is", html.table(["kind", "what happens"], rows, note="Every kind of data, in words.", left=2)
+    )
 
 
 def _knowledge(kinds: Sequence[Row]) -> html.Markup:
@@ -122,6 +130,7 @@ def _spoiled(kinds: Sequence[Row]) -> list[html.Markup]:
 def _sets(sets: Sequence[Row]) -> html.Markup:
     methods = [*LEARNERS, DEFAULT]
     header = ["kind", "data set", *map(_broken, methods), "best", "which", "floor", f"{DEFAULT} /\nsafe"]
+    note = "nUPE of each data set, and the best candidate of it."
     rows = [
         [
             _name(one),
@@ -134,7 +143,7 @@ def _sets(sets: Sequence[Row]) -> html.Markup:
         ]
         for one in sets
     ]
-    return html.folded(f"{len(rows)} data sets", html.table(header, rows, left=2, rules=_rules(sets)))
+    return html.folded(f"{len(rows)} data sets", html.table(header, rows, note=note, left=2, rules=_rules(sets)))
 
 
 def _name(one: Row) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...pages import html
-from ..experiments.regimes import DEFAULT, JACOBIAN, KNOWN, ORACLE, PAPER
+from ..experiments.regimes import DEFAULT, JACOBIAN, KNOWN, ORACLE, PAPER, verdict
 from ..experiments.trials import Result
 from ..figures import charts
 from . import parts
@@ -21,6 +21,7 @@ def page(result: Result) -> str:
     systems = ", ".join(dict.fromkeys(row["system"] for row in result.rows))
     return html.document(
         "Learners in every regime of constraints and noise",
+        verdict(result),
         html.markup(
             "Demonstrators ({systems}) move under constraints of many kinds, from none to some that are drawn at "
             "random, with and without noise on the recorded actions. Every learner sees the same recordings. The "

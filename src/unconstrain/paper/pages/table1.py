@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ...base.arrays import Array
 from ...pages import figures, html
+from ..experiments.table1 import verdict
 from ..experiments.trials import METRICS, Result
 from ..figures import charts
 from . import parts
@@ -28,6 +30,7 @@ def page(result: Result) -> str:
     """Ours beside the paper's, as a table and as dots."""
     return html.document(
         "Table I: free and randomly constrained demonstrations",
+        verdict(result),
         html.markup(
             "A point moves in the plane on a limit cycle. It is recorded either <b>free</b> or while a rail that "
             "nobody tells the learner about holds it to one direction, and the rail turns twice on the way. Three "
@@ -42,17 +45,19 @@ def page(result: Result) -> str:
     )
 
 
-def table(given: list[dict[str, Any]], trials: int, trials_of_paper: int) -> html.Markup:
+def table(
+    given: list[dict[str, Any]], trials: int, trials_of_paper: int, metrics: Sequence[str] = METRICS
+) -> html.Markup:
     """Ours beside the paper's, row by row."""
     header = ["method", "data"]
-    for metric in METRICS:
+    for metric in metrics:
         header += [f"{TITLES[metric]}\nours", "median", "paper"]
     rows, rules = [], []
     for index, row in enumerate(given):
         if index and row["method"] != given[index - 1]["method"]:
             rules.append(index)
         cells = [parts.label(row["method"]), WORDS.get(row["constraint"], row["constraint"])]
-        for metric in METRICS:
+        for metric in metrics:
             median = html.number(100.0 * row[f"{metric}_median"])
             cells += [parts.mean_sd(*_pair(row, metric)), median, parts.mean_sd(*_pair(row, f"paper_{metric}"))]
         rows.append(cells)

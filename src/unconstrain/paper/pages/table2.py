@@ -13,7 +13,7 @@ from . import table1
 HELD = "coordinates of the hand that are held"
 
 READINGS = (
-    "The first rows take the paper word for word: a fifth of the samples of the trajectories that are learnt from is "
+    "These rows take the paper word for word: a fifth of the samples of the trajectories that are learnt from is "
     "held out for testing, samples have no weights, and one α serves all rows. What else the name of a method says is "
     "another reading of the paper, or what it does not have: see the settings."
 )
@@ -23,6 +23,7 @@ def page(result: Result) -> str:
     """Errors against the number of constraints, and ours beside the paper's."""
     return html.document(
         "Table II: an arm whose hand is held",
+        table2.verdict(result),
         html.markup(
             "An arm of seven joints moves away from its joint limits while one to six coordinates of its hand "
             "(position, then orientation) are kept still. Nobody tells the learner that, and it has to find how the "
@@ -32,13 +33,19 @@ def page(result: Result) -> str:
             "low everywhere."
         ),
         html.section("Errors against the constraint", _curves(result)),
-        html.section(
-            "Beside the paper", html.paragraph(READINGS), table1.table(result.rows, table1.trials(result), 50)
-        ),
+        html.section("Beside the paper", *_readings(result)),
         html.section("The same, to compare at a glance", table1.dots(result)),
         html.section("With the kinematics known", *_kinematics(result)),
         html.settings_table(result.settings),
     )
+
+
+def _readings(result: Result) -> list[html.Markup]:
+    """The paper's own reading, and others folded away."""
+    own = [row for row in result.rows if row["method"] in table2.METHODS]
+    others = [row for row in result.rows if row["method"] not in table2.METHODS]
+    shown, more = (table1.table(rows, table1.trials(result), 50, ("nupe", "ncpe")) for rows in (own, others))
+    return [shown, html.paragraph(READINGS), html.folded("Other readings, and fresh trajectories", more)]
 
 
 def _kinematics(result: Result) -> list[html.Markup]:
@@ -49,7 +56,7 @@ def _kinematics(result: Result) -> list[html.Markup]:
         f"“{table2.JACOBIAN}” is the learner “robust” that is told the Jacobian of the hand, and finds by itself which "
         "of its rows are held. It knows more than the methods of the paper. Both are tested on fresh trajectories."
     )
-    return [html.paragraph(text), table1.table(rows, count, 50)] if rows else []
+    return [html.paragraph(text), table1.table(rows, count, 50, ("nupe", "ncpe"))] if rows else []
 
 
 def _curves(result: Result) -> html.Markup:

@@ -11,13 +11,20 @@ import unconstrain as uc
 from ...base.arrays import Array
 from ...pages import figures, html
 from ...risks import null_space_projection, project
+from ..experiments import washing
 from ..experiments.trials import Result
 from ..experiments.washing.learning import Split
 from ..experiments.washing.surfaces import Surface
 from ..figures import plates
 from ..systems.wiping import WipingPolicy
 from .washing_arm import on_the_arm
-from .washing_scores import bars, scores
+from .washing_scores import LEARNERS, bars, scores
+
+BESIDE = ("direct", "robust")
+"""Learners whose velocities are drawn over time; more would hide each other."""
+
+MOST_CASES = 4
+"""Velocities are drawn for so many of the plates that nobody learnt from."""
 
 ARROWS = 11
 """Fields are drawn on so many points along each axis of a plate."""
@@ -54,9 +61,10 @@ def page(result: Result) -> str:
     ]
     return html.document(
         "Wiping a car rim, as recorded" if real else "Washing a car, simulated",
+        washing.verdict(result),
         _lead(real),
-        html.section("How well each method does", scores(result), bars(result)),
         html.section("On the arm", *on_the_arm(result)),
+        html.section("How well each method does", scores(result), bars(result)),
         html.section("The demonstrations", _demonstrations(splits)),
         html.section("The policy on plates that nobody learnt from", _fields(cases, real)),
         html.section("Predicted and observed velocity on these plates", _velocities(cases)),
@@ -81,7 +89,7 @@ def _lead(real: bool) -> html.Markup:
     return (recorded if real else simulated) + (
         " Nobody tells the learner where the plates are. Direct learning averages them into the skill; "
         "inconsistency alone removes them, but trusts noisy directions as much as clear ones; the hybrid weighs the "
-        "one against the other."
+        "one against the other, and robust, the default of fit, chooses with nothing set for this job."
     )
 
 
@@ -97,51 +105,48 @@ def _demonstrations(splits: list[Split]) -> html.Markup:
             "Each translucent plane is the one nearest to a bout; bouts of one colour share a tilt, and each tilt "
         )
         caption += "is held out once."
-    tracks, corners = [], {}
+    tracks, corners = [], []
     for key, surface in kinds:
         for demo, normals in zip(surface.demonstrations, surface.normals, strict=True):
-            tracks.append((key, demo.name, demo.states))
-            corners[demo.name] = plates.Quad.around(demo.states, normals["plane"]).corners
+            tracks.append((key, demo.states))
+            corners.append((key, plates.Quad.around(demo.states, normals["plane"]).corners))
     keys = tuple(dict.fromkeys(key for key, _ in kinds))
     colours = {key: figures.COLOURS.get(key, figures.PALETTE[at % len(figures.PALETTE)]) for at, key in enumerate(keys)}
     return html.picture(
         "demonstrations",
         [figures.movements(tracks, corners)],
-        f"{caption} Positions are relative to the middle of each plate. Drag to turn, scroll to zoom.",
+        f"{caption} Positions are relative to the middle of each plate.",
         keys=keys,
         colours=colours,
     )
 
 
 def _fields(cases: list[Case], real: bool) -> html.Markup:
-    panels = []
-    for case in cases:
-        plate = case.plate
-        points = plate.grid(ARROWS)
-        states = plate.place(points)
-        fields = {name: case.split.policies[name](states) @ plate.axes for name in figures.METHODS}
-        if not real:
-            fields["truth"] = WipingPolicy()(states) @ plate.axes
-        demo = case.demonstration
-        reference = (demo.truth.policy if demo.truth is not None else demo.actions) @ plate.axes
-        longest = float(np.linalg.norm(reference, axis=1).max())
-        panels.append(
-            figures.vector_field(
-                points,
-                fields,
-                longest=longest,
-                scale=2.6 * plate.half / ARROWS / longest,
-                trajectories=[plate.flatten(demo.states)],
-                trajectories_are="held out",
-                title=case.title,
-                labels=_axis_labels(case),
-                height=480,
-            )
+    """A panel for each learner, so that no arrow hides another, on the first of these plates."""
+    case, plate = cases[0], cases[0].plate
+    points = plate.grid(ARROWS)
+    states = plate.place(points)
+    truth = {} if real else {"truth": WipingPolicy()(states) @ plate.axes}
+    demo = case.demonstration
+    reference = (demo.truth.policy if demo.truth is not None else demo.actions) @ plate.axes
+    longest = float(np.linalg.norm(reference, axis=1).max())
+    panels = [
+        figures.vector_field(
+            points,
+            truth | {name: case.split.policies[name](states) @ plate.axes},
+            longest=longest,
+            scale=2.6 * plate.half / ARROWS / longest,
+            trajectories=[plate.flatten(demo.states)],
+            trajectories_are="held out",
+            title=f"{figures.LABELS[name]}, {case.title}",
+            labels=_axis_labels(case),
         )
+        for name in LEARNERS
+    ]
     against = (
         "The pink line is the demonstration that was held out; arrows should follow it."
         if real
-        else "Thin black arrows are the true policy; the pink line is the demonstration that was held out."
+        else "Thin arrows are the true policy; the pink line is the demonstration that was held out."
     )
     return html.picture(
         "fields",
@@ -149,25 +154,25 @@ def _fields(cases: list[Case], real: bool) -> html.Markup:
         f"Learnt velocities, projected onto the plate and seen from above it. {against} Away from it "
         "nobody recorded anything, and all of them guess. Arrows are not to the scale of the axes, and those that are "
         f"longer than the longest {'observed' if real else 'true'} one on the pink line are cut to it.",
-        keys=(*(() if real else ("truth",)), *figures.METHODS, "held out"),
+        keys=(*(() if real else ("truth",)), *LEARNERS, "held out"),
     )
 
 
 def _velocities(cases: list[Case]) -> html.Markup:
     panels = []
-    for case in cases:
+    for case in cases[:MOST_CASES]:
         demo = case.demonstration
         onto = null_space_projection(case.normal[None, :])
-        series = {name: project(onto, case.split.policies[name](demo.states)) for name in figures.METHODS}
+        series = {name: project(onto, case.split.policies[name](demo.states)) for name in BESIDE}
         times = demo.times if demo.times is not None else np.arange(len(demo), dtype=np.float64)
-        names = [f"v<sub>{axis}</sub> (m/s)" for axis in "xyz"]
+        names = [f"v{axis} (m/s)" for axis in "xyz"]
         panels.append(figures.over_time(times, series | {"observed": demo.actions}, names, title=case.title))
     return html.picture(
         "velocities",
         panels,
-        "Velocity in world coordinates. Black is what was observed, coloured what each method predicts at the observed "
+        "Velocity in world coordinates. Thin is what was observed, coloured what each method predicts at the observed "
         "positions once its prediction is projected onto the plate (N π̃).",
-        keys=("observed", *figures.METHODS),
+        keys=("observed", *BESIDE),
     )
 
 
@@ -185,7 +190,9 @@ def _rollouts(splits: list[Split]) -> html.Markup:
             if len(outside):
                 left.append(f"{figures.LABELS[name]} after {_seconds(run, outside[0])} on {case.title}")
             lines[name] = path[: outside[0] + 1] if len(outside) else path
-        panels.append(plates.paths(lines, reach=reach, title=case.title, labels=_axis_labels(case), height=480))
+        panels.append(
+            figures.paths(list(lines.items()), reach=reach, title=case.title, labels=_axis_labels(case), height=480)
+        )
     longest = next(iter(splits[0].rollouts.values()))
     escaped = f" These left the picture: {'; '.join(left)}." if left else ""
     return html.picture(
@@ -194,7 +201,7 @@ def _rollouts(splits: list[Split]) -> html.Markup:
         f"Each learnt policy, started where the demonstration starts (dot) and followed for {_seconds(longest, -1)} "
         "under the plate’s constraint, seen from above the plate. "
         f"A policy that drifts off or falls into the middle would not wipe.{escaped}",
-        keys=("observed", *figures.METHODS),
+        keys=("observed", *LEARNERS),
     )
 
 

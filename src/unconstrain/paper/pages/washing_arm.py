@@ -19,7 +19,7 @@ from ..systems.arm import LWR3
 from . import parts
 
 STATEMENT = (
-    "The hybrid policy gives a velocity at every position; projected onto the plate it becomes joint velocities, "
+    "The default policy gives a velocity at every position; projected onto the plate it becomes joint velocities, "
     "together with standing upright on the plate and an admittance that holds the pressing force; what that leaves "
     "free returns the arm to a resting posture. Torques move the arm, and a spring in the sponge meets the plate. "
     "Farther than {reach:g} cm from where anybody demonstrated, the arm goes back: where recordings only show a steady "
@@ -45,13 +45,13 @@ def _pictures(shown: Reproduction, wipe: Wipe) -> html.Markup:
     name = f"plate {shown.plate.name}, which nobody {'wiped' if shown.demonstration is None else 'learnt from'}"
     try:
         moving = parts.image(
-            "animation", animation(film(wipe)), "gif", f"The arm wipes a plate tilted {shown.plate.name}",
+            "animation", animation(film(wipe)), "webp", f"The arm wipes a plate tilted {shown.plate.name}",
             f"The arm on {name}, as fast as it is. The line is the path of the sponge.",
         )  # fmt: skip
         if shown.demonstration is None:
             return moving
         return moving + parts.image(
-            "strip", strip(shown.demonstration, wipe), "png", "A hand wipes a plate; below, the arm wipes it",
+            "strip", strip(shown.demonstration, wipe), "webp", "A hand wipes a plate; below, the arm wipes it",
             "One turn of the demonstration on this plate (above, positions as the camera saw them), and one of the "
             "reproduction (below), like figure 6 of the paper. The demonstration was not learnt from.",
         )  # fmt: skip
@@ -80,20 +80,21 @@ def _tracks(wiped: list[tuple[Reproduction, Wipe]]) -> html.Markup:
     for one, wipe in wiped:
         plate = plates.Quad.around(wipe.positions, wipe.plate.rotation[:, 2], margin=1.6)
         lines = {} if one.demonstration is None else {"observed": plate.flatten(one.demonstration.states)}
-        lines["hybrid"] = plate.flatten(wipe.positions)
+        lines["robust"] = plate.flatten(wipe.positions)
         title = f"{one.plate.name} ({'seen' if one.seen else 'unseen'})"
         labels = ("in the plate (m)", "in the plate (m)")
-        panels.append(plates.paths(lines, reach=plate.half, title=title, labels=labels, height=400))
-        series = {"hybrid": np.column_stack([wipe.forces])}
-        force = figures.over_time(wipe.times, series, ["force (N)"], title="normal force", row_height=310)
-        panels.append(force.update_yaxes(rangemode="tozero"))
+        panels.append(figures.paths(list(lines.items()), reach=plate.half, title=title, labels=labels))
+        series = {"robust": np.column_stack([wipe.forces])}
+        force = figures.over_time(wipe.times, series, ["force (N)"], title=f"normal force, {title}", row_height=340)
+        force.axes[0].set_ylim(bottom=0.0)
+        panels.append(force)
     return html.picture(
         "arm-paths",
         panels,
-        "The sponge on each plate, seen from above it, with the hand’s strokes in black where there are any; beside it "
+        "The sponge on each plate, seen from above it, with the hand’s strokes thin where there are any; beside it "
         "the normal force between sponge and plate. Zero would be lost contact.",
-        keys=("observed", "hybrid"),
-        labels={"hybrid": "arm", "observed": "hand"},
+        keys=("observed", "robust"),
+        labels={"robust": "arm", "observed": "hand"},
         least=380,
     )
 

@@ -13,7 +13,8 @@ Row = dict[str, Any]
 KINDS = {"plane": "normal of the plane", "tool": "axis of the tool"}
 
 
-_COLUMNS = (*figures.METHODS, "robust")
+LEARNERS = (*figures.METHODS, "robust")
+"""The paper's methods, and the default learner."""
 
 
 def scores(result: Result) -> html.Markup:
@@ -30,21 +31,21 @@ def bars(result: Result) -> html.Markup:
         surfaces = list(dict.fromkeys(row["surface"] for row in rows))
         unseen = {row["surface"] for row in rows if not row["seen"]}
         # With some surfaces seen and some not, those that count are marked.
-        groups = [f"<b>{one}</b>" if one in unseen and len(unseen) < len(surfaces) else one for one in surfaces]
-        values = {method: [_value(rows, method, one, "ncpe") for one in surfaces] for method in figures.METHODS}
+        groups = [f"{one}\n(new)" if one in unseen and len(unseen) < len(surfaces) else one for one in surfaces]
+        values = {method: [_value(rows, method, one, "ncpe") for one in surfaces] for method in LEARNERS}
         title = f"nCPE with the {KINDS.get(kind, kind)}" if kind else ""
         panels.append(figures.bars(groups, values, title=title, label="nCPE"))
-    mark = "" if kinds[0] else " Surfaces in bold were not learnt from."
-    return html.picture("scores", panels, f"Error along each surface; lower is better.{mark}", keys=figures.METHODS)
+    mark = "" if kinds[0] else " New surfaces were not learnt from."
+    return html.picture("scores", panels, f"Error along each surface; lower is better.{mark}", keys=LEARNERS)
 
 
 def _simulated_scores(rows: list[Row]) -> html.Markup:
     header = ["surface", "learnt from"]
-    header += [f"{title}\n{method}" for title in ("nCPE", "nUPE") for method in _COLUMNS]
+    header += [f"{title}\n{method}" for title in ("nCPE", "nUPE") for method in LEARNERS]
     surfaces = list(dict.fromkeys((row["surface"], row["seen"]) for row in rows))
     body = []
     for surface, seen in surfaces:
-        values = [_value(rows, method, surface, what) for what in ("ncpe", "nupe") for method in _COLUMNS]
+        values = [_value(rows, method, surface, what) for what in ("ncpe", "nupe") for method in LEARNERS]
         body.append([surface, "yes" if seen else "no", *map(html.number, values)])
     seen_count = sum(seen for _, seen in surfaces)
     unseen = [row for row in rows if not row["seen"]]
@@ -59,13 +60,13 @@ def _simulated_scores(rows: list[Row]) -> html.Markup:
 def _real_scores(rows: list[Row]) -> html.Markup:
     kinds = list(dict.fromkeys(row["normal"] for row in rows))
     header = ["held-out tilt"]
-    header += [f"{method}\n{kind} normal" for kind in kinds for method in _COLUMNS]
+    header += [f"{method}\n{kind} normal" for kind in kinds for method in LEARNERS]
     surfaces = list(dict.fromkeys(row["surface"] for row in rows))
     of_kind = {kind: [row for row in rows if row["normal"] == kind] for kind in kinds}
     body = [
         [
             surface,
-            *(html.number(_value(of_kind[kind], method, surface, "ncpe")) for kind in kinds for method in _COLUMNS),
+            *(html.number(_value(of_kind[kind], method, surface, "ncpe")) for kind in kinds for method in LEARNERS),
         ]
         for surface in surfaces
     ]
@@ -81,7 +82,7 @@ def _real_scores(rows: list[Row]) -> html.Markup:
 
 def _means(rows: list[Row], what: str) -> list[str]:
     """Mean of each method, with its ratio to direct learning."""
-    means = {method: float(np.mean([row[what] for row in rows if row["method"] == method])) for method in _COLUMNS}
+    means = {method: float(np.mean([row[what] for row in rows if row["method"] == method])) for method in LEARNERS}
     relative = html.markup("{} <b>(×{})</b>")
     cells = []
     for method, mean in means.items():

@@ -48,22 +48,15 @@ def film(wipe: Wipe, seconds: float = 4.0, width: int = 480, height: int = 360) 
 
 
 def animation(frames: Sequence[Array]) -> bytes:
-    """Frames as a GIF that repeats."""
-    image = require_extra("PIL.Image", "sim")
-    # One palette for all: colours must not flicker. This method keeps those of small things.
-    palette = image.fromarray(np.concatenate(frames[:: max(1, len(frames) // 4)])).quantize(
-        256, method=image.Quantize.MAXCOVERAGE
-    )
-    pictures = [image.fromarray(frame).quantize(palette=palette, dither=image.Dither.NONE) for frame in frames]
-    stream = io.BytesIO()
-    pictures[0].save(
-        stream, "GIF", save_all=True, append_images=pictures[1:], duration=round(1000 / FRAMES_A_SECOND), loop=0
-    )
+    """Frames as a WebP that repeats."""
+    pictures = [require_extra("PIL.Image", "sim").fromarray(frame) for frame in frames]
+    stream, each = io.BytesIO(), round(1000 / FRAMES_A_SECOND)
+    pictures[0].save(stream, "WEBP", save_all=True, append_images=pictures[1:], duration=each, loop=0, quality=30)
     return stream.getvalue()
 
 
 def strip(demonstration: uc.Demonstration, wipe: Wipe, count: int = 4, width: int = 400, height: int = 300) -> bytes:
-    """A hand that demonstrates above, the arm that reproduces below: one turn of each, as a PNG (figure 6).
+    """A hand that demonstrates above, the arm that reproduces below: one turn of each, as a WebP (figure 6).
 
     Parameters
     ----------
@@ -95,7 +88,7 @@ def strip(demonstration: uc.Demonstration, wipe: Wipe, count: int = 4, width: in
         trails = [track[first : row + 1 : max(1, length // 40)] for row in chosen]
         rows.append(np.concatenate(_shots(name, wipe.plate, postures[chosen], trails, width, height), axis=1))
     stream = io.BytesIO()
-    image.fromarray(np.concatenate(rows)).save(stream, "PNG", optimize=True)
+    image.fromarray(np.concatenate(rows)).save(stream, "WEBP", quality=60)
     return stream.getvalue()
 
 

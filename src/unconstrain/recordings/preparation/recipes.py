@@ -182,6 +182,14 @@ class Recipe:
         moving = [name for name in self.states or () if name not in scalars]
         return tuple(f"{'w' if name in turning else 'v'}{name}" for name in moving)
 
+    def labels(self, units: Mapping[str, str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Names of states and actions with the units of their columns: ``x (mm)``, ``vx (mm/s)``."""
+        known = {name: f"{name} ({unit})" for name, unit in units.items() if unit}
+        speeds = {f"v{name}": f"v{name} ({unit}/s)" for name, unit in units.items() if unit}
+        actions = [known.get(name, name) for name in self.actions or ()]
+        actions = actions or [speeds.get(name, name) for name in self.directions]
+        return tuple(known.get(name, name) for name in self.states or ()), tuple(actions)
+
     @property
     def _orientations(self) -> list[tuple[tuple[str, ...], spaces.Sphere]]:
         """State columns of each quaternion, in their order, and its space."""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import unconstrain as uc
+
 from ....base.errors import ReadError
 from ...datasets.files import DATA_VARIABLE
 from ..journal import Journal
-from ..trials import Progress, Result, run_trials
-from .judging import policies, trial
+from ..trials import CLOSE, Progress, Result, reproduced, run_trials
+from .judging import DEFAULT, policies, trial
 from .movements import missing
 from .sets import DataSet as DataSet
 from .sets import data_sets as data_sets
@@ -60,6 +62,17 @@ def run(
     kinds = by_kind(sets)
     tables = {"kinds": kinds, "sets": sets, "missing": [{"source": source} for source in absent]}
     return Result("recorded", chosen, [_shown(one) for one in kinds], tables=tables)
+
+
+def verdict(result: Result) -> uc.evaluation.verdicts.Verdict:
+    """Whether the default learner costs nobody anything, beside the better of two that look for nothing in the data."""
+    kinds = [one for one in result.tables["kinds"] if one["to_safe"] is not None]
+    worst = max(kinds, key=lambda one: one["to_safe"])
+    claim = (
+        f"{DEFAULT} is near the better of direct and softened hybrid, kind by kind: at worst {worst['to_safe']:.2f} "
+    )
+    claim += f"times, {worst['kind']}"
+    return reproduced({claim: worst["to_safe"] <= CLOSE}, "Geometric means over the data sets of each kind.")
 
 
 def headlines(result: Result) -> list[str]:

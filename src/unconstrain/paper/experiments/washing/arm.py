@@ -95,13 +95,13 @@ def check_reach(plate: Plate) -> None:
 
 
 def jobs(settings: Settings, wiped: Sequence[Plate], splits: Sequence[Split]) -> list[tuple[Any, ...]]:
-    """Arguments of :func:`reproduce`: each trial's hybrid on each plate, or the one learnt from all recorded bouts."""
+    """Arguments of :func:`reproduce`: each trial's default policy on each plate, or that of all recorded bouts."""
     if not settings.real:
         return [
             (
                 settings,
                 trial,
-                split.policies["hybrid"],
+                split.policies["robust"],
                 split.training,
                 plate,
                 _on(plate, split.surfaces),
@@ -111,7 +111,7 @@ def jobs(settings: Settings, wiped: Sequence[Plate], splits: Sequence[Split]) ->
             for plate in wiped
         ]
     surfaces = [surface for split in splits for surface in split.held_out]
-    policy = fitted(settings, surfaces)["hybrid"] if wiped else None
+    policy = fitted(settings, surfaces)["robust"] if wiped else None
     return [(settings, 0, policy, surfaces, plate, surfaces, False) for plate in wiped]
 
 

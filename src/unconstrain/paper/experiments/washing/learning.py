@@ -62,7 +62,7 @@ def learn(settings: Settings, training: Sequence[Surface], held_out: Sequence[Su
     first, normal = held_out[0].demonstrations[0], held_out[0].normals[0]["plane"]
     rollouts = {
         name: _followed(policies[name], first.states[0], uc.constraints.Plane(normal), settings, name)
-        for name in learners(settings)
+        for name in policies
     }
     return Split(tuple(training), tuple(held_out), policies, rollouts)
 

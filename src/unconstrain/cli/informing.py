@@ -1,0 +1,107 @@
+"""``unconstrain info``: what one file says of itself; and what ``fit`` and ``constraint`` write down for it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import click
+
+import unconstrain as uc
+
+from ..base.errors import ModelFileError
+from .printing import print_table, say_verdict
+from .reading import reading_of
+
+
+def provenance(paths: Iterable[str | Path], recipe: uc.Recipe, first: uc.Recording, **reading: Any) -> dict[str, Any]:
+    """What goes into the file of a policy or constraint beside it: recipe, roles, units, sources, date."""
+    return {
+        "recipe": recipe.to_dict(),
+        **reading_of(**reading).roles,
+        "units": dict(first.units),
+        "sources": [Path(path).name for path in paths],
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "made with": f"unconstrain {version('unconstrain')}",
+    }
+
+
+@click.command(epilog="\b\nExample:\n  unconstrain info wipe.npz --json")
+@click.argument("file", type=click.Path())
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def info(file: str, as_json: bool) -> None:
+    """Say what the policy or constraint in FILE is, and where it comes from."""
+    held, notes = _loaded(file), uc.storage.load_notes(file)
+    told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held), **_rest(notes)}
+    if as_json:
+        click.echo(json.dumps(told, indent=2))
+        return
+    say_verdict(_verdict(held, notes))
+    print_table(["", ""], [[name, _said(value)] for name, value in told.items() if value not in (None, [], {}, "")])
+
+
+def _loaded(path: str) -> Any:
+    """A policy, constraint or guided policy, whichever the file holds."""
+    for kind in (uc.Policy, uc.LearntConstraint):
+        try:
+            return uc.load(path, kind)
+        except ModelFileError as error:
+            if "expected a" not in str(error).rpartition("holds a")[2]:
+                raise
+    return uc.load(path, uc.Guided)
+
+
+def _columns(notes: Mapping[str, Any]) -> dict[str, Any]:
+    """Names with units, and what they are relative to."""
+    recipe, units = uc.Recipe.from_dict(notes.get("recipe", {})), notes.get("units", {})
+    states, actions = recipe.labels(units)
+    return {
+        "states": list(states),
+        "actions": list(actions),
+        "centring": "states relative to the mean of each demonstration" if recipe.centre else "none",
+        "actions are": "columns" if recipe.actions else f"velocities of the states ({recipe.differentiate})",
+        "rate_hz": recipe.rate,
+    } if states else {"states": None}  # fmt: skip
+
+
+def _of(held: Any) -> dict[str, Any]:
+    """What was learnt, and how; a guided policy is told by the one in it."""
+    if isinstance(held, uc.LearntConstraint):
+        choice = held.choice_
+        return {"held": f"{held.rank_} of {choice.actions} directions", "features": choice.name, "noise": held.noise_}
+    policy = getattr(held, "policy", held)
+    solution = getattr(policy, "solution_", None)
+    if solution is None:
+        return {"fitted": False}
+    return {
+        "learner": type(policy.learner).__name__ if not isinstance(policy.learner, str) else policy.learner,
+        "learnt as": solution.method,
+        "model": f"{len(solution.weights)} local models" if len(solution.weights) > 1 else str(policy.features_),
+        "explained held out": None if (share := policy.held_out_score()) != share else round(share, 4),
+        "noise": None if solution.belief is None else solution.noise,
+    }
+
+
+def _rest(notes: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in notes.items() if name not in ("recipe", "units")}
+
+
+def _verdict(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:
+    if isinstance(held, uc.LearntConstraint):
+        return uc.evaluation.verdicts.of_constraint(held)
+    policy = getattr(held, "policy", held)
+    if not hasattr(policy, "solution_"):
+        mark = uc.evaluation.verdicts.Mark.BAD
+        return uc.evaluation.verdicts.Verdict(mark, "Not fitted: it cannot predict.", next="unconstrain fit")
+    sources = len(notes.get("sources", ())) or uc.evaluation.diagnosis.ENOUGH
+    return uc.evaluation.verdicts.of_explained(policy.held_out_score(), sources)
+
+
+def _said(value: Any) -> str:
+    if isinstance(value, list):
+        return ", ".join(map(str, value))
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,197 @@
+"""Judgements in words: what numbers mean, what to trust, where not, and what to do next.
+
+The thresholds of everything that is judged stand here, each with its reason; pages and commands say the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import Enum
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Array
+from .diagnosis import ENOUGH, SMALL, Diagnosis
+
+if TYPE_CHECKING:
+    from ..constraints import LearntConstraint
+
+GOOD, FAIR = 0.9, 0.7
+"""Explained share of motion. Along it a prediction misses √(1 − share) of a typical action: at the first a third, at
+the second more than half, beyond which little but the rough direction is left."""
+
+SUPPORTED = 1e-3
+"""Support below which no demonstration came near, and the policy extrapolates."""
+
+MOSTLY, PARTLY = 0.95, 0.7
+"""Share of recorded states at which the policy is determined: of the rest, one in twenty is an edge."""
+
+
+WIDTH = 80
+"""Columns of a terminal that sentences are broken for."""
+
+
+class Mark(Enum):
+    """How it stands, and the sign of it."""
+
+    GOOD = "✔"
+    DOUBTFUL = "!"
+    BAD = "✖"
+
+
+class Verdict(NamedTuple):
+    """A judgement in one sentence, and what follows from it, in sentences that may be empty."""
+
+    mark: Mark
+    said: str
+    trust: str = ""
+    doubt: str = ""
+    next: str = ""
+
+    def rest(self) -> list[tuple[str, str]]:
+        """What to trust, where not, and what to do next, as far as there is something to say."""
+        named = (("Trust", self.trust), ("Do not trust", self.doubt), ("Next", self.next))
+        return [(name, text) for name, text in named if text]
+
+    def to_json(self) -> dict[str, str]:
+        """With the name of the mark."""
+        return self._asdict() | {"mark": self.mark.name.lower()}
+
+    def lines(self) -> list[str]:
+        """For a terminal of 80 columns."""
+        said = wrap(f"{self.mark.value} {self.said}", WIDTH, subsequent_indent="  ")
+        return said + [
+            line
+            for name, text in self.rest()
+            for line in wrap(f"{name}: {text}", WIDTH, initial_indent="  ", subsequent_indent="    ")
+        ]
+
+
+def _graded(share: float, good: float = GOOD, fair: float = FAIR) -> tuple[Mark, str]:
+    if share >= good:
+        return Mark.GOOD, "good"
+    return (Mark.DOUBTFUL, "fair") if share >= fair else (Mark.BAD, "poor")
+
+
+def of_explained(
+    share: float, demonstrations: int, determined: float | None = None, what: str = "held-out motion"
+) -> Verdict:
+    """Judge how much of some motion a policy explains, along the motion.
+
+    Parameters
+    ----------
+    share : float
+        1 − the share left unexplained; NaN where nothing could be held out.
+    demonstrations : int
+        Fewer than three give no verdict.
+    determined : float, optional
+        Share of the weight directions that three demonstrations or more show.
+    what : str
+        The motion.
+    """
+    across = "What constraints hid: no recording shows it, so no score does."
+    if determined is not None and determined < MOSTLY:
+        across = f"Across the motion: {1 - determined:.0%} of the weight directions are shown by fewer than {ENOUGH} "
+        across += "demonstrations; 'unconstrain diagnose' says where."
+    if demonstrations < ENOUGH or not np.isfinite(share):
+        seen = f"explains {share:.0%} of {what}, but " if np.isfinite(share) else ""
+        few = f"{seen}no verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
+        return Verdict(Mark.DOUBTFUL, few[0].upper() + few[1:], doubt=across, next="Record the task on other surfaces.")
+    mark, word = _graded(share)
+    missed = f"where the policy predicts, it misses about {np.sqrt(max(1 - share, 0)):.0%} of a typical action"
+    advice = {
+        Mark.GOOD: "Score it on recordings that were held in other ways.",
+        Mark.DOUBTFUL: "'unconstrain diagnose' says where it fails; a wider --window may take out noise.",
+        Mark.BAD: "Look at the recordings ('unconstrain inspect'): columns, clocks or units may be wrong.",
+    }[mark]
+    trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
+    return Verdict(mark, f"Explains {share:.0%} of {what}: {word}.", trust, across, advice)
+
+
+def of_score(share: float, demonstrations: int) -> Verdict:
+    """Judge how much of recordings that were not learnt from a policy explains; one is enough to see it fail."""
+    mark, word = _graded(share)
+    few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
+    return Verdict(
+        mark,
+        f"Explains {share:.0%} of held-out motion, if none of it was learnt from: {word}.",
+        "" if mark is Mark.BAD else "Movement like this, along the directions that were recorded.",
+        "What constraints hid in these recordings, too: --plane or --constraint tells it.",
+        f"Score it under other constraints.{few}"
+        if mark is Mark.GOOD
+        else "'unconstrain diagnose' says what to record.",
+    )
+
+
+def of_diagnosis(found: Diagnosis) -> Verdict:
+    """Judge whether recordings tell the unconstrained policy."""
+    share, count = found.states_determined, len(found.movements)
+    alone = [region for region in found.regions if len(region.shown_by) < ENOUGH]
+    doubt = f"{len(alone)} of {len(found.regions)} regions, where fewer than {ENOUGH} demonstrations moved along what "
+    doubt += "is least known: free, or always held the same way, cannot be told there." if alone else ""
+    doubt = doubt if alone else "States that nobody came near."
+    if count < ENOUGH:
+        said = f"No verdict: {_count(count)}; whether they were free cannot be told from fewer than {ENOUGH}."
+        return Verdict(Mark.DOUBTFUL, said, doubt=doubt, next="Record the task again, held in other ways.")
+    mark, word = _graded(share, MOSTLY, PARTLY)
+    words = {"good": "enough", "fair": "enough in most places", "poor": "not enough"}
+    said = f"At {share:.0%} of the recorded states three demonstrations or more tell the policy: {words[word]}."
+    if found.noise_share > 3 * SMALL:
+        mark, said = Mark.DOUBTFUL, f"{said[:-1]}, though noise is {found.noise_share:.0%} of a typical action."
+    trust = "" if mark is Mark.BAD else f"The policy at these states, to about {found.noise_share:.0%} of noise."
+    then = "Record what the list below says, the first first." if share < 1 else "Demonstrate where nobody was."
+    return Verdict(mark, said, trust, doubt, then)
+
+
+def of_constraint(learnt: LearntConstraint) -> Verdict:
+    """Judge a learnt constraint by what it missed where held out."""
+    choice, shown = learnt.choice_, 1.0 - learnt.choice_.held_out
+    if learnt.rank_ == 0:
+        said = "No direction was held: nothing constrained these movements, or each direction was seen."
+        return Verdict(Mark.DOUBTFUL, said, next="Look whether the demonstrations were held in different ways.")
+    mark, word = _graded(shown)
+    held = f"{learnt.rank_} of {choice.actions} directions were held"
+    said = f"{held}; {1 - shown:.0%} of held-out motion is along them: {word}."
+    then = "Use it with 'unconstrain rollout --constraint' or 'score --constraint'."
+    if choice.doubts:
+        mark, then = (Mark.DOUBTFUL if mark is Mark.GOOD else mark), "Record what is missing, then learn it again."
+    doubt = "; ".join(text.rstrip(".") for text in choice.doubts)
+    wish = "A direction in which nobody wanted to move looks held, too."
+    return Verdict(mark, said, "What was held, near recorded states.", f"{doubt}. {wish}" if doubt else wish, then)
+
+
+def of_support(support: Array, times: Array | None) -> Verdict:
+    """Judge a movement of a policy by how near data is along it, (T,) each; times are steps where not known."""
+    seconds = np.arange(len(support)) if times is None else times
+    far = support < SUPPORTED
+    if not far.any():
+        return Verdict(Mark.GOOD, f"Near demonstrations for all {seconds[-1]:.2f} s: supported.")
+    since = seconds[int(far.argmax())]
+    mark = Mark.BAD if far.mean() > 0.5 else Mark.DOUBTFUL
+    said = f"From {since:.2f} s on the movement is far from all data, {far.mean():.0%} of the time: extrapolated."
+    return Verdict(
+        mark,
+        said,
+        f"The first {since:.2f} s." if far.argmax() else "",
+        "What is far from data.",
+        "Start nearer, or demonstrate there.",
+    )
+
+
+def of_surveys(surveys: Sequence[Any]) -> Verdict:
+    """Judge recordings by what is not as it seems in them."""
+    warned = [found for found in surveys if found.warnings]
+    codes = ", ".join(dict.fromkeys(one.code for found in warned for one in found.warnings))
+    few = len(surveys) < ENOUGH
+    fewer = f"{_count(len(surveys))}: 'fit' tells what was free from {ENOUGH} or more, held in different ways."
+    if not warned:
+        said = f"{_count(len(surveys))}, nothing odd: ready to learn from."
+        return Verdict(Mark.DOUBTFUL if few else Mark.GOOD, said, doubt=fewer if few else "", next="unconstrain fit")
+    said = f"{len(warned)} of {_count(len(surveys))} not as it should be: {codes}."
+    return Verdict(Mark.DOUBTFUL, said, doubt=fewer if few else "", next="Read the notes below; each names its cure.")
+
+
+def _count(demonstrations: int) -> str:
+    return f"{demonstrations} demonstration{'' if demonstrations == 1 else 's'}"

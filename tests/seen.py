@@ -1,0 +1,98 @@
+"""What people see: pages, opened in a browser by day and by night, and what commands print."""
+
+from collections.abc import Sequence
+from contextlib import contextmanager
+
+import numpy as np
+
+GRAPHS = """
+return [...document.querySelectorAll("figure svg[role=img]")].map(graph => ({
+  id: graph.closest("figure").id, label: graph.getAttribute("aria-label"),
+  drawn: graph.querySelectorAll("path, use, image").length,
+  wide: graph.getBoundingClientRect().width, high: graph.getBoundingClientRect().height,
+}));
+"""
+
+TEXTS = """
+document.querySelectorAll("details").forEach(one => one.open = true);
+const clear = "rgba(0, 0, 0, 0)", walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), found = {};
+const behind = one => {
+  for (; one; one = one.parentElement) {
+    const colour = getComputedStyle(one).backgroundColor;
+    if (colour !== clear) return colour;
+  }
+};
+while (walk.nextNode()) {
+  const one = walk.currentNode.parentElement, style = getComputedStyle(one);
+  if (!walk.currentNode.data.trim() || one.closest("script, style, title")) continue;
+  const own = one.tagName === "text" || one.tagName === "tspan" ? style.fill : style.color;
+  if (own === "rgb(0, 0, 0)" && one.closest("svg") || own === "rgb(254, 254, 254)") continue;  // on coloured cells
+  found[own + " on " + behind(one)] = [own, behind(one), walk.currentNode.data.trim().slice(0, 40)];
+}
+return Object.values(found);
+"""
+
+UNNAMED = """
+return [...document.querySelectorAll(`svg:not([aria-hidden]):not([aria-label]), img:not([alt]), th:not([scope]),
+  table:not(:has(caption)), button:empty, html:not([lang])`)].map(one => one.outerHTML.slice(0, 80));
+"""
+
+
+def opened(browser, page, folder):
+    """Open a page, check that it is complete, light, readable and described, and return its graphs."""
+    path = folder / "page.html"
+    path.write_text(page, "utf-8")
+    assert path.stat().st_size <= 1_000_000
+    browser.get(path.as_uri())
+    graphs = browser.execute_script(GRAPHS)
+    assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []
+    assert browser.execute_script("return performance.getEntriesByType('resource').map(one => one.name)") == []
+    assert browser.execute_script(UNNAMED) == []
+    for graph in graphs:
+        assert graph["label"], graph
+        assert graph["drawn"] >= 10, graph
+        assert min(graph["wide"], graph["high"]) > 50, graph
+    for scheme in ("light", "dark"):
+        with coloured(browser, scheme):
+            assert unreadable(browser) == [], scheme
+    return graphs
+
+
+def unreadable(browser):
+    """Colours of text and ground whose contrast is below 4.5, the least that WCAG asks for, with some of the text."""
+    pairs = browser.execute_script(TEXTS)
+    assert len(pairs) >= 2
+    return [one for one in pairs if contrast(*map(_rgb, one[:2])) < 4.5 and one[2] not in "✔!✖"]
+
+
+def contrast(one: Sequence[float], other: Sequence[float]) -> float:
+    """Ratio of the relative luminances of two colours, red, green and blue from 0 to 1, as WCAG 2 defines it."""
+    light, dark = sorted((_luminance(one), _luminance(other)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+def _luminance(colour: Sequence[float]) -> float:
+    linear = [value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4 for value in colour]
+    return float(np.dot([0.2126, 0.7152, 0.0722], linear))
+
+
+def _rgb(text: str) -> list[float]:
+    return [float(part) / 255.0 for part in text[text.index("(") + 1 : -1].split(",")[:3]]
+
+
+@contextmanager
+def coloured(browser, scheme):
+    """As somebody sees it who prefers light or dark."""
+    features = [{"name": "prefers-color-scheme", "value": scheme}]
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+    try:
+        yield
+    finally:
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+def below(said):
+    """What follows a verdict."""
+    verdict, _, rest = said.partition("\n\n")
+    assert verdict[:2] in ("✔ ", "! ", "✖ ")
+    return rest

@@ -1,0 +1,147 @@
+"""What is said of numbers: signs and words agree, and nothing is claimed that data cannot tell."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
+
+import unconstrain as uc
+from seen import below
+from unconstrain import cli
+from unconstrain.base.errors import InvalidDataError
+from unconstrain.evaluation import diagnosis, verdicts
+from unconstrain.evaluation.verdicts import FAIR, GOOD, Mark
+from unconstrain.recordings import Recording
+
+shares = st.floats(-1.0, 1.0)
+
+
+def call(*args):
+    return CliRunner().invoke(cli.main, list(map(str, args)), prog_name="unconstrain")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Three recordings of one swing, what was learnt from them, and what held one of them."""
+    folder = tmp_path_factory.mktemp("judged")
+    times = np.arange(0.0, 2.0, 0.05)
+    for number in range(3):
+        states = np.column_stack([np.cos(times + number), np.sin(times + number)]) + 0.1 * number
+        table = np.column_stack([times, states, -states[:, 1], states[:, 0]])
+        np.savetxt(folder / f"swing_{number}.csv", table, delimiter=",", header="t,x,y,vx,vy", comments="")
+    files = sorted(folder.glob("*.csv"))
+    learnt = call("fit", *files, "--model", "affine", "-o", folder / "p.npz", "--json")
+    assert learnt.exit_code == 0, learnt.stderr
+    (folder / "fit.json").write_text(learnt.stdout)
+    assert call("constraint", files[0], "-o", folder / "c.npz").exit_code == 0
+    return folder
+
+
+class TestMarks:
+    @given(shares, st.integers(diagnosis.ENOUGH, 20))
+    def test_a_sign_goes_with_its_word(self, share, count):
+        for found in (verdicts.of_explained(share, count), verdicts.of_score(share, count)):
+            word = {Mark.GOOD: "good", Mark.DOUBTFUL: "fair", Mark.BAD: "poor"}[found.mark]
+            assert found.said.endswith(f": {word}.")
+            assert found.lines()[0].startswith(found.mark.value)
+
+    @given(shares, shares)
+    def test_who_explains_more_is_not_judged_worse(self, one, other):
+        order = [Mark.BAD, Mark.DOUBTFUL, Mark.GOOD]
+        less, more = (order.index(verdicts.of_explained(share, 5).mark) for share in sorted((one, other)))
+        assert less <= more
+
+    @pytest.mark.parametrize(("share", "mark"), [(GOOD, Mark.GOOD), (FAIR, Mark.DOUBTFUL), (0.69, Mark.BAD)])
+    def test_thresholds_are_those_that_are_written_down(self, share, mark):
+        assert verdicts.of_explained(share, 5).mark is mark
+
+    @given(shares, st.integers(0, diagnosis.ENOUGH - 1))
+    def test_fewer_than_three_demonstrations_give_no_verdict(self, share, count):
+        found = verdicts.of_explained(share, count)
+        assert found.mark is Mark.DOUBTFUL
+        assert "no verdict" in found.said
+        assert not any(word in found.said for word in ("good", "fair", "poor"))
+
+    @given(st.text(max_size=300), st.text(max_size=300))
+    def test_lines_fit_a_terminal_and_say_everything(self, said, trust):
+        lines = verdicts.Verdict(Mark.GOOD, f"a {said}", trust).lines()
+        assert "".join(said.split()) in "".join("".join(lines).split())
+        assert all(len(line) <= 80 for line in lines)
+
+
+class TestSupport:
+    def test_a_movement_near_all_data_is_supported(self):
+        assert verdicts.of_support(np.ones(3), np.arange(3.0)).mark is Mark.GOOD
+
+    def test_where_support_ends_is_said_in_seconds(self):
+        found = verdicts.of_support(np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.5, 1.0]))
+        assert (found.mark, found.trust) == (Mark.DOUBTFUL, "The first 1.00 s.")
+
+
+class TestInfo:
+    def told(self, path):
+        return json.loads(call("info", path, "--json").stdout)
+
+    def test_a_policy_says_what_it_is(self, folder):
+        told = self.told(folder / "p.npz")
+        assert told["states"] == ["x", "y"]
+        assert told["sources"] == ["swing_0.csv", "swing_1.csv", "swing_2.csv"]
+        assert (told["holds"], told["learner"], told["centring"]) == ("ParametricPolicy", "Robust", "none")
+        assert told["date"].endswith("+00:00")
+
+    def test_names_come_with_their_units(self, tmp_path):
+        policy = uc.ParametricPolicy(uc.Affine(), "direct").fit([[0.0], [1.0]], [[0.0], [2.0]])
+        notes = {"recipe": uc.Recipe(("x",), None, "savgol").to_dict(), "units": {"x": "mm"}}
+        uc.save(policy, tmp_path / "p.npz", notes)
+        told = self.told(tmp_path / "p.npz")
+        assert (told["states"], told["actions"]) == (["x (mm)"], ["vx (mm/s)"])
+
+    def test_so_does_a_constraint(self, folder):
+        told = self.told(folder / "c.npz")
+        assert (told["holds"], told["held"]) == ("LearntConstraint", "1 of 2 directions")
+        assert told["sources"] == ["swing_0.csv"]
+
+    def test_a_person_reads_a_verdict_first(self, folder):
+        said = call("info", folder / "p.npz").stdout
+        assert "swing_2.csv" in below(said)
+
+    def test_a_policy_of_python_says_what_it_can(self, tmp_path):
+        uc.save(uc.ParametricPolicy(uc.Affine(), "direct").fit([[0.0], [1.0]], [[0.0], [2.0]]), tmp_path / "p.npz")
+        assert self.told(tmp_path / "p.npz")["learner"] == "direct"
+        uc.save(uc.ParametricPolicy(), tmp_path / "q.npz")
+        assert call("info", tmp_path / "q.npz").stdout.startswith("✖ Not fitted: it cannot predict.")
+
+    def test_what_is_no_policy_is_refused(self, folder):
+        ran = call("info", folder / "swing_0.csv")
+        assert (ran.exit_code, ran.stdout) == (2, "")
+        assert "is no policy file" in ran.stderr
+
+
+def test_a_fit_tells_programs_what_it_tells_people(folder):
+    told = json.loads((folder / "fit.json").read_text())
+    assert told["verdict"]["mark"] == "good"
+    assert told["held_out"] == pytest.approx(1.0, abs=1e-6)
+    assert (told["demonstrations"], told["samples"]) == (3, 120)
+    assert told["policy"].endswith("p.npz")
+
+
+@pytest.mark.parametrize("name", ["p.pkl", "p.PICKLE", "p.joblib"])
+def test_nothing_is_written_as_a_pickle(folder, name):
+    ran = call("fit", folder / "swing_0.csv", "-o", folder / name)
+    assert (ran.exit_code, (folder / name).exists()) == (2, False)
+    assert "name it .npz" in ran.stderr
+
+
+@pytest.mark.parametrize(("asked", "meant"), [("X", "'x'"), ("posx", "'pos_x'"), ("velocity_y", "'velocity_x'")])
+def test_a_column_that_is_not_there_has_a_neighbour(asked, meant):
+    recording = Recording(("x", "pos_x", "velocity_x"), np.zeros((2, 3)), name="a")
+    with pytest.raises(InvalidDataError, match=f"Did you mean {meant}"):
+        recording.select([asked])
+
+
+def test_what_is_like_nothing_has_none():
+    with pytest.raises(InvalidDataError, match=r"no column 'force'; it has x, y\.$"):
+        Recording(("x", "y"), np.zeros((2, 2)), name="a").select(["force"])
