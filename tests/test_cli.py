@@ -1185,9 +1185,10 @@ def test_fit_and_diagnose_name_the_sample_that_looks_wrong(tmp_path):
         np.savetxt(tmp_path / f"cup_{index}.csv", table, delimiter=",", header="time,x,y,vx,vy", comments="")
     files = [str(path) for path in sorted(tmp_path.glob("*.csv"))]
     columns = ["--state", "x,y", "--action", "vx,vy", "--model", "linear"]
-    said = "1 sample looks wrong beside the neighbours in time, and counted nothing: cup_2 sample 12 (0.55 s)."
+    said = f"1 sample looks wrong beside the neighbours in time, and counted nothing: {files[2]} row 11 (0.55 s)."
     fitted = CliRunner().invoke(cli.main, ["fit", *files, *columns, "-o", str(tmp_path / "policy.npz")])
     assert f"Note: {said}" in fitted.stderr
     assert said in CliRunner().invoke(cli.main, ["diagnose", *files, *columns]).stdout
     found = json.loads(CliRunner().invoke(cli.main, ["diagnose", *files, *columns, "--json"]).stdout)
-    assert found["suspects"] == [{"demonstration": "cup_2", "sample": 12, "time": pytest.approx(0.55)}]
+    [suspect] = found["suspects"]
+    assert suspect == {"demonstration": "cup_2", "sample": 12, "time": pytest.approx(0.55), "file": files[2], "row": 11}

@@ -82,6 +82,9 @@ def numbered(head, first=0, count=3):
         (["hand X", "hand Y", "hand Z"], "savgol", ["Frame"]),
         (["x", "y"], ["vx", "vy"], ["fx", "fy"]),
         (["x", "y", "z"], "savgol", ["fx", "fy", "fz"]),
+        (["x [mm]", "y [mm]"], ["vx [mm/s]", "vy [mm/s]"], ["fx [N]", "fy [N]"]),
+        (["p_x (m)", "p_y (m)", "p_z (m)"], "savgol", [f"q_{a} []" for a in "wxyz"]),
+        (["tx", "ty", "tz"], "savgol", ["qx", "qy", "qz", "qw"]),
     ],
 )
 def test_usual_names_are_understood(states, actions, others):
@@ -96,12 +99,22 @@ def test_usual_names_are_understood(states, actions, others):
         ["left.X", "left.Y", "left.Z", "right.X", "right.Y", "right.Z"],
         [*numbered("states"), *numbered("actions")],
         ["force.x", "force.y", "force.z"],
+        ["tx", "ty", "tz", "fx", "fy", "fz", "qx", "qy", "qz", "qw"],
         numbered("column"),
     ],
 )
 def test_where_names_do_not_tell_it_is_asked(columns):
     with pytest.raises(SettingError, match="--state"):
         complete(columns)
+
+
+def test_what_is_named_as_an_angle_is_a_state_beside_what_is_guessed():
+    recipe = complete(["x", "y", "yaw"], angles=("yaw",))
+    assert (recipe.states, recipe.differentiate) == (("x", "y", "yaw"), "savgol")
+    recipe = complete(["x", "y", "vx", "vy", "yaw", "vyaw"], angles=("yaw",))
+    assert (recipe.states, recipe.actions) == (("x", "y", "yaw"), ("vx", "vy", "vyaw"))
+    with pytest.raises(InvalidDataError, match="no column 'gone'"):
+        complete(["x", "y"], angles=("gone",))
 
 
 def test_patterns_hold_for_recipes_and_unknown_names_list_the_columns():
@@ -119,7 +132,17 @@ def test_patterns_hold_for_recipes_and_unknown_names_list_the_columns():
     [
         *(
             (name, 1.0)
-            for name in ("t", "Time", "%time", "__time", "Time (s)", "Time (Seconds)", "header.stamp", "clock")
+            for name in (
+                "t",
+                "Time",
+                "%time",
+                "__time",
+                "Time (s)",
+                "Time (Seconds)",
+                "header.stamp",
+                "clock",
+                "Zeit (s)",
+            )
         ),
         *((name, 1e-3) for name in ("Timestamp (ms)", "TimeMs", "time_ms", "t[ms]", "ElapsedTime (msec)", "tms")),
         *((name, 1e-9) for name in ("timestamp [ns]", "field.header.stamp_ns", "robot_time_ns")),
@@ -157,6 +180,7 @@ def test_seconds_and_nanoseconds_are_one_clock(tmp_path, prefix, whole, part):
         ("2024-05-01T10:00:00+02:00", "2024-05-01T10:00:01+02:00", 1.0),
         ("23:59:59.5", "00:00:00.5", 1.0),
         ("1:02.5", "1:03", 0.5),
+        ("2024/05/01 10:00:00.00", "2024/05/01 10:00:00.02", 0.02),
     ],
 )
 def test_words_of_times_become_seconds(first, second, apart):

@@ -18,7 +18,7 @@ import unconstrain as uc
 from foreign import ACTIONS, STATES, STEPS, bag, lasa, lerobot, robomimic
 from recorded import DATA as RECORDED
 from recorded import needs_data
-from unconstrain.base.errors import ReadError, UnconstrainError
+from unconstrain.base.errors import ReadError, SettingError, UnconstrainError
 from unconstrain.recordings.preparation.recipes import complete_recipe
 from unconstrain.recordings.readers import parquet, read_blocks
 from unconstrain.recordings.readers.mat5 import read_mat5
@@ -68,6 +68,21 @@ def test_an_archive_may_say_where_episodes_end(tmp_path):
     assert_array_equal(second.select(["obs1", "obs2", "obs3"]), STATES[10:])
     assert (len(first), first.remarks) == (10, ())
     assert guessed(first) == (("obs1", "obs2", "obs3"), ("actions1", "actions2", "actions3"))
+
+
+def test_columns_of_what_has_no_names_can_be_named(tmp_path):
+    np.savez(tmp_path / "a.npz", demo_1=np.ones((20, 2)).cumsum(axis=0), demo_2=np.ones((30, 2)).cumsum(axis=0))
+    found = uc.read(tmp_path / "a.npz")
+    assert [(one.name, one.columns) for one in found] == [
+        (f"a/demo_{number}", ("column1", "column2")) for number in (1, 2)
+    ]
+    assert {one.columns for one in uc.read(tmp_path / "a.npz", columns=("x", "y"))} == {("x", "y")}
+    scipy.io.savemat(tmp_path / "b.mat", {"A": np.ones((20, 2)).cumsum(axis=0)})
+    assert uc.read(tmp_path / "b.mat", columns=("x", "y"))[0].columns == ("x", "y")
+    with pytest.raises(ReadError, match="got 1 names of columns"):
+        uc.read(tmp_path / "b.mat", columns=("x",))
+    with pytest.raises(SettingError, match="says itself what its columns are called"):
+        uc.read(lerobot(tmp_path / "set", "v3.0"), columns=("x", "y"))
 
 
 @pytest.mark.parametrize("axis", [0, 2])

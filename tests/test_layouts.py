@@ -157,6 +157,20 @@ def test_a_row_of_units_is_no_row_and_used(only):
     assert recording.units == {"x": "mm", "y": "deg"}
 
 
+@pytest.mark.parametrize(("said", "degrees"), [("inDegrees=yes", True), ("inDegrees=no", False), ("", False)])
+def test_opensim_tells_which_coordinates_are_in_degrees(only, said, degrees):
+    above = f"Coordinates\nversion=1\nnRows=40\nnColumns=3\n{said}\n\nUnits are S.I. units\n\nendheader\n"
+    found = only(f"{above}time\tpelvis_tx\tknee_angle_r\n{rows(chr(9))}", "ik.mot")
+    assert dict(found.units) == ({"knee_angle_r": "deg"} if degrees else {})
+    assert_allclose(found.times, PATH[:, 0])
+
+
+def test_of_wide_tables_few_lines_are_looked_at(only):
+    table = np.column_stack([np.arange(30) * 0.02, np.random.default_rng(0).normal(size=(30, 3000))])
+    found = only(f"t,{','.join(f'c{at}' for at in range(3000))}\n{rows(table=table)}")
+    assert_allclose(found.values, table[:, 1:], atol=1e-5)
+
+
 def test_columns_that_are_numbered_in_the_first_row_are_named_so(only):
     recording = only("0,1,2\n" + rows())
     assert recording.columns == ("0", "1", "2")

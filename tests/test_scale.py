@@ -1,5 +1,6 @@
 """Units of a policy's own: what is learnt inside them, what comes out in those of the data."""
 
+import json
 import pickle
 import subprocess
 
@@ -80,6 +81,29 @@ def test_degrees_beside_metres_are_found_and_alike_columns_left_alone():
     assert_array_equal(policy.fit_demonstrations(in_units(demos, degrees)).scale_.states, degrees)
     assert policy.fit_demonstrations(demos).scale_ is None
     assert policy.fit_demonstrations(in_units(demos, np.full(3, 1000.0))).scale_ is None
+
+
+def test_a_later_batch_that_is_unlike_in_the_scale_of_the_first_is_warned_of():
+    metres, millimetres = uc.stack(turning(5)), uc.stack(in_units(turning(), MM))
+    policy = uc.LocallyLinearPolicy(learner="hybrid", scale="auto")
+    policy.partial_fit(*metres[:2], groups=metres.groups)
+    with pytest.warns(UserWarning, match="scale: 'auto' was found on the first batch, and in a later one"):
+        policy.partial_fit(*millimetres[:2], groups=millimetres.groups)
+    alike = uc.LocallyLinearPolicy(learner="hybrid", scale="auto")
+    for rows in np.array_split(np.arange(len(millimetres.states)), 6):  # warnings are errors here
+        alike.partial_fit(millimetres.states[rows], millimetres.actions[rows], groups=millimetres.groups[rows])
+    assert_array_equal(alike.scale_.states, MM)
+
+
+def test_diagnose_takes_the_scale_of_fit(tmp_path):
+    paths = [tmp_path / f"{number}.csv" for number in range(6)]
+    for path, one in zip(paths, in_units(turning()[:6], MM), strict=True):
+        write(path, "t,x,y,turn,vx,vy,vturn", np.column_stack([one.times, one.states, one.actions]))
+    read = (*paths, "--state", "x,y,turn", "--action", "vx,vy,vturn", "--model", "affine", "--scale", "1000,1000,1")
+    ran = call("diagnose", *read)
+    assert "As one count 1000 of x, 1000 of y, 1 of turn" in ran.out
+    assert "mixed-units" not in ran.err
+    assert json.loads(run("diagnose", *read, "--json"))["regions"]
 
 
 def test_a_scale_is_chosen_between_groups_of_columns_of_unlike_sizes():

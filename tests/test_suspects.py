@@ -1,9 +1,12 @@
 """One bad sample changes the policy near it only: it is left out by its neighbours in time, and bounded in sums."""
 
+from dataclasses import replace
 from functools import cache
 from itertools import product
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -14,6 +17,8 @@ import unconstrain as uc
 from conftest import LEARNERS, POLICIES, ROBUST
 from samples import rotation
 from unconstrain.evaluation.diagnosis import places_of
+from unconstrain.recordings.demonstration import Source
+from unconstrain.recordings.readers import parquet
 from unconstrain.training import Batch, FirstLook, suspects
 
 DEMONSTRATIONS, STEPS, DT = 8, 40, 0.05
@@ -214,3 +219,30 @@ def test_samples_are_named_by_demonstration_number_and_time():
     still = uc.Demonstration(np.zeros((3, 1)), np.zeros((3, 1)))
     found = places_of(np.array([1, 3, 8]), [("a", demo), ("b", still), ("a", demo)])
     assert list(map(str, found)) == ["a sample 2 (0.5 s)", "b sample 1", "a sample 6 (1 s)"]
+
+
+def test_samples_that_were_recorded_are_named_by_file_and_row():
+    demo = uc.Demonstration(np.zeros((3, 1)), np.zeros((3, 1)), source=Source("in/a.csv", np.array([4, 6, 8])))
+    found = places_of(np.array([0, 1]), [("a", demo[1:])])
+    assert list(map(str, found)) == ["in/a.csv row 6", "in/a.csv row 8"]
+    assert str(places_of(np.array([1]), [("3", demo)])[0]) == "in/a.csv '3' row 6"
+
+
+@pytest.mark.parametrize("recipe", [uc.Recipe(differentiate="savgol"), uc.Recipe(("x",), ("y",), rate=5.0)])
+def test_rows_are_those_of_the_recording_whatever_is_left_out_between(recipe):
+    times = np.append(np.arange(40), np.arange(60, 100)) * 0.02
+    order = np.random.default_rng(0).permutation(80)
+    table = np.column_stack([times, times**2])
+    [demo] = uc.prepare([uc.Recording(("x", "y"), table[order], times[order])], replace(recipe, sort=True))
+    most = 0.01 if recipe.rate else 0.0
+    assert np.abs(times[order][demo.source.rows] - demo.times).max() <= most + 1e-9
+
+
+def test_rows_of_blocks_go_on_from_block_to_block(tmp_path, monkeypatch):
+    monkeypatch.setattr(parquet, "BLOCK_ROWS", 8)
+    columns = {name: np.arange(20.0) + at for at, name in enumerate(("t", "x", "vx"))}
+    pq.write_table(pa.table(columns), tmp_path / "a.parquet")
+    blocks = [demo for _, demo in uc.Stream(tmp_path / "a.parquet").named_demonstrations()]
+    assert [len(one) for one in blocks] == [8, 8, 4]
+    assert_array_equal(np.concatenate([one.source.rows for one in blocks]), np.arange(20))
+    assert {one.source.file for one in blocks} == {str(tmp_path / "a.parquet")}

@@ -1,5 +1,6 @@
 """How objects that hold arrays show themselves: one line in a terminal, a small table in a notebook."""
 
+from collections.abc import Sequence
 from html import escape
 from typing import Any
 
@@ -41,3 +42,9 @@ def counted(number: int, noun: str) -> str:
 def shortened(name: str, most: int = 40) -> str:
     """A name in quotes, its middle left out where it is long."""
     return repr(name if len(name) <= most else f"{name[: most // 2]}…{name[-most // 2 + 1 :]}")
+
+
+def listed(names: Sequence[str], most: int = 30) -> str:
+    """Names with commas between, the first of many."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more

@@ -60,3 +60,9 @@ class WriteError(UnconstrainError, OSError):
 
 class MissingExtraError(UnconstrainError, ImportError):
     """A feature whose optional dependency is not installed."""
+
+
+NOTHING_LEFT = (
+    "no demonstration is left to read; check --episodes (episodes), --task (task) and --leave-out, or leave them off."
+)
+"""What a ReadError says where everything was to be passed over."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -15,7 +14,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.errors import ReadError, SettingError, UnconstrainError
+from ..base.errors import NOTHING_LEFT, ReadError, SettingError, UnconstrainError
 from ..base.files import write
 from ..paper import experiments
 from .constraining import constraint, held_of, options_for_held
@@ -29,7 +28,6 @@ from .fitting import (
     learner_of,
     options_for_model,
     policy_of,
-    scale_of,
 )
 from .informing import info, provenance
 from .looking import look, play
@@ -90,6 +88,8 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
                     yield recording
 
     surveys = uc.preparation.survey_set(recordings(), recipe)
+    if not first:
+        raise ReadError(NOTHING_LEFT)
     names = uc.readers.unique_names(found.name for found in surveys)
     surveys = [replace(found, name=name) for found, name in zip(surveys, names, strict=True)]
     keep_codes(remark.code for found in surveys for remark in found.warnings)
@@ -105,8 +105,6 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
         click.echo(json.dumps(plain, indent=2))
     else:
         say_surveys(surveys)
-        if not first:
-            raise ReadError(f"{', '.join(files)}: holds no recording.")
         try:
             click.echo(f"fit uses {said_recipe(uc.preparation.decide(recipe, first[0])[0], first[0])}.")
         except UnconstrainError as error:
@@ -139,14 +137,6 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
 @click.option(
     "--hold-out", type=click.Choice(["auto", "demonstration", "sample"]), default="auto", help="Unit of a fold."
 )
-@click.option(
-    "--scale",
-    type=scale_of,
-    default="none",
-    show_default=True,
-    metavar="AUTO|NONE|A,B,...",
-    help="What counts as one of each state, such as 1000,1 for mm beside rad; auto finds it.",
-)
 @click.option("--report", type=click.Path(dir_okay=False), help="Also write an HTML report there.")
 @option_for_force
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on the dask cluster of this scheduler.")
@@ -159,12 +149,12 @@ def fit(
     learner: str | None,
     variance: float | None,
     centres: int | None,
+    scale: Any,
     alpha: float | Literal["auto"] | None,
     softness: float | None,
     speed_power: float,
     folds: int,
     hold_out: Any,
-    scale: Any,
     report: str | None,
     force: bool,
     scheduler: str | None,
@@ -178,11 +168,9 @@ def fit(
     """
     paths = uc.readers.expand(files)
     check_outputs((output, report), paths, force)
-    if scale is not None:  # is what cures them
-        warnings.filterwarnings("ignore", "mixed-units", UserWarning)
     learner = learner or default_learner(paths, scheduler, alpha, softness, speed_power)
     chosen = {"learner": learner_of(learner, alpha, softness, speed_power), "validation": uc.Folds(folds, hold_out)}
-    fitted = policy_of(model, variance, centres, scale=scale, **chosen)
+    fitted = policy_of(model, variance, centres, scale, **chosen)
     with shown("reading, placing, learning") as progress:
         stream = stream_of(paths, speed_power, progress, **reading)
         learn(fitted, stream, scheduler)

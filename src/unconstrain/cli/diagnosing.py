@@ -13,7 +13,7 @@ import unconstrain as uc
 
 from ..base.files import write
 from .fitting import options_for_model, policy_of
-from .printing import option_for_json, print_table, refuse_warnings, say, say_verdict
+from .printing import option_for_json, print_table, refuse_warnings, say, say_scale, say_verdict
 from .progress import shown
 from .reading import options_for_reading, prepared, said_recipe
 from .writing import check_outputs, option_for_force
@@ -33,6 +33,7 @@ def diagnose(
     model: str,
     variance: float | None,
     centres: int | None,
+    scale: Any,
     report: str | None,
     force: bool,
     verbose: bool,
@@ -47,10 +48,10 @@ def diagnose(
     check_outputs((report,), paths, force)
     with shown("reading, placing, learning"):
         demonstrations, recipe, first = prepared(paths, reading)
-        policy = policy_of(model, variance, centres, learner=uc.Robust()).fit_demonstrations(demonstrations)
+        policy = policy_of(model, variance, centres, scale, learner=uc.Robust()).fit_demonstrations(demonstrations)
         found = uc.evaluation.diagnose(policy, demonstrations)
     missed = 1.0 - policy.score(*uc.stack(demonstrations)[:2])
-    say(uc.preparation.doubts(len(demonstrations), missed), "diagnose")
+    say(uc.preparation.doubts(len(demonstrations), missed))
     refuse_warnings(reading["strict"])
     states = recipe.states or ()
     actions = recipe.actions or recipe.directions
@@ -62,6 +63,7 @@ def diagnose(
         say_verdict(verdict)
         used = said_recipe(recipe, first)
         click.echo(f"{len(demonstrations)} demonstrations, {len(found.undetermined)} samples; {used}.")
+        say_scale(policy, recipe)
         _say(found, states, actions, len(found.regions) if verbose else MOST_ROWS)
     if report is not None:
         from ..pages.diagnosis import diagnosis_page

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -30,6 +31,11 @@ MUCH = 200_000_000
 
 def options_for_model(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options that choose the model of the policy."""
+    scale = "What counts as one of each state, such as 1000,1 for mm beside rad; auto finds it."
+    metavar = "AUTO|NONE|A,B,..."
+    command = click.option("--scale", type=scale_of, default="none", show_default=True, metavar=metavar, help=scale)(
+        command
+    )
     variance = "Local: σ² of the receptive fields. By default from the data."
     command = click.option("--centres", type=click.IntRange(1), help="RBF: number of kernels, 25 by default.")(command)
     command = click.option("--variance", type=float, help=variance)(command)
@@ -93,14 +99,16 @@ def learner_of(name: str, alpha: float | Literal["auto"] | None, softness: float
     return uc.Hybrid(**given, threshold=0.0 if softness else None)  # type: ignore[arg-type]
 
 
-def policy_of(model: str, variance: float | None, centres: int | None, **chosen: Any) -> uc.Policy:
+def policy_of(model: str, variance: float | None, centres: int | None, scale: Any, **chosen: Any) -> uc.Policy:
     """Make the policy of the options."""
+    if scale is not None:  # is what cures them
+        warnings.filterwarnings("ignore", "mixed-units", UserWarning)
     for option, value, needed in (("variance", variance, "local"), ("centres", centres, "rbf")):
         if value is not None and model != needed:
             raise SettingError(f"--{option}: belongs to --model {needed}, got --model {model}.")
         if value is not None:
             chosen[option] = value
-    return MODELS[model](**chosen)
+    return MODELS[model](scale=scale, **chosen)
 
 
 def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None) -> None:

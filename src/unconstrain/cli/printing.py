@@ -79,11 +79,11 @@ def say_surveys(surveys: Sequence[Any]) -> None:
         click.echo(f"columns: {', '.join(columns)}")
     for found in surveys:
         if found.non_increasing:
-            click.echo(f"'{found.name}': time does not increase at row {found.non_increasing[0]}.")
+            click.echo(f"{found.title}: time does not increase at row {found.non_increasing[0]}.")
         for remark in found.warnings:
-            click.echo(remark.about(found.name))
+            click.echo(remark.about(found.title))
         for note in found.notes:
-            click.echo(f"'{found.name}': {note.message}")
+            click.echo(f"{found.title}: {note.message}")
 
 
 option_for_json = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
@@ -167,7 +167,7 @@ def _say_determined(solution: uc.Solution, learner: str) -> None:
 
 
 def _say_doubts(judged: Judged, learner: str) -> None:
-    say(uc.preparation.doubts(judged.demonstrations, 1.0 - judged.training), "fit")
+    say(uc.preparation.doubts(judged.demonstrations, 1.0 - judged.training))
     if 1.0 - judged.held_out > 0.05 + 2.0 * (1.0 - judged.training):
         faster = "" if learner == "robust" else "--speed-power 2 or "
         click.echo(
@@ -256,10 +256,10 @@ def show_warning(message: Warning | str, *_: Any) -> None:
     keep_codes([getattr(message, "code", "")])
 
 
-def say(remarks: Iterable[Any], name: str) -> None:
-    """Print remarks about something of some name as notes."""
+def say(remarks: Iterable[Any]) -> None:
+    """Print remarks about all demonstrations together as notes."""
     for remark in remarks:
-        show_warning(uc.preparation.PreparationWarning(remark.about(name), remark.code))
+        show_warning(uc.preparation.PreparationWarning(remark.about(), remark.code))
 
 
 def keep_codes(codes: Iterable[str]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -40,15 +41,24 @@ MOST_NAMED = 8
 
 
 class Place(NamedTuple):
-    """Where a sample is: its demonstration, its number in it, counted from one, and its time in seconds, if known."""
+    """Where a sample is: its demonstration, its number in it, counted from one, and its time in seconds, if known.
+
+    Of one that was recorded the file, and the row of its recording, from 0 as in all remarks about recordings.
+    """
 
     demonstration: str
     sample: int
     time: float | None
+    file: str = ""
+    row: int | None = None
 
     def __str__(self) -> str:
         time = "" if self.time is None else f" ({self.time:.4g} s)"
-        return f"{self.demonstration} sample {self.sample}{time}"
+        if self.row is None:
+            return f"{self.demonstration} sample {self.sample}{time}"
+        named = not self.file or Path(self.file).name.partition(".")[0] != self.demonstration
+        place = [self.file, f"'{self.demonstration}'" if named else "", f"row {self.row}"]
+        return f"{' '.join(filter(None, place))}{time}"
 
 
 def places_of(rows: NDArray[np.intp], demonstrations: Iterable[tuple[str, Demonstration]]) -> list[Place]:
@@ -59,7 +69,10 @@ def places_of(rows: NDArray[np.intp], demonstrations: Iterable[tuple[str, Demons
         inside = rows[(start <= rows) & (rows < start + len(demo))] - start
         times = [None] * len(inside) if demo.times is None else demo.times[inside].tolist()
         samples = (before[name] + inside + 1).tolist()
-        found += [Place(name, *place) for place in zip(samples, times, strict=True)]
+        known = demo.source
+        rows_of = [None] * len(inside) if known is None else known.rows[inside].tolist()
+        places = zip(samples, times, rows_of, strict=True)
+        found += [Place(name, sample, time, known.file if known else "", row) for sample, time, row in places]
         start, before[name] = start + len(demo), before[name] + len(demo)
     return found
 

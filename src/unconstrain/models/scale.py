@@ -6,6 +6,7 @@ are taken to be orthogonal in the primed coordinates: those in which the demonst
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -13,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Array, as_vector, beside
+from ..base.arrays import Array, as_vector, beside, on_host
 from ..base.errors import SettingError
 from .formula import ClosedForm
 
@@ -28,6 +29,14 @@ BETWEEN = 3.0
 
 PLAUSIBLE = 30.0
 """In the right units, columns differ by at most this factor."""
+
+WRONG, LEAST_SAMPLES = 100.0, 30
+"""A scale was wrong if columns differ in it by this factor, in a batch of at least so many samples."""
+
+UNLIKE_ALL_THE_SAME = (
+    "scale: 'auto' was found on the first batch, and in a later one the scaled columns differ by more than a hundred "
+    "times. Give the scale in numbers, or a first batch that shows all movements."
+)
 
 PRIOR = 0.1
 """The logarithm of the unexplained share counts together with this times that of the factor, squared.
@@ -75,13 +84,31 @@ class Scale:
         consistency : callable
             From a scale (n + d,) to a held-out score of these samples.
         """
-        spread, speed = states.std(axis=0), np.sqrt((actions**2).mean(axis=0))
+        spread, speed = _sizes(states, actions)
         if len(spread) == len(speed):
             scales = [one._replace(scale=np.tile(one.scale, 2)) for one in candidates(np.sqrt(spread * speed))]
         else:
             first = candidates(spread)[0].scale
             scales = [one._replace(scale=np.append(first, one.scale)) for one in candidates(speed)]
         return scales[0].scale if len(scales) == 1 else min(scales, key=lambda one: one.cost(consistency)).scale
+
+    @staticmethod
+    def check(scale: Scale | None, states: Array, actions: Array) -> None:
+        """Warn where a batch of samples shows that the scale that was found on the first one was wrong.
+
+        Warns
+        -----
+        UserWarning
+            If in its units some column still moves :data:`WRONG` times as much as another.
+        """
+        if len(states) < LEAST_SAMPLES:
+            return
+        spread, speed = _sizes(states, actions)
+        own = Scale(np.ones(len(spread)), np.ones(len(speed))) if scale is None else scale
+        sizes = np.sqrt(spread / own.states * speed / own.actions) if len(spread) == len(speed) else speed / own.actions
+        moving = sizes[sizes > 0]
+        if moving.size and moving.max() > WRONG * moving.min():
+            warnings.warn(UNLIKE_ALL_THE_SAME, UserWarning, stacklevel=4)
 
     def state(self, states: Array) -> Array:
         """States (N, n) in the policy's own units."""
@@ -117,6 +144,12 @@ class Scale:
             reach=self.states * own.reach,
             precisions=None if own.precisions is None else own.precisions / self.states**2,
         )
+
+
+def _sizes(states: Array, actions: Array) -> tuple[Array, Array]:
+    """Spread of states (n,) and root-mean-square actions (d,) of some samples, of whatever array library."""
+    states, actions = (np.asarray(on_host(table), dtype=np.float64) for table in (states, actions))
+    return states.std(axis=0), np.sqrt((actions**2).mean(axis=0))
 
 
 class Candidate(NamedTuple):

@@ -111,9 +111,10 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
     ) -> Self:
         """Learn from a further batch; the sums are those of all batches at once.
 
-        The first batch fixes features, fields, action dimensions, and the spread by which samples are dealt into folds;
-        it should be typical. Batches of too few different states to tell are kept until there are enough. Parameters,
-        result and errors as in :meth:`fit`. The solution is found anew each time; where only the last counts,
+        The first batch, which should be typical, fixes features, fields, action dimensions, the spread by which samples
+        are dealt into folds, and a scale that is ``"auto"``; a later one that is unlike in it is warned of. Batches of
+        too few different states to tell are kept until there are enough. Parameters, result and errors as in
+        :meth:`fit`. The solution is found anew each time; where only the last counts,
         :meth:`fit_batches` is faster.
         """
         first, learner, draft = not hasattr(self, "solution_"), named(self.learner), self._draft()
@@ -379,8 +380,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
             )
         if auto:
             some = batch.at(np.unique(np.linspace(0, batch.states.shape[0] - 1, _LOOKED_AT).astype(np.intp)))
-            states, actions = (np.asarray(on_host(table), dtype=np.float64) for table in some[:2])
-            asked = Scale.comparable(states, actions, partial(self._consistency, some))
+            asked = Scale.comparable(*some[:2], partial(self._consistency, some))
         scale = Scale.of(asked, batch.states.shape[1], batch.actions.shape[1])
         return None if scale.is_one else scale
 
@@ -451,6 +451,8 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
             self.scale_ = self._scaled(batch)
         elif columns != self.n_outputs_:
             raise InvalidDataError(f"actions: got {columns} columns, expected {self.n_outputs_} as before.")
+        elif isinstance(self.scale, str) and not self._is_curved:
+            Scale.check(self.scale_, *batch[:2])
         if self.scale_ is None:
             return batch
         noise = None if batch.noise is None else self.scale_.action(batch.noise)

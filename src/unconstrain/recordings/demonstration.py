@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array, as_matrix, as_vector
-from ..base.display import Shown, counted, shortened
+from ..base.display import Shown, counted, listed, shortened
 from ..base.errors import InvalidDataError
 from ..models import spaces
 from .columns import resolve
-from .remarks import Remark
+from .remarks import Remark, titled
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,6 +39,8 @@ class Recording(Shown):
         Unit of a column, as the file says it (``"mm"``, ``"deg"``), for the columns of which it says one.
     attributes : mapping of str to object
         What the file says of the whole recording: its task, the version of its environment, its rate.
+    file : str
+        Path of the file, for messages; empty where it came from none.
 
     Examples
     --------
@@ -54,9 +57,15 @@ class Recording(Shown):
     remarks: tuple[Remark, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
     attributes: Mapping[str, Any] = field(default_factory=dict)
+    file: str = ""
 
     def __len__(self) -> int:
         return len(self.values)
+
+    @property
+    def title(self) -> str:
+        """What it is called in messages."""
+        return titled(self.name, self.file)
 
     def select(self, names: Sequence[str]) -> Array:
         """Pick columns by name, shape (T, len(names)).
@@ -66,18 +75,21 @@ class Recording(Shown):
         InvalidDataError
             If a column does not exist; the message lists those that do.
         """
-        missing = [name for name in names if name not in self.columns]
+        missing = [name for name in names if name not in self._places]
         if missing:
             near = dict.fromkeys(column for name in missing for column in _near(name, self.columns))
             meant = f" Did you mean {' or '.join(map(repr, near))}?" if near else ""
-            raise InvalidDataError(
-                f"'{self.name}' has no column {', '.join(map(repr, missing))}; it has {', '.join(self.columns)}.{meant}"
-            )
-        return self.values[:, [self.columns.index(name) for name in names]]
+            has_not = f"'{self.name}' has no column {listed([*map(repr, missing)])}; it has {listed(self.columns)}."
+            raise InvalidDataError(has_not + meant)
+        return self.values[:, [self._places[name] for name in names]]
 
     def resolve(self, names: Sequence[str]) -> tuple[str, ...]:
         """Columns that names, patterns (``joint_?``), ranges (``q1..q7``) and stems (``position``) mean, in order."""
         return resolve(names, self.columns)
+
+    @cached_property
+    def _places(self) -> Mapping[str, int]:
+        return {name: place for place, name in reversed(list(enumerate(self.columns)))}
 
     def _summary(self) -> tuple[str, ...]:
         sizes = counted(len(self), "row"), counted(len(self.columns), "column")
@@ -110,6 +122,17 @@ class Truth(Shown):
         return counted(len(self.policy), "sample"), counted(self.policy.shape[1], "action")
 
 
+class Source(NamedTuple):
+    """Where samples were recorded: the file, and rows (T,) of its recording, from 0, that each is at or nearest to."""
+
+    file: str
+    rows: NDArray[np.intp]
+
+    def at(self, rows: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Source:
+        """Of some of the samples."""
+        return Source(self.file, self.rows[rows])
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Demonstration(Shown):
     """One recorded movement.
@@ -128,6 +151,8 @@ class Demonstration(Shown):
         Which states are angles or orientations (:mod:`unconstrain.spaces`); policies that learn from it take it.
     noise : float or array_like, shape (d,), optional
         Standard deviation of the noise on the actions, on each or on all; None where it is not known.
+    source : Source, optional
+        File and rows that the samples came from, for messages.
 
     Raises
     ------
@@ -147,6 +172,7 @@ class Demonstration(Shown):
     name: str = ""
     space: spaces.Space = field(default_factory=spaces.Euclidean)
     noise: Array | None = None
+    source: Source | None = None
 
     def __post_init__(self) -> None:
         of = f" of '{self.name}'" if self.name else ""
@@ -176,6 +202,7 @@ class Demonstration(Shown):
             actions=self.actions[rows],
             times=None if self.times is None else self.times[rows],
             truth=None if self.truth is None else Truth(self.truth.policy[rows], self.truth.projections[rows]),
+            source=None if self.source is None else self.source.at(rows),
         )
 
     def _each(self, noise: Any, of: str) -> Array:

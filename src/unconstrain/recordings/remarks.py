@@ -1,5 +1,6 @@
 """What is worth saying about a recording."""
 
+from pathlib import Path
 from typing import NamedTuple
 
 WARNINGS = (
@@ -42,8 +43,13 @@ class Remark(NamedTuple):
         """Whether the recording may not be what it seems, rather than how it was read."""
         return self.code in WARNINGS
 
-    def about(self, name: str) -> str:
-        """One line on a recording of some name: the code, the place, and the message."""
-        places = [f"'{name}'", *([] if self.row is None else [f"row {self.row}"])]
-        places += [] if self.column is None else [f"column {self.column!r}"]
-        return f"{self.code}: {', '.join(places)}: {self.message}"
+    def about(self, title: str = "") -> str:
+        """One line on a recording of some title, or on several: the code, the place, and the message."""
+        row = "" if self.row is None else f"row {self.row}"
+        column = "" if self.column is None else f"column {self.column!r}"
+        return ": ".join(filter(None, (self.code, ", ".join(filter(None, (title, row, column))), self.message)))
+
+
+def titled(name: str, file: str = "") -> str:
+    """A recording by its name, and by its file where it is not called as that."""
+    return f"'{name}'" if name.startswith(Path(file).name.partition(".")[0]) else f"'{name}' of {file}"

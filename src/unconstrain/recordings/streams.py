@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import BLOCK_ROWS, Array, check_at_least
-from ..base.errors import InvalidDataError
+from ..base.errors import NOTHING_LEFT, ReadError
 from ..models import spaces
 from .demonstration import Demonstration, Recording, noise_of, times_of
 from .preparation import Recipe, decide, prepare
@@ -102,18 +104,18 @@ class Stream:
 
     @cached_property
     def first(self) -> Recording:
-        """The first recording, or the first block of it."""
+        """The first recording, or the first block of it; a ReadError where none is left."""
         blocks = (block for path in self.paths for block in self._blocks(path))
         try:
             return next(blocks)
         except StopIteration:
-            raise InvalidDataError("got no recording that is not left out, expected at least one.") from None
+            raise ReadError(NOTHING_LEFT) from None
 
     @cached_property
     def recipe(self) -> Recipe:
         """The recipe, completed by a look at the first recording."""
         recipe, remarks = decide(self._asked, self.first)
-        warn(self.first.name, remarks)
+        warn(self.first.title, remarks)
         return recipe
 
     @property
@@ -186,11 +188,13 @@ class Stream:
     def _read(self) -> Iterator[tuple[str, Demonstration]]:
         by_rows = self.recipe.is_row_by_row
         for number, path in enumerate(self.paths, start=self._first_file):
+            before = Counter[str]()
             for recording in self._blocks(path, whole=not by_rows):
                 with warnings.catch_warnings():
                     if self._walked:  # it was said on the first walk
                         warnings.simplefilter("ignore", UserWarning)
-                    demonstration = self._prepared(recording)
+                    demonstration = self._prepared(recording, before[recording.name])
+                before[recording.name] += len(recording)
                 yield f"{number}/{recording.name}", demonstration
             if self._progress is not None:
                 self._progress(number - self._first_file + 1, len(self.paths))
@@ -200,16 +204,19 @@ class Stream:
             if recording.name not in self.leave_out:
                 yield recording
 
-    def _prepared(self, recording: Recording) -> Demonstration:
+    def _prepared(self, recording: Recording, before: int) -> Demonstration:
+        """A recording, or a block of it after so many rows, as a demonstration."""
         subject = subject_of(recording, self.recipe)
         if not self._walked and len(self._outlines) < MOST_OUTLINES:
-            self._outlines.append((recording.name, outline(subject)))
-        return prepare_one(subject)
+            self._outlines.append((recording.title, outline(subject)))
+        prepared = prepare_one(subject)
+        source = prepared.source
+        return replace(prepared, source=None if source is None else source._replace(rows=source.rows + before))
 
     def _say_what_differs(self) -> None:
         said = compare([one for _, one in self._outlines])
-        for (name, _), remarks in zip(self._outlines, said, strict=True):
-            warn(name, remarks)
+        for (title, _), remarks in zip(self._outlines, said, strict=True):
+            warn(title, remarks)
         self._outlines.clear()
 
     def _batch(self, named: list[tuple[str, Demonstration]]) -> Block:

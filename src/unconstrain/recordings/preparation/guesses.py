@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import wraps
 
 VELOCITY_NAMES = ("v{}", "d{}", "{}_dot", "dot_{}", "{}dot", "{}_vel", "{}_velocity", "vel_{}")
 """How people call the velocity of a column."""
@@ -36,7 +37,9 @@ FAMILY_OF_VELOCITY = (
 FAMILY_OF_ACTIONS = (*FAMILY_OF_VELOCITY, ("states", "actions"), ("state", "action"))
 """The same where the states are told: by themselves ``states`` may be those of a simulator."""
 
-PLACES = re.compile(r"(^|[._/ ])(pose|pos|position|translation|tcp|ee|eef|tool|hand|point|p)(_?(pos|position|pose))?$")
+PLACES = re.compile(
+    r"^p_\w+$|(^|[._/ ])(pose|pos|position|translation|tcp|ee|eef|tool|hand|point|p)(_?(pos|position|pose))?$"
+)
 """An axis of such a thing is a position."""
 
 JOINTS = re.compile(r"(^|[._/ ])(actual_)?(q|qpos|joints?|joint_?(pos|positions?|angles?)|positions?|tcp_pose|pos)$")
@@ -46,6 +49,28 @@ _NUMBERED = re.compile(r"(.*?)[_. \[]?(\d+)\]?")
 _OF_AXIS = re.compile(r"(.*?)(?:[_. /]|(?<=[a-z])(?=[XYZ]))?([xyzXYZ])")
 
 
+_UNIT = re.compile(r"[_ ]?[\[(](?=\D)[^\[\]()]{0,12}[\])]$")
+"""A unit in brackets at the end of a name."""
+
+Guess = Callable[..., tuple[str, ...] | None]
+
+
+def _without_units(guess: Guess) -> Guess:
+    """A guess by names without units in brackets, unless two would be the same then."""
+
+    @wraps(guess)
+    def guessed(columns: Sequence[str], *states: Sequence[str]) -> tuple[str, ...] | None:
+        plain = {name: _UNIT.sub("", name) for name in columns}
+        if len(set(plain.values())) < len(columns):
+            return guess(columns, *states)
+        found = guess(tuple(plain.values()), *(tuple(plain.get(name, name) for name in one) for one in states))
+        named = {short: name for name, short in plain.items()}
+        return None if found is None else tuple(named[short] for short in found)
+
+    return guessed
+
+
+@_without_units
 def guess_states(columns: Sequence[str]) -> tuple[str, ...] | None:
     """Columns that look as states: with a velocity, numbered x, several with their velocities, positions."""
     moving = max((_with_velocity(columns, style) for style in VELOCITY_NAMES), key=len)
@@ -58,6 +83,7 @@ def guess_states(columns: Sequence[str]) -> tuple[str, ...] | None:
     return paired or positions_in(columns)
 
 
+@_without_units
 def guess_actions(columns: Sequence[str], states: Sequence[str]) -> tuple[str, ...] | None:
     """Columns that look as the velocities of these states, or as the actions in them."""
     for style in VELOCITY_NAMES:
@@ -72,6 +98,7 @@ def guess_actions(columns: Sequence[str], states: Sequence[str]) -> tuple[str, .
     return numbered_as("u", columns) if tuple(states) == numbered_as("x", columns) else None
 
 
+@_without_units
 def positions_in(columns: Sequence[str]) -> tuple[str, ...] | None:
     """Columns that look as positions, to be differentiated; None where there are none, or several to choose from."""
     places = _places(columns)
@@ -95,9 +122,9 @@ def numbered_as(letter: str, columns: Sequence[str]) -> tuple[str, ...] | None:
 
 
 def _with_velocity(columns: Sequence[str], style: str) -> tuple[str, ...]:
-    velocities = {style.format(name) for name in columns}
+    known, velocities = set(columns), {style.format(name) for name in columns}
     # Beside x, dx, ddx only x is a state: dx is its velocity.
-    return tuple(name for name in columns if style.format(name) in columns and name not in velocities)
+    return tuple(name for name in columns if style.format(name) in known and name not in velocities)
 
 
 def _families(columns: Sequence[str]) -> Mapping[str, tuple[str, ...]]:
@@ -140,12 +167,13 @@ def _places(columns: Sequence[str]) -> Mapping[str, tuple[str, ...]]:
     places = {}
     for head, names in axes.items():
         letters = next((each for each in AXES if set(each) == set(names)), None)
-        if letters and (head == "" or (head not in turning and not _NOT_PLACES.search(head.lower()))):
+        is_place = head not in turning and not _NOT_PLACES.search(head.lower())
+        if letters and (head == "" or is_place or (head == "t" and "q" in turning and "f" not in axes)):
             places[head] = tuple(names[letter] for letter in letters)
     return places
 
 
 _NOT_PLACES = re.compile(
-    r"(?:^|[._/ ])(force|torque|wrench|moment|linear|angular|vel|velocity|speed|acc|acceleration|gyro|mag|orientation"
-    r"|rot|rotation|quat|quaternion|euler|twist|f|t|r|n|w|v|d|a|q)$"
+    r"^(?!p_)(?:.*[._/ ])?(force|torque|wrench|moment|linear|angular|vel|velocity|speed|acc|acceleration|gyro|mag"
+    r"|orientation|rot|rotation|quat|quaternion|euler|twist|f|t|r|n|w|v|d|a|q)$"
 )

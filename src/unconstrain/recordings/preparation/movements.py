@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...base.arrays import Array, as_matrix, as_vector, check_at_least
 from ...base.errors import InvalidDataError, SettingError
-from ..demonstration import Demonstration, Recording
+from ..demonstration import Demonstration, Recording, Source
 from ..remarks import Remark
 from ..signals.jumps import glitches, repaired, seams
 from ..signals.smoothing import LEAST, kalman_velocities
@@ -110,29 +110,29 @@ def prepare(recordings: Recording | Sequence[Recording], recipe: Recipe | None =
     if not every:
         raise InvalidDataError("got no recording, expected at least one.")
     whole, remarks = decide(recipe or Recipe(), every[0])
-    warn(every[0].name, remarks, stacklevel=3)
+    warn(every[0].title, remarks, stacklevel=3)
     subjects = [Subject(recording, whole) for recording in every]
     demonstrations = [prepare_one(subject, stacklevel=4) for subject in subjects]
     for subject, remarks in zip(subjects, compare([outline(subject) for subject in subjects]), strict=True):
-        warn(subject.recording.name, remarks, stacklevel=3)
+        warn(subject.recording.title, remarks, stacklevel=3)
     return demonstrations
 
 
 def prepare_one(subject: Subject, stacklevel: int = 2) -> Demonstration:
     """Turn one recording into a demonstration, by a recipe that names its columns; as :func:`prepare`."""
-    name = subject.recording.name
-    warn(name, examine(subject), stacklevel + 1)
+    title = subject.recording.title
+    warn(title, examine(subject), stacklevel + 1)
     demonstration, notes = _prepare(subject.recording, subject.recipe)
     for note in notes:
-        warnings.warn(PreparationWarning(f"'{name}': {note}"), stacklevel=stacklevel)
+        warnings.warn(PreparationWarning(f"{title}: {note}"), stacklevel=stacklevel)
     return demonstration
 
 
-def warn(name: str, remarks: Sequence[Remark], stacklevel: int = 2) -> None:
-    """Say what there is to say about a recording of some name."""
+def warn(title: str, remarks: Sequence[Remark], stacklevel: int = 2) -> None:
+    """Say what there is to say about a recording of some title."""
     for remark in remarks:
         code = remark.code if remark.warns else ""
-        warnings.warn(PreparationWarning(remark.about(name), code), stacklevel=stacklevel)
+        warnings.warn(PreparationWarning(remark.about(title), code), stacklevel=stacklevel)
 
 
 def differentiate(
@@ -288,18 +288,21 @@ def _prepare(recording: Recording, recipe: Recipe) -> tuple[Demonstration, list[
     notes: list[str] = []
     noise = None
     if times is None:
-        states, actions = _in_rows(states, actions, recipe)
+        at, states, actions = _in_rows(states, actions, recipe)
     else:
+        stamped = times
         piece, notes = _without_repeats(_Piece(*_sorted(times, states, actions, recipe)), recording.name)
         pieces = _split(_without_glitches(piece._replace(states=continuous(piece.states, recipe)), recipe), recipe)
         (times, states, actions, noise), more = _repair(pieces, recipe, recording.name)
         notes += more
+        at = _nearest(stamped, times)
     if actions is None:
         raise SettingError(
             f"'{recording.name}' has no times, which are needed to differentiate: "
             "name the time column (--time), or give its rate in samples per second (--rate)."
         )
-    demonstration = Demonstration(states, actions, times, name=recording.name, noise=noise, space=recipe.space)
+    source = Source(recording.file, at)
+    demonstration = Demonstration(states, actions, times, None, recording.name, recipe.space, noise, source)
     if recipe.trim is not None or recipe.still is not None:
         demonstration = trim(demonstration, *(recipe.trim or (0.0, 0.0)), still=recipe.still)
     if recipe.centre:
@@ -352,11 +355,20 @@ def _sorted(times: Array, states: Array, actions: Array | None, recipe: Recipe) 
     return times[order], states[order], None if actions is None else actions[order]
 
 
-def _in_rows(states: Array, actions: Array | None, recipe: Recipe) -> tuple[Array, Array | None]:
-    """States and actions without times: continuous, without glitches and pauses."""
+def _nearest(stamps: Array, times: Array) -> NDArray[np.intp]:
+    """Rows (S,) of the stamps (T,), in any order, that are nearest to some times (S,)."""
+    order = np.argsort(stamps, kind="stable")
+    inner = stamps[order]
+    after = np.clip(np.searchsorted(inner, times), 1, len(inner) - 1)
+    return order[after - (times - inner[after - 1] < inner[after] - times)]
+
+
+def _in_rows(states: Array, actions: Array | None, recipe: Recipe) -> tuple[NDArray[np.intp], Array, Array | None]:
+    """Rows, states and actions without times: continuous, without glitches and pauses."""
     piece = _Piece(np.arange(len(states), dtype=np.float64), continuous(states, recipe), actions)
     pieces = _split(_without_glitches(piece, recipe), recipe)
-    return _joined(pieces)[1:3]
+    joined = _joined(pieces)
+    return joined.times.astype(np.intp), joined.states, joined.actions
 
 
 def _without_glitches(piece: _Piece, recipe: Recipe) -> _Piece:

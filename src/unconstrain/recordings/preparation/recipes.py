@@ -258,20 +258,26 @@ def _with_columns(recipe: Recipe, recording: Recording) -> Recipe:
     columns = recording.columns
     states = recipe.states and recording.resolve(recipe.states)
     told = replace(recipe, states=states, actions=recipe.actions and recording.resolve(recipe.actions))
-    recording.select([*(told.states or ()), *(told.actions or ())])
-    states = states or guess_states(columns)
+    states = states or _with_turning(told, guess_states(columns))
+    replace(recording, values=recording.values[:0]).select([*(states or ()), *(told.actions or ())])
     if states and (told.actions or told.differentiate):
         return replace(told, states=states)
     actions = states and guess_actions(columns, states)
     if actions:
         return replace(told, states=states, actions=actions)
-    if states and states == positions_in(columns):
+    if states and states == _with_turning(recipe, positions_in(columns)):
         return replace(told, states=states, differentiate="savgol")
     raise SettingError(
         f"'{recording.name}': cannot tell {'the actions' if states else 'states and actions'} from its columns "
         f"{', '.join(columns)}. Say which with states and actions (--state, --action), "
         "or take the velocity of the states with differentiate='savgol' (--state, --differentiate)."
     )
+
+
+def _with_turning(recipe: Recipe, states: tuple[str, ...] | None) -> tuple[str, ...] | None:
+    """States as guessed, and what the recipe says is an angle or part of an orientation: its columns are states."""
+    groups = (recipe.angles, *recipe.quaternions, *recipe.rotation_vectors)
+    return tuple(dict.fromkeys((*(states or ()), *(name for group in groups for name in group)))) or None
 
 
 def _names(what: str, names: Any) -> tuple[str, ...] | None:

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...base.arrays import Array
-from ...base.errors import InvalidDataError, SettingError, UnconstrainError
+from ...base.errors import UnconstrainError
 from ..demonstration import Recording
-from ..remarks import Remark
+from ..remarks import Remark, titled
 from .decisions import in_radians
 from .movements import Gap, find_gaps
 from .plausibility.checks import examine
@@ -44,6 +44,8 @@ class Survey:
         What is not as it seems, at most one for each code.
     notes : tuple of Remark
         How the file was read, where that is worth a word: columns without names, demonstrations taken apart.
+    file : str
+        Path of the file; empty where it came from none.
     """
 
     name: str
@@ -58,6 +60,12 @@ class Survey:
     zero_actions: int | None
     warnings: tuple[Remark, ...]
     notes: tuple[Remark, ...] = ()
+    file: str = ""
+
+    @property
+    def title(self) -> str:
+        """What the recording is called in messages."""
+        return titled(self.name, self.file)
 
 
 def survey(recording: Recording, recipe: Recipe | None = None) -> Survey:
@@ -113,7 +121,7 @@ def _survey(subject: Subject, asked: Recipe) -> Survey:
     gaps = find_gaps(known, asked.max_gap_s)
     steady = _steady_intervals(known, gaps)
     typical = float(np.median(steady)) if steady.size else None
-    bad_cells = (~np.isfinite(recording.values)).sum(axis=0)
+    bad_cells = [int((~np.isfinite(column)).sum()) for column in recording.values.T]
     return Survey(
         name=recording.name,
         columns=recording.columns,
@@ -123,10 +131,11 @@ def _survey(subject: Subject, asked: Recipe) -> Survey:
         jitter=float(steady.std() / typical) if typical else None,
         gaps=gaps,
         non_increasing=() if times is None else tuple((np.flatnonzero(~(np.diff(times) > 0)) + 1).tolist()),
-        missing={name: int(count) for name, count in zip(recording.columns, bad_cells, strict=True) if count},
-        zero_actions=_zero_actions(recording, asked),
+        missing={name: count for name, count in zip(recording.columns, bad_cells, strict=True) if count},
+        zero_actions=_zero_actions(subject),
         warnings=tuple(remark for remark in examine(subject) if remark.warns),
         notes=tuple(remark for remark in recording.remarks if not remark.warns),
+        file=recording.file,
     )
 
 
@@ -152,11 +161,6 @@ def _steady_intervals(times: Array, gaps: tuple[Gap, ...]) -> Array:
     return intervals[(intervals > 0) & (intervals < shortest_gap)]
 
 
-def _zero_actions(recording: Recording, recipe: Recipe) -> int | None:
-    try:
-        actions = complete_recipe(recipe, recording).actions
-    except (InvalidDataError, SettingError):
-        return None
-    if actions is None or not set(actions) <= set(recording.columns):
-        return None
-    return int((recording.select(actions) == 0).all(axis=1).sum())
+def _zero_actions(subject: Subject) -> int | None:
+    actions = subject.recipe.actions
+    return None if actions is None else int((subject.recording.select(actions) == 0).all(axis=1).sum())

@@ -16,7 +16,7 @@ from dataclasses import replace
 from glob import glob
 from pathlib import Path
 
-from ...base.errors import ReadError, SettingError
+from ...base.errors import NOTHING_LEFT, ReadError, SettingError
 from ..demonstration import Recording
 from .folders import files_in
 from .formats import format_of
@@ -85,7 +85,7 @@ def read(
     told = Reading(group, time, time_unit, columns, topic, episodes, task)
     found = [recording for path in expand(paths) for recording in read_blocks(path, told, whole=True)]
     if not found:
-        raise ReadError("no demonstration is left to read; check episodes (--episodes) and task (--task).")
+        raise ReadError(NOTHING_LEFT)
     names = unique_names(recording.name for recording in found)
     return [replace(recording, name=name) for recording, name in zip(found, names, strict=True)]
 
@@ -97,6 +97,8 @@ def read_blocks(path: PathLike, reading: Reading | None = None, *, whole: bool =
     """
     file, told = Path(path), reading or Reading()
     known = format_of(file)
+    if told.columns is not None and known.has_names:
+        raise SettingError(f"columns (--columns): {file} says itself what its columns are called; leave them off.")
     assembly = Assembly(file, told)
     for table in (known.read if whole or known.blocks is None else known.blocks)(file, told):
         yield from assembly.recordings(table)

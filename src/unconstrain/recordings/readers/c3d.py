@@ -180,4 +180,4 @@ def _numbers(values: list[Any], count: int, otherwise: float) -> Array:
     return np.array(known if len(known) == count else [otherwise] * count)
 
 
-FORMAT = Format((".c3d",), lambda head: len(head) > 1 and head[1] == 0x50 and head[0] == 2, read_c3d)
+FORMAT = Format((".c3d",), lambda head: len(head) > 1 and head[1] == 0x50 and head[0] == 2, read_c3d, has_names=True)

@@ -20,6 +20,7 @@ from ...base.arrays import Array
 from ...base.errors import ReadError
 from .layout import NOTHING, Layout, is_comment, number, read_list, split
 from .lines import Lines
+from .table import numbers_of
 
 Row = tuple[int, list[str]]
 """Line number, from 1, and cells."""
@@ -91,14 +92,10 @@ class Parser:
         if self.layout.delimiter == " ":
             text = re.sub(rb" *\n", b"\n", re.sub(rb"[ \t]+", b" ", text)).replace(b"\n ", b"\n")
         table = _read_csv(self._arrow, text, self.layout, self.numbers, self.words)
-        words = (
-            {} if table is None else {at: [cell.strip() for cell in table[str(at)].to_pylist()] for at in self.words}
-        )
+        words = {} if table is None else {at: _stripped(table[str(at)].to_pylist()) for at in self.words}
         if table is None or (self.group is not None and not all(words[self.group])):
             return None
-        numbers = np.empty((table.num_rows, len(self.numbers)))
-        for place, at in enumerate(self.numbers):
-            numbers[:, place] = table[str(at)].to_numpy()
+        numbers = numbers_of(table.select([str(at) for at in self.numbers]))
         self._has_number[self.numbers] |= np.isfinite(numbers).any(axis=0)
         return Cells(numbers, words, ())
 
@@ -185,6 +182,12 @@ def _numbers(cells: Sequence[str], decimal: str) -> tuple[Array, int | None]:
     values = [number(cell, decimal) for cell in cells]
     word = next((row for row, value in enumerate(values) if value is None), None)
     return np.array([np.nan if value is None else value for value in values]), word
+
+
+def _stripped(cells: Sequence[str]) -> list[str]:
+    """Words without white space around them, equal ones in one place of memory."""
+    once = {cell: cell.strip() for cell in cells}
+    return [once[cell] for cell in cells]
 
 
 def _arrow() -> ModuleType | None:

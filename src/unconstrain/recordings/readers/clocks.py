@@ -33,7 +33,7 @@ _WORDS_OF_UNITS = {
 }
 _UNIT = "|".join(_WORDS_OF_UNITS.values())
 _UNIT_IN_NAME = re.compile(rf"(?:[_. \[(]|(?<=time)|(?<=stamp)|(?<=^t))({_UNIT})[\])]?$", re.IGNORECASE)
-_TIME = r"(?:t|times?|time[_ ]?stamps?|stamps?|rosbagtimestamp|elapsed|date[_ ]?time|clock)"
+_TIME = r"(?:t|times?|time[_ ]?stamps?|stamps?|rosbagtimestamp|elapsed|date[_ ]?time|clock|zeit|temps|tiempo|tempo)"
 _WHOSE = r"(?:[a-z]+[_ ])?(?:elapsed|ros|robot|sys(?:tem)?|unix|utc|epoch|wall|sim(?:ulation)?|log|record(?:ing)?)[_ ]?"
 TIME_NAME = re.compile(
     rf"(?:(?:.*[./])?header[./_]stamp|[%_#]*{_TIME}|{_WHOSE}{_TIME})(?:[_ ]?[\[(]?(?:{_UNIT})[\])]?)?",
@@ -45,6 +45,7 @@ _WHOLE = re.compile(r"(.*?)(secs?|seconds)", re.IGNORECASE)
 _PARTS = ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds", "nsecond", "nseconds")
 
 _ZONE = re.compile(r"\s*(?:Z|UTC|[+-]\d\d:?\d\d)$")
+_DATE = re.compile(r"^(\d{4})[/.](\d\d)[/.](\d\d)")
 _OF_DAY = re.compile(r"(?:(\d+):)?(\d+):(\d+(?:[.,]\d*)?)")
 _DAY = 86_400.0
 
@@ -134,7 +135,7 @@ def read_words(words: Sequence[str]) -> Array | None:
         return None
     if all(not word or _OF_DAY.fullmatch(word) for word in given):
         return _times_of_day(given)
-    plain = [_ZONE.sub("", word).replace(",", ".") or "NaT" for word in given]
+    plain = [_DATE.sub(r"\1-\2-\3", _ZONE.sub("", word).replace(",", ".")) or "NaT" for word in given]
     if not all(re.match(r"\d{4}-\d\d-\d\d|NaT", word) for word in plain):
         return None
     try:

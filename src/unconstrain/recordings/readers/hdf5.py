@@ -53,7 +53,7 @@ def read_hdf5_blocks(path: Path, reading: Reading) -> Iterator[Table]:
 def _read(path: Path, reading: Reading, rows: int | None) -> Iterator[Table]:
     h5py = require_extra("h5py", "data")
     with ours_alone(path, "an HDF5 file"), h5py.File(path, "r") as file:
-        yield from tables_of(_branch(file, path.stem, reading, _masks(file)), path, rows)
+        yield from tables_of(_branch(file, path.stem, reading, _masks(file)), path, reading.columns, rows)
 
 
 def _branch(node: Any, name: str, reading: Reading, masks: Mapping[str, list[str]], depth: int = 0) -> Branch:

@@ -8,10 +8,12 @@ separate cells, and what stands above it is its header.
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import takewhile
+from functools import cached_property
+from itertools import compress, takewhile
 from typing import Any, NamedTuple
 
 from .table import unique_names
@@ -60,6 +62,8 @@ _RATE = re.compile(
     re.IGNORECASE,
 )
 _VICON_RATE = re.compile(r"^\W*(?:Trajectories|Model Outputs|Joints|Segments|Devices)\W*\n\W*([\d.]+)", re.MULTILINE)
+_IN_DEGREES = re.compile(r"^\W*in ?degrees\s*[=,;:\t ]\s*(yes|y|true|1)\b", re.IGNORECASE | re.MULTILINE)
+_NO_ROTATION = re.compile(r".*_[tvp][xyz](/(value|speed))?|.*(force|torque|moment).*|time", re.IGNORECASE)
 _MARKERS = re.compile(r"^MARKER_NAMES[\t,;](.+)$", re.MULTILINE)
 
 
@@ -109,7 +113,7 @@ class Layout:
     others: tuple[tuple[int, int, int], ...]
     various: tuple[int, ...]
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the columns, all different."""
         return unique_names(title or f"column{at + 1}" for at, title in enumerate(self.titles))
@@ -206,6 +210,7 @@ def find_block(rows: Rows, lines: Sequence[str], delimiter: str, decimal: str) -
     after = [line for line, cells in enumerate(rows) if line > run.last and cells is not None]
     stop = after[0] if after and any(line > run.last for line, _, _ in others) else None
     titles, units = _titles(header, len(run.kinds), above)
+    units = _degrees(titles, above) | units
     layout = Layout(
         *(delimiter, decimal, first, titles, kinds, any(titles), tuple(map(tuple, header)), units),
         *(_attributes(rows[:first], header), _rate(above), stop, others, _various(rows[first:], kinds)),
@@ -220,8 +225,8 @@ def _runs(rows: Rows, decimal: str) -> list[_Run]:
     for line, cells in enumerate(rows):
         if cells is None:
             continue
-        kinds = "".join(_kind(cell, decimal) for cell in cells)
-        weight = sum(len(cell) for cell, kind in zip(cells, kinds, strict=True) if kind in "nl")
+        kinds = _kinds(cells, decimal)
+        weight = sum(map(len, compress(cells, map("nl".__contains__, kinds))))
         latest = _place(runs, kinds, latest)
         if latest is not None:
             run = runs[latest]
@@ -250,6 +255,15 @@ def _merged(one: str, other: str) -> str | None:
     return "".join(b if a == "e" else a for a, b in pairs)
 
 
+def _kinds(cells: Sequence[str], decimal: str) -> str:
+    """Kinds of the cells of a row; one that is all numbers is known at once."""
+    try:
+        plain = decimal == "." and "_" not in "".join(cells) and not any(map(math.isnan, map(float, cells)))
+    except ValueError:
+        plain = False
+    return "n" * len(cells) if plain else "".join(_kind(cell, decimal) for cell in cells)
+
+
 def _kind(cell: str, decimal: str) -> str:
     if cell in NOTHING:
         return "e"
@@ -275,7 +289,7 @@ def _weight(run: _Run, rows: Rows, decimal: str) -> float:
 
 
 def _is_words(cells: Sequence[str], decimal: str) -> bool:
-    kinds = {_kind(cell, decimal) for cell in cells if cell}
+    kinds = set(_kinds([cell for cell in cells if cell], decimal))
     return bool(kinds) and kinds <= {"w", "e"} and "w" in kinds
 
 
@@ -324,7 +338,7 @@ def _kinds_below(rows: Rows, first: int, run: _Run, decimal: str) -> str:
     kinds = run.kinds
     for cells in rows[first:]:
         if cells is not None and len(cells) == len(kinds):
-            here = "".join(_kind(cell, decimal) for cell in cells)
+            here = _kinds(cells, decimal)
             if here != kinds:
                 kinds = "".join(max(pair, key=order.index) for pair in zip(kinds, here, strict=True))
     return kinds
@@ -389,6 +403,12 @@ def _titles(header: Sequence[list[str]], width: int, above: str) -> tuple[tuple[
     units = {name: unit.strip("[]()") for name, unit in zip(unique_names(titles), unit_row or (), strict=False) if unit}
     in_names = {name: found[1] for name in titles if (found := _UNIT_IN_NAME.search(name))}
     return titles, {**{name: unit for name, unit in in_names.items() if _UNIT_WORD.fullmatch(unit)}, **units}
+
+
+def _degrees(titles: Sequence[str], above: str) -> dict[str, str]:
+    """Units of coordinates as OpenSim tells them: ``inDegrees=yes`` but for time, forces and translations (``_tx``)."""
+    turning = titles if _IN_DEGREES.search(above) else ()
+    return {name: "deg" for name in turning if name and not _NO_ROTATION.fullmatch(name)}
 
 
 def _spread(row: Sequence[str], below: Sequence[str]) -> list[str]:

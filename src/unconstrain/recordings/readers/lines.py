@@ -2,12 +2,13 @@
 
 import codecs
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from ...base.errors import ReadError
 
-BLOCK_BYTES = 2**22
+BLOCK_BYTES = 2**21
 """So much of a text is parsed at once."""
 
 LONGEST_LINE = 2**26
@@ -16,7 +17,7 @@ LONGEST_LINE = 2**26
 HEAD_BYTES = 2**18
 """So much of a text is looked at to find its table, or so many lines if that is more."""
 
-HEAD_LINES = 50
+HEAD_LINES = 20
 
 _MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))
 
@@ -75,8 +76,9 @@ def head_of(blocks: Iterator[Lines]) -> list[Lines]:
 
 
 def texts(head: Sequence[Lines]) -> list[str]:
-    """The lines of some blocks; those that are not UTF-8 as older programs write them."""
-    return [_decoded(line) for block in head for line in block.text.split(b"\n")[:-1]]
+    """The lines to look at in some blocks; those that are not UTF-8 as older programs write them."""
+    lines = (line for block in head for line in block.text.split(b"\n")[:-1])
+    return [_decoded(line) for line in islice(lines, max(HEAD_LINES, head[0].next if head else 0))]
 
 
 def _decoded(line: bytes) -> str:

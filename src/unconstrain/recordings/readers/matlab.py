@@ -24,9 +24,9 @@ LARGEST_CELL = 100_000
 """More members than any cell of demonstrations has."""
 
 
-def read_matlab(path: Path, _: Reading) -> Iterator[Table]:
+def read_matlab(path: Path, reading: Reading) -> Iterator[Table]:
     """Read one file; see :class:`~.table.ReadFile`."""
-    yield from tables_of(Branch(_contents(path), path.stem, is_short=False), path)
+    yield from tables_of(Branch(_contents(path), path.stem, is_short=False), path, reading.columns)
 
 
 def _contents(path: Path) -> Mapping[str, Any]:

@@ -6,7 +6,6 @@ x1..xn and u1..ud. Other arrays are read as :mod:`~.trees` says.
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +14,8 @@ import numpy as np
 from ...base.arrays import BLOCK_ROWS
 from ...base.errors import ReadError
 from .reading import Reading
-from .table import Format, Table, named_by, ours_alone
-from .trees import Branch, tables_of
+from .table import Format, Table, ours_alone
+from .trees import UNNAMED, Branch, tables_of
 
 _EXPECTED = "Expected a NumPy archive, as from numpy.savez(path, states=..., actions=..., times=..., groups=...)"
 _ROLES = {"groups": "group"}
@@ -32,7 +31,7 @@ def read_npz(path: Path, reading: Reading) -> Iterator[Table]:
         _check_pairs(path, contents, {"times", "groups", *filter(None, asked)})
     named = {name if name in asked else _ROLES.get(name, name): array for name, array in contents.items()}
     try:
-        yield from tables_of(Branch(named, path.stem), path)
+        yield from tables_of(Branch(named, path.stem), path, reading.columns)
     except ReadError as error:
         raise ReadError(f"{path}: {str(error).removeprefix(f'{path}: ')} {_EXPECTED}.") from error
 
@@ -50,10 +49,8 @@ def read_npy_blocks(path: Path, reading: Reading) -> Iterator[Table]:
 def _npy(path: Path, reading: Reading, rows: int | None) -> Iterator[Table]:
     array = _array(path)
     fields = array.dtype.names
-    members = {"column": array} if fields is None else {name: array[name] for name in fields}
-    for table in tables_of(Branch(members, path.stem), path, rows):
-        names = named_by(reading.columns, table.columns, path)
-        yield table if names == table.columns else replace(table, columns=names)
+    members = {UNNAMED: array} if fields is None else {name: array[name] for name in fields}
+    yield from tables_of(Branch(members, path.stem), path, reading.columns, rows)
 
 
 def _array(path: Path) -> Any:

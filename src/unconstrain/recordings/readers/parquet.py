@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import BLOCK_ROWS, Array, require_extra
+from ...base.display import listed
 from ...base.errors import ReadError
 from .clocks import UNITS
 from .lerobot import DataSet, data_set_of, whole_episodes
 from .reading import Reading
-from .table import Format, Table, find_roles, listed, ours_alone, unique_names
+from .table import Format, Table, find_roles, numbers_of, ours_alone, unique_names
 
 
 def read_parquet(path: Path, reading: Reading) -> Iterator[Table]:
@@ -117,11 +118,13 @@ def _is_number(kind: Any) -> bool:
 
 def _float64(column: Any) -> Array:
     """Numbers, NaN where there is none."""
-    from pyarrow import float64, int8, types
+    from pyarrow import float64, int8, table, types
 
     if types.is_boolean(column.type):
         column = column.cast(int8())
-    return np.asarray(column.cast(float64(), safe=False).to_numpy(zero_copy_only=False), dtype=np.float64)
+    return numbers_of(table([column.cast(float64(), safe=False)], ["numbers"]))[:, 0]
 
 
-FORMAT = Format((".parquet", ".pq"), lambda head: head.startswith(b"PAR1"), read_parquet, read_parquet_blocks)
+FORMAT = Format(
+    (".parquet", ".pq"), lambda head: head.startswith(b"PAR1"), read_parquet, read_parquet_blocks, has_names=True
+)

@@ -72,7 +72,7 @@ class Reading:
 
     def takes(self, name: str, labels: Sequence[str] = (), task: object = None) -> bool:
         """Whether a demonstration of this name, in these lists and of this task is to be read."""
-        if self.task is not None and task is not None and str(task) != self.task:
+        if self.task is not None and str(task) != self.task:
             return False
         if self.episodes is None or not {name, name.rpartition("/")[2], *labels}.isdisjoint(self.episodes):
             return True

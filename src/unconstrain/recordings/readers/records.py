@@ -12,20 +12,20 @@ import numpy as np
 from .packed import opened, stem
 from .reading import Reading
 from .table import Format, Table, ours_alone
-from .trees import Branch, tables_of
+from .trees import UNNAMED, Branch, tables_of
 
 LONGEST_CELL = 64
 """A record may hold lists, up to so many numbers; what is longer is a column."""
 
 
-def read_json(path: Path, _: Reading) -> Iterator[Table]:
+def read_json(path: Path, reading: Reading) -> Iterator[Table]:
     """Read one file; see :class:`~.table.ReadFile`."""
     with ours_alone(path, "JSON: records, or columns of numbers"):
         with opened(path) as file:
             content = _parse(file.read().decode("utf-8-sig"))
         tree = _tree(content)
-    members = tree if isinstance(tree, Mapping) else {"column": tree}
-    yield from tables_of(Branch(members, stem(path), is_short=False), path)
+    members = tree if isinstance(tree, Mapping) else {UNNAMED: tree}
+    yield from tables_of(Branch(members, stem(path), is_short=False), path, reading.columns)
 
 
 def _parse(text: str) -> Any:

@@ -17,10 +17,11 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import require_extra
+from ...base.display import listed
 from ...base.errors import ReadError
 from .packed import stem
 from .reading import Reading
-from .table import Format, Table, listed, ours_alone
+from .table import Format, Table, ours_alone
 
 MOTION = re.compile(r"(JointState|Pose|Twist|Wrench|Accel|Transform|Point|Vector3|Odometry)\w*|TFMessage")
 """Kinds of messages that are taken for the recording where one topic has such and no topic is named."""
@@ -158,4 +159,4 @@ def is_recording(folder: Path) -> bool:
     return (folder / "metadata.yaml").is_file() and any(any(folder.glob(kind)) for kind in kinds)
 
 
-FORMAT = Format((".bag", ".db3", ".mcap"), lambda head: head.startswith(_MAGICS), read_ros)
+FORMAT = Format((".bag", ".db3", ".mcap"), lambda head: head.startswith(_MAGICS), read_ros, has_names=True)

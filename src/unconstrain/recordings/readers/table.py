@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array
-from ...base.display import legible
+from ...base.display import legible, listed
 from ...base.errors import ReadError, UnconstrainError
 from ..demonstration import Recording
 from ..remarks import Remark
@@ -62,7 +62,7 @@ class Format(NamedTuple):
 
     ``suffixes`` in small letters with the dot; ``recognises`` looks at the first bytes of a file; ``read`` reads it
     whole, ``blocks``, if given, by some rows at a time. A format ``by_content`` is known by its first bytes whatever
-    the suffix says.
+    the suffix says; one that ``has_names`` says itself what its columns are called.
     """
 
     suffixes: tuple[str, ...]
@@ -70,6 +70,7 @@ class Format(NamedTuple):
     read: ReadFile
     blocks: ReadFile | None = None
     by_content: bool = True
+    has_names: bool = False
 
 
 @dataclass(frozen=True)
@@ -123,6 +124,15 @@ def ours_alone(path: Path, expected: str) -> Iterator[None]:
     except Exception as error:
         said = (str(error).splitlines() or [""])[0][:200] or type(error).__name__
         raise ReadError(f"{path}: cannot be read ({said}). Expected {expected}.") from error
+
+
+def numbers_of(table: Any) -> Array:
+    """A table of pyarrow whose columns are float64, shape (T, c), NaN where there is no number.
+
+    What pyarrow itself converts to NumPy makes it import pandas, where that is installed.
+    """
+    parts = [batch.to_tensor(null_to_nan=True).to_numpy() for batch in table.to_batches()]
+    return np.concatenate([np.empty((0, table.num_columns)), *parts])
 
 
 class Roles(NamedTuple):
@@ -190,6 +200,7 @@ class Assembly:
             (*table.remarks, *remarks),
             {name: unit for name, unit in table.units.items() if name in names},
             table.attributes,
+            legible(str(self.path)),
         )
         groups = _groups(table, roles.group)
         tasks = table.words.get("task")
@@ -219,7 +230,7 @@ class Assembly:
         said = f"got {first[:40]!r}, expected a number or a time as ISO 8601 writes it, such as 2024-05-01T10:00:00.02"
         if self.reading.time is not None:
             raise ReadError(f"{self.path}, column {name!r}: {said}.")
-        return Remark("dropped-column", f"column {name!r} is called as a clock, but is left out: {said}.", name, 0)
+        return Remark("dropped-column", f"is called as a clock, but was left out: {said}.", name, 0)
 
     def _times_of_rate(self, table: Table) -> Array | None:
         if not table.rate or not np.isfinite(table.rate) or table.rate <= 0:
@@ -323,12 +334,6 @@ def named_by(names: Sequence[str] | None, held: Sequence[str], path: Path) -> tu
     return tuple(names)
 
 
-def listed(names: Sequence[str]) -> str:
-    """Names with commas between, the first thirty."""
-    more = f" and {len(names) - 30} more" if len(names) > 30 else ""
-    return ", ".join(names[:30]) + more
-
-
 def _names_group(name: str) -> bool:
     return name.lower() in GROUP_NAMES
 
@@ -346,7 +351,7 @@ def _groups(table: Table, group: str | None) -> list[str] | None:
     if group is None:
         return None
     if group in table.words:
-        return [str(word) for word in table.words[group]]
+        return list(map(str, table.words[group]))
     return [f"{number:.17g}" for number in _column(table, group).tolist()]
 
 

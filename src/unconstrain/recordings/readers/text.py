@@ -12,10 +12,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.display import listed
 from ...base.errors import ReadError
 from ..remarks import Remark
 from .cells import Cells, Parser
@@ -23,9 +25,12 @@ from .layout import Layout, find_layout, is_comment, split
 from .lines import Lines, head_of, lines_of, texts
 from .packed import opened, stem
 from .reading import Reading
-from .table import Format, Table, find_roles, listed, named_by
+from .table import Format, Table, find_roles, named_by
 
 DELIMITERS = ",\t;|"
+
+RESERVED = 2**28
+"""Bytes of addresses for a table, so that it grows in its place; none that is not used takes memory."""
 
 
 def read_text(path: Path, reading: Reading) -> Iterator[Table]:
@@ -54,16 +59,19 @@ def read_text_blocks(path: Path, reading: Reading) -> Iterator[Table]:
 def joined(tables: Iterator[Table]) -> Table:
     """Blocks of one table, end to end, with no more than one of them in memory twice."""
     first = next(tables)
-    values = first.values.copy()
-    words = {name: list(cells) for name, cells in first.words.items()}
-    breaks = list(first.breaks)
-    for table in tables:
-        rows = len(values)
+    width = first.values.shape[1]
+    values = np.empty((RESERVED // (8 * max(width, 1)), width))
+    words: dict[str, list[Any]] = {name: [] for name in first.words}
+    breaks, rows = list[int](), 0
+    for table in chain([first], tables):
         breaks += [rows + at for at in table.breaks]
-        values.resize((rows + len(table.values), values.shape[1]), refcheck=False)
-        values[rows:] = table.values
+        stop = rows + len(table.values)
+        if stop > len(values):
+            values.resize((stop, width), refcheck=False)
+        values[rows:stop], rows = table.values, stop
         for name, cells in table.words.items():
             words[name] += cells
+    values.resize((rows, width), refcheck=False)
     return replace(first, values=values, words=words, breaks=tuple(breaks))
 
 
@@ -121,7 +129,7 @@ def _remarks(layout: Layout, names: Sequence[str], parser: Parser) -> Iterator[R
     lists = [at for at, width in parser.lists.items() if not width]
     for at in (*(place for place in layout.various if place not in parser.words), *lists):
         why = "lists of several lengths" if at in lists else "words"
-        yield Remark("dropped-column", f"column {names[at]!r} holds {why}, not numbers, and was left out.", names[at])
+        yield Remark("dropped-column", f"holds {why}, not numbers, and was left out.", names[at])
 
 
 def _layout(lines: Sequence[str], path: Path) -> Layout:

@@ -10,16 +10,17 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...base.arrays import Array
+from ...base.display import listed
 from ...base.errors import ReadError
 from ..remarks import Remark
-from .table import FEWEST_ROWS, Table, listed, unique_names
+from .table import FEWEST_ROWS, Table, named_by, unique_names
 
 SHORT = {"states": "x", "actions": "u"}
 """What the columns of arrays of these names are called, where both are there: x1..xn and u1..ud."""
@@ -36,6 +37,9 @@ _DEMONSTRATION = re.compile(
 
 EPISODE_ENDS = ("episode_ends",)
 """Arrays that hold the row after the last of each episode."""
+
+UNNAMED = "column"
+"""What an array without a name, or of many that are alike, makes is called by this and a number."""
 
 MOST_ROWS = 10**9
 MOST_COLUMNS = 16
@@ -70,18 +74,20 @@ class Leaf:
         return self.array[start:stop] if self.axis == 0 else np.asarray(self.array[:, start:stop]).T
 
 
-def tables_of(branch: Branch, path: Path, rows: int | None = None) -> Iterator[Table]:
-    """All tables in a tree, whole or by so many rows at a time.
+def tables_of(
+    branch: Branch, path: Path, names: Sequence[str] | None = None, rows: int | None = None
+) -> Iterator[Table]:
+    """All tables in a tree, with their columns called as told, whole or by so many rows at a time.
 
     Raises
     ------
     ReadError
-        If there is none.
+        If there is none, or other than so many columns.
     """
     found = False
     for table in _tables(branch, path, rows):
         found = True
-        yield table
+        yield table if names is None else replace(table, columns=named_by(names, table.columns, path))
     if not found:
         held = described(branch.members)
         raise ReadError(f"{path}: no arrays of numbers with one length in common; it holds {held}.")
@@ -104,8 +110,9 @@ def _tables(branch: Branch, path: Path, rows: int | None) -> Iterator[Table]:
     if leaves and (not below or _length(leaves) >= FEWEST_ROWS):
         yield from _cut(leaves, branch, path, rows)
     elif not below:
+        alike = _are_demonstrations(arrays)
         for name, array in arrays.items():
-            if array.ndim == 2 and (single := _leaves({name: array})):
+            if array.ndim == 2 and (single := _leaves({UNNAMED if alike else name: array})):
                 below_it = Branch({}, _under(branch, name), branch.attributes, branch.labels)
                 yield from _cut(single, below_it, path, rows)
     for child in below:
@@ -165,7 +172,7 @@ def _left_out(leaves: Mapping[str, Leaf], branch: Branch) -> Iterator[Remark]:
             and member.ndim < 3
             and member.dtype.kind in "fiu"
         ):
-            said = f"{name!r} of shape {tuple(member.shape)} was left out: the others have {_length(leaves)} samples."
+            said = f"of shape {tuple(member.shape)} was left out: the others have {_length(leaves)} samples."
             yield Remark("dropped-column", said, name)
 
 
@@ -292,7 +299,7 @@ def _words(part: Any, name: str, path: Path) -> list[str]:
 
 
 def _under(branch: Branch, name: str) -> str:
-    return f"{branch.name}/{name}" if branch.name else name
+    return "/".join(filter(None, (branch.name, name if name != UNNAMED else "")))
 
 
 def _shape(member: Any) -> str:

@@ -22,6 +22,9 @@ AROUND = 10
 LONGEST_GLITCH = 30
 """Samples that are off their neighbours together for longer are no glitch but a place."""
 
+MOST_COLUMNS = 100
+"""Of more columns, so many show whether rows are at two places."""
+
 LIKE_AN_IMPULSE = 0.11
 """A lone bad sample leaves residuals that differ from those of an impulse by less than this share; a corner, by 1/6."""
 
@@ -169,6 +172,7 @@ def topics(values: Array) -> int | None:
     int or None
         The first row of the second movement; None where there is one movement.
     """
+    values = values[:, :: -(-values.shape[1] // MOST_COLUMNS)]
     along = _along_widest(values)
     order = np.sort(along)
     between = np.diff(order)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...base.arrays import Array
+from ...base.arrays import BLOCK_ROWS, Array, slices
 
 TURNS = (2 * np.pi, 360.0)
 """One turn in radians, and in degrees."""
@@ -63,7 +63,7 @@ def _jumps_by(angle: Array, turn: float) -> list[int]:
 
 def quaternion_flips(quaternions: Array) -> list[int]:
     """Rows at which a unit quaternion (T, 4) turns its sign; none where the rows are no unit quaternions."""
-    if np.abs(np.linalg.norm(quaternions, axis=1) - 1.0).max(initial=0.0) > 0.02:
+    if any(np.abs(_lengths(quaternions[rows]) - 1.0).max() > 0.02 for rows in slices(quaternions, BLOCK_ROWS)):
         return []
     cosines = (quaternions[1:] * quaternions[:-1]).sum(axis=1)
     # Neighbours are close but for the sign: by how much they turn is seen from the others.
@@ -78,7 +78,7 @@ def continuous_quaternions(quaternions: Array) -> Array:
 
 def rotation_flips(vectors: Array) -> list[int]:
     """Rows at which a rotation vector (T, 3), radians or degrees, becomes the opposite one of nearly half a turn."""
-    lengths = np.linalg.norm(vectors, axis=1)
+    lengths = _lengths(vectors)
     for turn in TURNS:
         if not 0.4 * turn < lengths.max(initial=0.0) < 0.53 * turn:
             continue
@@ -92,6 +92,11 @@ def rotation_flips(vectors: Array) -> list[int]:
         if rows.size:
             return rows.tolist()
     return []
+
+
+def _lengths(vectors: Array) -> Array:
+    """Of each row, (T,), without a table beside it."""
+    return np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
 
 
 def _missed_by_wrap(steps: Array, turn: float) -> Array:

@@ -32,11 +32,10 @@ def noise_share(values: Array) -> Array:
 
 
 def _share_of_noise(column: Array) -> float:
-    variance = float(column.var())
-    if len(column) < 2 or variance == 0.0:
-        return 1.0
     changes = np.diff(column)
-    return float(changes @ changes) / (2 * len(changes) * variance)
+    if not changes.any():  # the variance of a constant may be more than nothing, by rounding
+        return 1.0
+    return float(changes @ changes) / (2 * len(changes) * float(column.var()))
 
 
 def _by_column(measure: Callable[[Array], float], values: Array) -> Array:

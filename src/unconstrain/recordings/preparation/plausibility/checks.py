@@ -134,7 +134,8 @@ def glitch(subject: Subject) -> Remark | None:
     if not subject.glitches or subject.recipe.glitches != "keep":
         return None
     first, rows = subject.glitches[0], {row for one in subject.glitches for row in range(one.start, one.stop)}
-    message = f"{len(rows)} sample{'s' * (len(rows) > 1)} far off their neighbours; --glitches repair or drop."
+    far = "1 sample far off its" if len(rows) == 1 else f"{len(rows)} samples far off their"
+    message = f"{far} neighbours; --glitches repair or drop."
     return Remark("glitch", message, subject.name(first.column), subject.row(first.start))
 
 
@@ -153,7 +154,10 @@ def other_topic(subject: Subject) -> Remark | None:
     """Rows that alternate between two movements in two places."""
     if subject.topic is None:
         return None
-    message = "rows alternate between two places, as where two topics share a table; choose one, such as with --topic."
+    message = (
+        "rows alternate between two places, as where two topics share a table; take them apart by the column that "
+        "names them (--group), or read one (--topic of a ROS recording)."
+    )
     return Remark("other-topic", message, row=subject.row(subject.topic))
 
 
@@ -195,7 +199,7 @@ def _rests(subject: Subject) -> bool:
     """Whether states are constant, or noise about a place that is far from nought beside it."""
     states = subject.clean
     extent = np.ptp(states, axis=0).max(initial=0.0)
-    is_small = bool(extent <= 0.05 * np.abs(states).max(initial=0.0))
+    is_small = bool(extent <= 0.05 * max(states.max(initial=0.0), -states.min(initial=0.0)))
     differentiated = subject.stamps is not None and not subject.actions.size
     return is_noise(states) and (differentiated or is_small)
 

@@ -25,7 +25,7 @@ def doubts_about(demonstrations: Sequence[Demonstration]) -> dict[str, str]:
     first: dict[str, str] = {}
     for subject, beside in zip(subjects, compare([outline(one) for one in subjects]), strict=True):
         for remark in (*_alone(subject), *beside):
-            first.setdefault(remark.code, remark.about(subject.recording.name))
+            first.setdefault(remark.code, remark.about(subject.recording.title))
     return first
 
 

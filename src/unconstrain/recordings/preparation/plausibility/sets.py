@@ -54,7 +54,7 @@ def outline(subject: Subject) -> Outline | None:
     return Outline(
         subject.recipe.states or (),
         np.ptp(states, axis=0),
-        np.abs(states).max(axis=0),
+        np.maximum(states.max(axis=0), -states.min(axis=0)),
         noise_share(states) > 0.3,
         (states[at] + states[at + span]) / 2,
         np.zeros((0, states.shape[1])) if is_noise(states) else states[at + span] - states[at],
