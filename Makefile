@@ -9,7 +9,7 @@ DEV_STAMP := $(VENV)/.installed-dev
 DEMO_DIR := build/demo
 DOCS_DIR := build/docs
 
-.PHONY: help demo test check house docs bench bench-gpu clean
+.PHONY: help demo test check fuzz house docs bench bench-gpu clean
 .DELETE_ON_ERROR:
 
 help: ## show this list
@@ -36,6 +36,9 @@ house: $(DEV_STAMP) ## print the plan of the rooms and its figures; HOUSE=--walk
 docs: $(DEV_STAMP) ## build the documentation; warnings are errors
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs $(DOCS_DIR)
 	@echo "The documentation is in $(CURDIR)/$(DOCS_DIR)/index.html"
+
+fuzz: $(DEV_STAMP) ## attack what is promised for a minute; FUZZ=--long until it is as often as docs/reliability says
+	@$(BIN)/python tests/fuzz.py $(FUZZ)
 
 bench: $(DEV_STAMP) ## time everything against floors and peers; BENCH='--full --against FILE' for more
 	@$(BIN)/python benchmarks/run.py $(BENCH)

@@ -312,14 +312,6 @@ def test_options_of_the_hybrid_mean_the_hybrid(files, tmp_path):
     assert "auto" in call("fit", *files, "--alpha", "much", "-o", tmp_path / "p.npz").err
 
 
-def test_much_data_is_learnt_from_sums(files, tmp_path, monkeypatch):
-    monkeypatch.setattr(fitting, "MUCH", 1000)
-    ran = call("fit", *files, "--model", "linear", "-o", tmp_path / "p.npz")
-    assert ran.code == 0
-    assert "are not kept in memory" in ran.err
-    assert isinstance(storage.load(tmp_path / "p.npz").learner, uc.Hybrid)
-
-
 def test_a_cluster_computes_no_samples(files, tmp_path):
     learner = ("--learner", "robust", "--scheduler", "tcp://nowhere:1")  # learns from sums there
     assert "nothing answers" in refused("fit", *files, *learner, "-o", tmp_path / "p.npz")

@@ -30,7 +30,7 @@ SAID = [
     (FoldedMoments((MOMENTS,) * 3, range(2)), "FoldedMoments(3 folds, 2 held out, 1 model, 2 actions, 3 features)"),
     (FoldedMoments((), range(0)), "FoldedMoments(0 folds, 0 held out)"),
     (POLICY.training_, "Training(2 states, 2 actions, 10 folds by demonstration, samples kept)"),
-    (replace(POLICY.training_, batches=None), "Training(2 states, 2 actions, 10 folds by demonstration, sums alone)"),
+    (replace(POLICY.training_, kept=None), "Training(2 states, 2 actions, 10 folds by demonstration, sums alone)"),
     (POLICY.training_.model, "Model(Affine features, ReceptiveFields(10 centres in 2 dimensions, variance=0.5))"),
     (samples_of(DATA), "Samples(90 samples, 2 states, 2 actions, 3 features, 1 model)"),
     (uc.Affine(), "Affine()"),

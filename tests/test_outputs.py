@@ -1,6 +1,7 @@
 """What commands write: nothing that is there or read is lost, and no work is for nothing."""
 
 import os
+import sys
 
 import numpy as np
 import pytest
@@ -115,3 +116,18 @@ def test_a_rollout_that_is_printed_writes_nothing(folder):
     before = sorted(folder.iterdir())
     assert call(*COMMANDS["rollout"][:-2]).exit_code == 0
     assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("command", "module", "extra"),
+    [
+        (COMMANDS["report"], "jinja2", "viz"),
+        (COMMANDS["diagnose"], "plotly", "viz"),
+        (("export", "p.npz", "-o", "a.onnx"), "onnx", "onnx"),
+        (("convert", "a.csv", "b.parquet"), "pyarrow", "data"),
+    ],
+)
+def test_what_is_needed_to_write_is_looked_for_before_anything_is_read(folder, monkeypatch, command, module, extra):
+    monkeypatch.setitem(sys.modules, module, None)
+    (folder / read_by(command)).write_bytes(b"nothing that can be read")
+    assert f"pip install 'unconstrain[{extra}]'" in refused(*command)

@@ -20,8 +20,9 @@ Examples
 import hashlib
 import json
 import os
+import warnings
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -31,7 +32,8 @@ from typing import Any, TypeVar, overload
 import numpy as np
 
 from .base import files
-from .base.errors import ModelFileError
+from .base.errors import ModelFileError, UnconstrainError
+from .base.foreign import check_size, ours_alone
 from .constraints import STORED, LearntConstraint
 from .learners import (
     Belief,
@@ -59,6 +61,8 @@ VERSION = 3
 
 _FORMAT = "unconstrain-policy"
 _HEADER = "header"
+_EXPECTED = "a file that save() wrote"
+_INCOMPLETE = "the policy in it is not complete"
 
 _KNOWN: dict[str, type] = {
     kind.__name__: kind
@@ -156,7 +160,8 @@ def load(path: str | os.PathLike[str], kind: type[Any] = Policy) -> Any:
     Raises
     ------
     ModelFileError
-        If the file does not exist, is damaged, of a newer version, not ours, or of another kind.
+        If the file does not exist, is damaged, of a newer version, not ours, of another kind, or does not predict. Its
+        digest shows damage, not malice: whoever writes a file can write its digest.
 
     Examples
     --------
@@ -165,29 +170,66 @@ def load(path: str | os.PathLike[str], kind: type[Any] = Policy) -> Any:
     array([[4.]])
     """
     header, arrays = _read(path)
-    try:
-        content = header["content"]["policy"]
-        for version, change in _CHANGES.items():
-            content = _changed(content, change) if header["version"] <= version else content
-        policy = _unpack(content, arrays)
-    except ModelFileError as error:
-        raise ModelFileError(f"{path}: {error}") from error
     # A file that was tampered with, digest included, can make any constructor fail, in any way.
-    except Exception as error:
-        raise ModelFileError(f"{path}: the policy in it is not complete ({_said(error)}).") from error
-    if not isinstance(policy, kind):
-        wanted = "policy" if issubclass(Policy, kind) else kind.__name__
-        raise ModelFileError(f"{path}: holds a {type(policy).__name__}, expected a {wanted}.")
+    with ours_alone(path, _EXPECTED, ModelFileError, _INCOMPLETE, kinds=True):
+        try:
+            content = header["content"]["policy"]
+            for version, change in _CHANGES.items():
+                content = _changed(content, change) if header["version"] <= version else content
+            policy = _unpack(content, arrays)
+        except ModelFileError as error:
+            raise ModelFileError(f"{path}: {error}") from error
+        except UnconstrainError as error:
+            raise ModelFileError(f"{path}: {_INCOMPLETE} ({type(error).__name__}: {error}).") from error
+        if not isinstance(policy, kind):
+            wanted = "policy" if issubclass(Policy, kind) else kind.__name__
+            raise ModelFileError(f"{path}: holds a {type(policy).__name__}, expected a {wanted}.")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # states have no names here
+            _check_finite(
+                each for known, tried in _TRIED.items() if isinstance(policy, known) for each in tried(policy)
+            )
     return policy
+
+
+def _tried_policy(policy: Policy) -> list[Any]:
+    """What a fitted policy says in the midst of its data."""
+    repr(policy)
+    if not hasattr(policy, "solution_"):
+        return []
+    training, scale = policy.training_, policy.scale_
+    state = training.model.embedding.states(training.split.origin[None])
+    place = state if scale is None else scale.states * state
+    found = [policy.predict(place).reshape(1, policy.n_outputs_), policy.step(place[0])]
+    return found if policy.solution_.belief is None else [*found, *policy.uncertainty(place)]
+
+
+def _tried_constraint(constraint: LearntConstraint) -> list[Any]:
+    repr(constraint)
+    if not hasattr(constraint, "choice_"):
+        return []
+    place = np.ones((1, constraint.choice_.columns))
+    return [constraint.projection(place).reshape(1, constraint.choice_.actions, constraint.choice_.actions)]
+
+
+def _check_finite(found: Iterable[Any]) -> None:
+    if not all(np.isfinite(each).all() for each in found):
+        raise ValueError("what it says is not finite")
+
+
+_TRIED: dict[type, Callable[[Any], list[Any]]] = {
+    Policy: _tried_policy,
+    Guided: lambda guided: [guided(guided.goal_[None]).reshape(1, len(guided.goal_))],
+    LearntConstraint: _tried_constraint,
+}
+"""What is asked of each kind, once, before it is given away."""
 
 
 def load_notes(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Read the notes that were saved beside a policy; raises as :func:`load` does."""
     header, _ = _read(path)
-    try:
+    with ours_alone(path, _EXPECTED, ModelFileError, "the notes in it are not complete", kinds=True):
         return dict(header["content"]["notes"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise ModelFileError(f"{path}: the notes in it are not complete ({_said(error)}).") from error
 
 
 def _without_samples(model: Any) -> Any:
@@ -323,13 +365,14 @@ def _read(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str, np.nd
         raise ModelFileError(f"{path}: {what}, expected a policy file.")
     if not zipfile.is_zipfile(path):
         raise ModelFileError(f"{path}: is no policy file, or a damaged one. Expected a file that save() wrote.")
-    try:
-        # Opened here, because NumPy leaves a damaged one open.
-        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-    # Damaged bytes make NumPy, zipfile and zlib raise a dozen unrelated types; none of them must pass this door.
-    except Exception as error:
-        raise ModelFileError(f"{path}: is no policy file, or a damaged one ({_said(error)}).") from error
+    with (
+        ours_alone(path, _EXPECTED, ModelFileError, "is no policy file, or a damaged one", kinds=True),
+        Path(path).open("rb") as stream,  # opened here, because NumPy leaves a damaged one open
+        np.load(stream, allow_pickle=False) as file,
+    ):
+        held = file.zip.infolist()
+        check_size(sum(one.file_size for one in held) // 8, sum(one.compress_size for one in held))
+        arrays = {name: file[name] for name in file.files}
     try:
         header = json.loads(str(arrays.pop(_HEADER)))
         if header["format"] != _FORMAT:
@@ -353,8 +396,3 @@ def _digest(header: Mapping[str, Any], arrays: Mapping[str, np.ndarray[Any, Any]
         said.update(f"{name}{array.dtype.str}{array.shape}".encode())
         said.update(array.tobytes())
     return said.hexdigest()
-
-
-def _said(error: Exception) -> str:
-    """The first line of an error that is not ours."""
-    return f"{type(error).__name__}: {error}".splitlines()[0]

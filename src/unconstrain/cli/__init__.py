@@ -116,7 +116,7 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
 @options_for_reading
 @click.option("-o", "--output", required=True, type=click.Path(dir_okay=False), help="File for the policy (.npz).")
 @options_for_model
-@click.option("--learner", type=click.Choice(LEARNERS), help="Learner; by default robust, or hybrid on much data.")
+@click.option("--learner", type=click.Choice(LEARNERS), help="Learner; by default robust.")
 @click.option(
     "--alpha",
     type=alpha_of,
@@ -168,7 +168,7 @@ def fit(
     """
     paths = uc.readers.expand(files)
     check_outputs((output, report), paths, force)
-    learner = learner or default_learner(paths, scheduler, alpha, softness, speed_power)
+    learner = learner or default_learner(scheduler, alpha, softness, speed_power)
     chosen = {"learner": learner_of(learner, alpha, softness, speed_power), "validation": uc.Folds(folds, hold_out)}
     fitted = policy_of(model, variance, centres, scale, **chosen)
     with shown("reading, placing, learning") as progress:

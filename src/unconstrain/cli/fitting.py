@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any, Literal
 
 import click
@@ -24,9 +23,6 @@ MODELS: dict[str, Callable[..., uc.Policy]] = {
     "linear": lambda **chosen: uc.ParametricPolicy(uc.Affine(), **chosen),  # the former name of "affine"
 }
 """Policies by name, of settings of their own and of what every policy has: learner and validation."""
-
-MUCH = 200_000_000
-"""Bytes of data above which samples are not kept in memory, and the default learner is the hybrid."""
 
 
 def options_for_model(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -62,24 +58,11 @@ def scale_of(text: str) -> str | tuple[float, ...] | None:
 
 
 def default_learner(
-    paths: Sequence[str | Path],
-    scheduler: str | None,
-    alpha: float | Literal["auto"] | None,
-    softness: float | None,
-    speed_power: float,
+    scheduler: str | None, alpha: float | Literal["auto"] | None, softness: float | None, speed_power: float
 ) -> str:
     """The learner where none is named."""
-    if scheduler is not None or alpha is not None or softness is not None or speed_power:
-        return "hybrid"
-    size = sum(Path(path).stat().st_size for path in paths if Path(path).is_file())
-    if size <= MUCH:
-        return "robust"
-    click.echo(
-        f"Note: {size / 1e6:.0f} MB of data are not kept in memory, so this uses --learner hybrid; --learner robust "
-        "on a part of the data may be better.",
-        err=True,
-    )
-    return "hybrid"
+    of_sums = scheduler is not None or alpha is not None or softness is not None or speed_power
+    return "hybrid" if of_sums else "robust"
 
 
 def learner_of(name: str, alpha: float | Literal["auto"] | None, softness: float | None, speed_power: float) -> Any:

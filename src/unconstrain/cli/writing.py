@@ -12,12 +12,21 @@ from ..base.errors import SettingError
 from ..base.files import check
 
 PICKLES = (".pkl", ".pickle", ".joblib")
+NEEDED: dict[str, tuple[str, tuple[str, ...]]] = {
+    ".html": ("viz", ("jinja2", "matplotlib")),
+    ".onnx": ("onnx", ("onnx",)),
+    ".parquet": ("data", ("pyarrow",)),
+    ".mcap": ("formats", ("rosbags",)),
+}
+"""For files that end so, the extra that writes them, and what it brings."""
 
 option_for_force = click.option("--force", is_flag=True, help="Replace what is there.")
 
 
 def check_outputs(outputs: Iterable[str | None], inputs: Iterable[str | Path | None], force: bool) -> None:
     """Refuse to write over what is read, two things to one place, where nothing can be written, or over what is there.
+
+    What is needed to write is looked for, too.
 
     Parameters
     ----------
@@ -28,8 +37,8 @@ def check_outputs(outputs: Iterable[str | None], inputs: Iterable[str | Path | N
 
     Raises
     ------
-    SettingError, WriteError
-        In one sentence that begins with the output.
+    SettingError, WriteError, MissingExtraError
+        But for the last in one sentence that begins with the output.
     """
     read = [Path(path) for path in inputs if path is not None]
     before: list[Path] = []
@@ -44,7 +53,17 @@ def check_outputs(outputs: Iterable[str | None], inputs: Iterable[str | Path | N
             check(path)
         if path.exists() and not force:
             raise SettingError(f"{path}: is there; give another name, or --force to replace it.")
+        _check_extra(path)
         before.append(path)
+
+
+def _check_extra(path: Path) -> None:
+    if path.suffix.lower() in NEEDED:
+        from ..base.arrays import require_extra
+
+        extra, modules = NEEDED[path.suffix.lower()]
+        for module in modules:
+            require_extra(module, extra)
 
 
 def _overlap(output: Path, read: Path) -> bool:

@@ -283,7 +283,7 @@ class _Spread:
             own = self._features @ change.T
             of_action = blocks.reshape(p, d, p, d)
             for action in range(d):
-                variance = ((own @ of_action[:, action, :, action]) * own).sum(axis=1)
+                variance = np.vecdot(own @ of_action[:, action, :, action], own)
                 spread[:, action] += share * np.sqrt(np.maximum(variance, 0.0))
         return spread
 

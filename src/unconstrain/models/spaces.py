@@ -150,6 +150,9 @@ class Euclidean(Space):
 
     columns: int = 1
 
+    def __post_init__(self) -> None:
+        check_at_least("columns", self.columns, 0, whole=True)
+
     @property
     def sizes(self) -> tuple[int, int, int]:
         """All are the number of axes."""

@@ -185,7 +185,7 @@ def _velocities(policy: Callable[[Array], Array], states: Array) -> Array:
 def _kept(policy: Any) -> list[Demonstration]:
     """The demonstrations that a fitted policy has kept."""
     training = getattr(policy, "training_", None)
-    if training is None or training.batches is None:
+    if training is None or training.kept is None:
         raise SettingError(
             "demonstrations: got none, and the policy has not kept its own (a learner such as Robust keeps them, a "
             "stored policy does not). Pass demonstrations=."

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import BLOCK_ROWS, Array, check_at_least
 from ..base.errors import NOTHING_LEFT, ReadError
+from ..base.foreign import Stamp, unchanged
 from ..models import spaces
 from .demonstration import Demonstration, Recording, noise_of, times_of
 from .preparation import Recipe, decide, prepare
@@ -68,7 +69,7 @@ class Stream:
     leave_out : iterable of str
         Names of recordings to pass over.
     progress : callable, optional
-        Called with how many files of a walk were read, and of how many.
+        Called with how many rows this walk has read, and of how many, which the first does not know.
 
     Examples
     --------
@@ -88,7 +89,7 @@ class Stream:
         reading: Reading | None = None,
         speed_power: float = 0.0,
         leave_out: Iterable[str] = (),
-        progress: Callable[[int, int], None] | None = None,
+        progress: Callable[[int, int | None], None] | None = None,
     ) -> None:
         check_at_least("speed_power", speed_power, 0.0)
         self.paths = expand(paths)
@@ -99,7 +100,9 @@ class Stream:
         self._asked = recipe or Recipe()
         self._first_file = 0
         self._held: list[tuple[str, Demonstration]] | None = None
+        self._rows: int | None = None
         self._walked = False
+        self._stamps: dict[Path, Stamp] = {}
         self._outlines: list[tuple[str, Outline | None]] = []
 
     @cached_property
@@ -187,6 +190,7 @@ class Stream:
 
     def _read(self) -> Iterator[tuple[str, Demonstration]]:
         by_rows = self.recipe.is_row_by_row
+        read = 0
         for number, path in enumerate(self.paths, start=self._first_file):
             before = Counter[str]()
             for recording in self._blocks(path, whole=not by_rows):
@@ -195,14 +199,17 @@ class Stream:
                         warnings.simplefilter("ignore", UserWarning)
                     demonstration = self._prepared(recording, before[recording.name])
                 before[recording.name] += len(recording)
+                read += len(recording)
+                if self._progress is not None:
+                    self._progress(read, self._rows)
                 yield f"{number}/{recording.name}", demonstration
-            if self._progress is not None:
-                self._progress(number - self._first_file + 1, len(self.paths))
+        self._rows = read
 
     def _blocks(self, path: Path, whole: bool = False) -> Iterator[Recording]:
-        for recording in read_blocks(path, self.reading, whole=whole):
-            if recording.name not in self.leave_out:
-                yield recording
+        with unchanged(path, self._stamps.setdefault(path, Stamp.of(path))):
+            for recording in read_blocks(path, self.reading, whole=whole):
+                if recording.name not in self.leave_out:
+                    yield recording
 
     def _prepared(self, recording: Recording, before: int) -> Demonstration:
         """A recording, or a block of it after so many rows, as a demonstration."""

@@ -16,7 +16,9 @@ Examples
 learner: Likelihood needs the samples, and a cluster sends their sums alone. Take Hybrid().
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
+from contextlib import contextmanager
 from functools import partial, reduce
 from operator import add
 from typing import Any, Protocol, Self, TypeVar
@@ -101,7 +103,7 @@ def fit_batches(policy: P, parts: Sequence[Any], *, client: Any | None = None) -
     InvalidDataError
         As ``fit`` does, and if there is no part.
     SettingError
-        If the learner needs the samples.
+        If the learner needs the samples, or the cluster gives up.
     MissingExtraError
         If dask is not installed.
     """
@@ -135,6 +137,9 @@ def connected(address: str, timeout_s: float = 10.0) -> Any:
         ) from error
 
 
+_CLUSTERS = ("dask", "distributed", "tornado")
+
+
 def _summed(client: Any | None, function: Callable[[Any], Any], parts: Sequence[Any]) -> Any:
     """Sum of a function at each part, in a tree of neighbours; both go to the workers."""
     delayed = require_extra("dask", "cluster").delayed
@@ -143,7 +148,24 @@ def _summed(client: Any | None, function: Callable[[Any], Any], parts: Sequence[
     while True:
         level = [delayed(_added)(level[start : start + FAN_IN]) for start in range(0, len(level), FAN_IN)]
         if len(level) == 1:
-            return level[0].compute() if client is None else client.compute(level[0]).result()
+            with _of_cluster():
+                return level[0].compute() if client is None else client.compute(level[0]).result()
+
+
+@contextmanager
+def _of_cluster() -> Iterator[None]:
+    """What the cluster itself raises becomes one sentence; errors of what it computes pass."""
+    try:
+        yield
+    except Exception as error:
+        kind = type(error)
+        if kind.__module__.partition(".")[0] not in _CLUSTERS and not isinstance(error, CancelledError | TimeoutError):
+            raise
+        said = (str(error).splitlines() or [""])[0][:200]
+        raise SettingError(
+            f"scheduler: the cluster gave up ({kind.__name__}: {said}). Where workers died, give them more memory or "
+            "smaller parts; where they were lost, start them again."
+        ) from error
 
 
 def _added(sums: Sequence[Any]) -> Any:

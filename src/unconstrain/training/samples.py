@@ -82,7 +82,7 @@ class Samples(Shown):
         """Number of regressors p' of each model."""
         return self.centring.shape[1]
 
-    @property
+    @cached_property
     def sizes(self) -> Array:
         """Number of samples in each model, shape (M,)."""
         return self.counts @ self.memberships
@@ -98,12 +98,19 @@ class Samples(Shown):
 
     def predict(self, weights: Array) -> Array:
         """What models of these weights (..., M, d, p), over ``T_m φ``, predict, shape (..., N, d)."""
+        return self._predicted(weights, slice(None))
+
+    def _predicted(self, weights: Array, rows: slice | NDArray[np.bool_]) -> Array:
+        features, shares = self.features[rows], self.shares[rows]
         plain = weights @ self.centring
         *policies, models, d, p = plain.shape
         of_model = np.moveaxis(plain.reshape(-1, models, d, p), 0, 1)
-        each = (self.features @ of_model.reshape(-1, p).T).reshape(len(self), models, -1)
-        blended = each if models == 1 else self.shares[:, None, :] @ each
-        return np.moveaxis(blended.reshape(len(self), -1, d), 0, 1).reshape(*policies, len(self), d)
+        if models == 1:
+            found = features @ of_model.reshape(-1, p).T
+        else:  # weights are blended first: there are fewer of them than of models
+            own = (shares @ of_model.reshape(models, -1)).reshape(len(features), -1, p)
+            found = (own @ features[:, :, None])[..., 0]
+        return np.moveaxis(found.reshape(len(features), -1, d), 0, 1).reshape(*policies, len(features), d)
 
     def moments(self, actions: Array, weights: Array) -> Moments:
         """Moments of any actions (N, d) at these features, each sample weighted (N,)."""
@@ -161,7 +168,7 @@ class Samples(Shown):
         found = np.empty((*np.shape(refits)[1:-3], *self.actions.shape))
         for fold, weights in enumerate(refits):
             rows = self.folds == fold
-            found[..., rows, :] = self[rows].predict(weights)
+            found[..., rows, :] = self._predicted(weights, rows)
         return found
 
     def _summary(self) -> tuple[str, ...]:

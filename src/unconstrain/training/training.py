@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from copy import deepcopy
 from dataclasses import dataclass, field, replace
-from functools import partial, reduce
+from functools import partial
 from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array, beside, is_foreign, on_host, power_of_two
+from ..base.arrays import Array, beside, is_foreign, power_of_two
 from ..base.display import Shown, counted
-from ..base.errors import SettingError
+from ..base.errors import InvalidDataError, SettingError
+from ..base.foreign import MOST_NUMBERS
 from ..base.threads import Workers, workers
 from ..models import Model
 from ..risks import FoldedMoments, Moments, Sums
 from .batches import Batch
 from .first_look import FirstLook
 from .folds import Split
+from .kept import Kept
 from .order import arranged, distinct
 from .samples import Samples
 from .suspects import longest_plausible
@@ -48,13 +49,11 @@ class Training(Shown):
         Actions of at most this length have no direction.
     gathered : FoldedMoments
         Sums over the features φ(x), fold by fold.
-    batches : tuple of Batch, optional
-        The samples as they were given, where they are kept.
+    kept : Kept, optional
+        The samples as they were given, where they are kept: all, or some of each demonstration.
     action_unit, weight_unit : float
         Powers of two about the largest action and sample weight at first look. Sums and samples are in these units,
         and so is ``at_rest``: squares of actions that are numbers at all are then numbers, too.
-    most : int, optional
-        Samples are kept up to so many, and none if there are more; None keeps all.
     longest : float
         Longest plausible action. Longer ones count less; see :mod:`.suspects`.
 
@@ -65,25 +64,28 @@ class Training(Shown):
     4.0
     """
 
-    MOST_KEPT: ClassVar[int] = 200_000
-    """Samples that are kept for a learner that can do without: of more, sums alone."""
+    MOST_KEPT: ClassVar[int] = 50_000
+    """Samples that are kept for a learner that can do without: of more, every second, fourth, ... one.
+
+    With a quarter of 100,000 samples of 100 demonstrations the squared error was 0.95 to 1.04 times that with all, at 5
+    and 30 % noise, in a quarter of the time.
+    """
 
     model: Model
     actions: int
     split: Split
     at_rest: float
     gathered: FoldedMoments
-    batches: tuple[Batch, ...] | None = field(default=None, metadata={"stored": False})
+    kept: Kept | None = field(default=None, metadata={"stored": False})
     action_unit: float = 1.0
     weight_unit: float = 1.0
-    most: int | None = 0
     longest: float = np.inf
 
     @classmethod
     def begin(
         cls, look: FirstLook, model: Model, split: Split, most: int | None = 0, *, more: bool = False
     ) -> Training:
-        """Nothing seen but a first look; up to ``most`` samples are kept from now on, all for None.
+        """Nothing seen but a first look; about ``most`` samples at most are kept from now on, all for None.
 
         With ``more``, it is at the first of further batches, which may well be faster: no length is implausible.
         """
@@ -91,36 +93,35 @@ class Training(Shown):
         units = power_of_two(look.fastest), power_of_two(look.heaviest)
         at_rest = AT_REST * (look.fastest / units[0])
         longest = np.inf if more else longest_plausible(look.lengths)
-        return cls(model, look.actions, split, at_rest, nothing, None if most == 0 else (), *units, most, longest)
+        return cls(model, look.actions, split, at_rest, nothing, None, *units, longest).keeping(most)
+
+    def keeping(self, most: int | None) -> Training:
+        """The same with samples kept from now on, as in :meth:`begin`."""
+        return replace(self, kept=None if most == 0 else Kept(most))
 
     def with_batches(self, batches: Iterable[Batch]) -> Training:
         """With further samples summed, in one pass.
 
         Raises
         ------
+        InvalidDataError
+            If the sums of all folds would have more numbers than go into memory.
         SettingError
             If demonstrations are held out and a batch does not name them.
         """
-        split, kept, room = self.split, list(self.batches or ()), self._room(self.batches)
+        split, kept = self.split, self.kept
         d, (models, p) = self.actions, self._sizes
+        _check_size(split.validation.count, models, d, p)
         sums = [Sums(models, d, p, self.at_rest) for _ in range(split.validation.count)]
         for batch in batches:
             batch = batch.tempered(self.longest)
-            room -= batch.states.shape[0]
-            if room >= 0:
-                batch = deepcopy(batch)  # the caller may use a buffer again
-                kept.append(batch)
+            kept = None if kept is None else kept.with_batch(batch)
             with workers() as threads:  # not around the batches: what makes them is the caller's
                 for block in batch.blocks():
                     split = split.seeing(block.groups)
                     _add(self._in_units(block), self.model, split, sums, threads)
         further = FoldedMoments(tuple(each.moments.on_host() for each in sums), self.gathered.held_out)
-        return replace(
-            self,
-            split=split,
-            gathered=self.gathered + further,
-            batches=tuple(kept) if room >= 0 else None,
-        )
+        return replace(self, split=split, gathered=self.gathered + further, kept=kept)
 
     def __add__(self, other: Training) -> Training:
         """Two parts of the same data, begun alike; this one's samples come first."""
@@ -128,30 +129,23 @@ class Training(Shown):
             self,
             split=self.split.dealing(other.split.fold_of),
             gathered=self.gathered + other.gathered,
-            batches=(*self.batches, *other.batches) if self._room(self.batches, other.batches) >= 0 else None,  # type: ignore[misc]
+            kept=None if self.kept is None or other.kept is None else self.kept + other.kept,
         )
-
-    def _room(self, *parts: Sequence[Batch] | None) -> float:
-        """How many more samples may be kept beside these; less than none where some were not kept."""
-        if any(part is None for part in parts):
-            return -np.inf
-        most = np.inf if self.most is None else self.most
-        return most - sum(batch.states.shape[0] for part in parts for batch in part or ())
 
     def of_folds(self, indices: Sequence[int]) -> Training:
         """What is in some of the folds, each held out in turn; without the samples."""
         parts = tuple(self.gathered.parts[i] for i in indices)
-        return replace(self, gathered=FoldedMoments(parts, range(len(parts))), batches=None)
+        return replace(self, gathered=FoldedMoments(parts, range(len(parts))), kept=None)
 
     def without(self, rows: NDArray[np.intp]) -> Training:
-        """The same without some of the samples, which were kept: rows among all that were given."""
+        """What is kept, without some of it: rows among all that were given, or of those that are kept."""
         batches, start = [], 0
-        for batch in self.batches or ():
+        for batch in self.kept.batches if self.kept else ():
             stop = start + batch.states.shape[0]
             batches.append(batch.without(rows[(start <= rows) & (rows < stop)] - start))
             start = stop
         nothing = FoldedMoments((), self.gathered.held_out)
-        begun = replace(self, gathered=nothing, batches=(), longest=np.inf)  # they were tempered when kept
+        begun = replace(self, gathered=nothing, longest=np.inf).keeping(None)  # they were tempered when kept
         return replace(begun.with_batches(batches), longest=self.longest)
 
     @property
@@ -175,7 +169,7 @@ class Training(Shown):
 
     @property
     def samples(self) -> Samples:
-        """All samples that were given, those of no weight too, each of several copies once; see :mod:`.order`.
+        """All samples that are kept, those of no weight too, each of several copies once; see :mod:`.order`.
 
         Folds are numbered as in ``filled``.
 
@@ -211,12 +205,12 @@ class Training(Shown):
 
     def _distinct(self) -> tuple[Batch, NDArray[np.intp], NDArray[np.intp]]:
         """All samples in one, the first of each kind of copies, and which kind each is of."""
-        if self.batches is None:
+        if self.kept is None:
             raise SettingError(
                 "learner: it needs the samples, and this policy has their sums alone: it was stored, or fitted by a "
                 "learner that needs no samples. Fit with this learner from the start."
             )
-        given = reduce(Batch.followed_by, map(_on_host, self.batches))
+        given = self.kept.whole
         return self._in_units(given), *distinct(self._in_coordinates(given))
 
     def _in_units(self, batch: Batch) -> Batch:
@@ -233,7 +227,7 @@ class Training(Shown):
         filled, number = self.gathered.filled, np.zeros(self.split.validation.count, dtype=np.intp)
         number[filled] = np.arange(len(filled))  # what no field sees is in none of them either
         found[rows] = number[self.split.assign(samples.states[rows], samples.at(rows).groups)]
-        return found
+        return np.asarray(np.unique(found, return_inverse=True)[1], dtype=np.intp)  # one may be missing of what is kept
 
     @property
     def _sizes(self) -> tuple[int, int]:
@@ -248,8 +242,18 @@ class Training(Shown):
 
     def _summary(self) -> tuple[str, ...]:
         folds = f"{counted(len(self.gathered.parts), 'fold')} by {self.split.by}"
-        kept = "sums alone" if self.batches is None else "samples kept"
+        kept = "sums alone" if self.kept is None else "samples kept"
         return counted(self._typical.shape[1], "state"), counted(self.actions, "action"), folds, kept
+
+
+def _check_size(folds: int, models: int, d: int, p: int) -> None:
+    """Refuse sums that would not go into memory, before there are any."""
+    numbers = folds * models * (d * p) ** 2
+    if numbers > MOST_NUMBERS:
+        raise InvalidDataError(
+            f"{counted(d, 'action')} and {counted(p, 'feature')} in {counted(models, 'model')} make sums of "
+            f"{8e-9 * numbers:,.0f} GB. Take fewer columns as states and actions, fewer features, or Folds(2)."
+        )
 
 
 def _summed(counts: Array, places: NDArray[np.intp]) -> Array:
@@ -259,11 +263,6 @@ def _summed(counts: Array, places: NDArray[np.intp]) -> Array:
 def _proportion(counts: Array) -> float:
     """What makes the mean weight one, over the samples of any: only ratios of weights count."""
     return float(np.count_nonzero(counts) / counts.sum())
-
-
-def _on_host(batch: Batch) -> Batch:
-    states, actions = (np.asarray(on_host(table), dtype=np.float64) for table in batch[:2])
-    return batch._replace(states=states, actions=actions)
 
 
 def _add(batch: Batch, model: Model, split: Split, sums: Sequence[Sums], threads: Workers) -> None:

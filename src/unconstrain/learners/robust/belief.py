@@ -170,10 +170,10 @@ def _ratio(apart: Array, noise: Array, samples: Samples, m: int) -> float:
     p = own.shape[1]
     weights, found = samples.counts * samples.memberships[:, m], []
     for action in range(d):
-        seen = ((own @ apart.reshape(p, d, -1)[:, action]) ** 2).sum(axis=1)
-        said = ((own @ noise.reshape(p, d, p, d)[:, action, :, action]) * own).sum(axis=1)
+        off = own @ apart.reshape(p, d, -1)[:, action]
+        said = np.vecdot(own @ noise.reshape(p, d, p, d)[:, action, :, action], own)
         with np.errstate(divide="ignore", invalid="ignore"):
-            found.append(np.log(seen) - np.log(said))
+            found.append(np.log(np.vecdot(off, off)) - np.log(said))
     logs = np.mean(found, axis=0)
     fine = np.isfinite(logs) & (weights > 0)
     return float(np.exp(np.average(logs[fine], weights=weights[fine]))) if fine.any() else 1.0

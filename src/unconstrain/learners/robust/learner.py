@@ -31,9 +31,12 @@ from .segments import found_segments
 from .softened import softened
 
 SUMS_ALONE = (
-    "Learnt from sums alone, as the softened hybrid, since samples were not kept: there were more than "
-    f"{Training.MOST_KEPT:,}, or they came over a cluster or from a file. Likelihood and noise correction were not "
-    "tried."
+    "Learnt from sums alone, as the softened hybrid, since samples were not kept: they came over a cluster or from a "
+    "file. Likelihood and noise correction were not tried."
+)
+THINNED = (
+    "Learnt from one in {0} samples of each demonstration, {1:,} in all, evenly: more of them say the same. These are "
+    "what solution_.free is about; those that look wrong are left out, but not listed."
 )
 
 
@@ -50,7 +53,9 @@ class SampleLearner(Learner):
             training = training.without(suspects)
             everything = training.samples
         found = self._learnt(training, everything)
-        return replace(found, belief=replace(found.believed, suspects=suspects))
+        thinned = _thinned(training)
+        listed = suspects[:0] if thinned else suspects  # which they are among all is not known
+        return replace(found, belief=replace(found.believed, suspects=listed), notes=(*found.notes, *thinned))
 
     def _learnt(self, training: Training, everything: Samples) -> Solution:
         samples = held_out_together(everything.counted)
@@ -203,9 +208,10 @@ class Robust(_Maximising):
     :class:`Segments` by demonstration, and :class:`Likelihood` unless noise
     hides the sphere or nearly all samples are in its uniform component.
 
-    Keeps the samples, up to 200,000 of them, and uses them. Where they are
-    more, on a cluster, or in a stored policy that learns on, the moments have
-    to do: it then is :class:`~unconstrain.Hybrid` with ``alpha="auto"``, and
+    Keeps the samples, up to 50,000 of them, and uses them; of more it keeps
+    every second, fourth, ... of each demonstration, and ``solution_.free`` is
+    about those. On a cluster, and in a stored policy that learns on, the
+    moments have to do: it then is :class:`~unconstrain.Hybrid` with ``alpha="auto"``, and
     ``solution_.notes`` says so.
 
     Parameters
@@ -242,7 +248,7 @@ class Robust(_Maximising):
 
     def learn(self, training: Training) -> Solution:
         """Learn from the samples where they were kept, and from the moments elsewhere."""
-        if training.batches is None:
+        if training.kept is None:
             return replace(Hybrid(alpha="auto").learn(training), notes=(SUMS_ALONE,))
         return super().learn(training)
 
@@ -280,7 +286,7 @@ class Robust(_Maximising):
         begun : mapping
             Training in each model, by name, with nothing seen.
         seen : iterable of Batch, optional
-            What to learn from; the first 200,000 samples of it are looked at.
+            What to learn from; about the first 50,000 samples of it are looked at.
 
         Raises
         ------
@@ -293,7 +299,7 @@ class Robust(_Maximising):
                 "with fit(...) first, and take its features_."
             )
         first = list(_first(seen))
-        keeping = {name: replace(one, batches=(), most=None) for name, one in begun.items()}
+        keeping = {name: one.keeping(Training.MOST_KEPT) for name, one in begun.items()}
         trainings = {name: one.with_batches(first) for name, one in keeping.items()}
         samples = {name: held_out_together(one.samples.counted) for name, one in trainings.items()}
         any_ = next(iter(samples.values()))
@@ -314,6 +320,11 @@ def _first(batches: Iterable[Batch]) -> Iterator[Batch]:
         room -= batch.states.shape[0]
         if room <= 0:
             return
+
+
+def _thinned(training: Training) -> tuple[str, ...]:
+    kept = training.kept
+    return () if kept is None or kept.stride == 1 else (THINNED.format(kept.stride, kept.size),)
 
 
 def _most_noise(samples: Samples) -> float:

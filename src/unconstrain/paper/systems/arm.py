@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...base.arrays import Array, as_vector, require_extra
 from ...base.errors import ReadError, SettingError
+from ...base.foreign import ours_alone
 
 _HINGES = {"revolute": False, "continuous": False, "prismatic": True}
 
@@ -103,11 +105,13 @@ class Arm:
             if link is not None and link not in links:
                 raise SettingError(f"{path}: has no link {link!r}; it has {', '.join(sorted(links))}.")
         into = {joint.child: joint for joint in joints}
-        chain = []
+        chain: list[_Joint] = []
         link = tip
         while link != base and link in into:
             chain.append(into[link])
             link = into[link].parent
+            if len(chain) > len(into):
+                raise ReadError(f"{path}: the joints that lead to {tip!r} make a ring, expected a tree.")
         if base is not None and link != base:
             raise SettingError(f"{path}: {base!r} is not on the way from the root to {tip!r}, but on another branch.")
         return _from_joints(chain[::-1], path, tip)
@@ -221,31 +225,37 @@ class _Joint:
     upper: float
     mimics: bool
 
+    @property
+    def is_told(self) -> bool:
+        """Whether its place and axis are numbers, and its limits are not none."""
+        of_place = np.isfinite(self.origin).all() and np.isfinite(self.axis).all()
+        return bool(of_place and not np.isnan([self.lower, self.upper]).any())
+
 
 def _urdf(path: str | os.PathLike[str]) -> tuple[set[str], list[_Joint]]:
     """Links and joints of a file."""
     reader = require_extra("yourdfpy", "arm")
-    try:
+    # What is no number does harm only on the way.
+    with ours_alone(path, "a URDF", said="is no URDF that can be read", kinds=True), np.errstate(all="ignore"):
         robot = reader.URDF.load(os.fspath(path), load_meshes=False, build_scene_graph=False).robot
-    # The reader and the XML parser below it raise whatever they stumble over.
-    except Exception as error:
-        raise ReadError(f"{path}: is no URDF that can be read ({type(error).__name__}: {error}).") from error
-    joints = []
-    for one in robot.joints:
-        ends = (-np.inf, np.inf)
-        if one.limit is not None and one.type != "continuous":
-            ends = (one.limit.lower or 0.0, one.limit.upper or 0.0)
-        axis = np.array([1.0, 0.0, 0.0]) if one.axis is None else np.asarray(one.axis, dtype=np.float64)
-        origin = np.eye(4) if one.origin is None else np.asarray(one.origin, dtype=np.float64)
-        mimics = one.mimic is not None
-        joints.append(_Joint(one.name, one.type, one.parent, one.child, origin, axis, *ends, mimics))
-    return {link.name for link in robot.links}, joints
+        return {str(link.name) for link in robot.links}, [_joint(one) for one in robot.joints]
+
+
+def _joint(one: Any) -> _Joint:
+    ends = (-np.inf, np.inf)
+    if one.limit is not None and one.type != "continuous":
+        ends = (float(one.limit.lower or 0.0), float(one.limit.upper or 0.0))
+    axis = np.array([1.0, 0.0, 0.0] if one.axis is None else one.axis, dtype=np.float64).reshape(3)
+    origin = np.array(np.eye(4) if one.origin is None else one.origin, dtype=np.float64).reshape(4, 4)
+    return _Joint(str(one.name), str(one.type), one.parent, one.child, origin, axis, *ends, one.mimic is not None)
 
 
 def _from_joints(chain: list[_Joint], path: str | os.PathLike[str], tip: str) -> Arm:
     """Arm of a chain; fixed joints become part of the next one's origin."""
     origins, moving, origin = [], [], np.eye(4)
     for joint in chain:
+        if not joint.is_told:
+            raise ReadError(f"{path}: joint {joint.name!r} on the way to {tip!r} holds a number that is none.")
         origin = origin @ joint.origin
         if joint.kind == "fixed":
             continue

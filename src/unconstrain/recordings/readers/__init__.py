@@ -17,6 +17,7 @@ from glob import glob
 from pathlib import Path
 
 from ...base.errors import NOTHING_LEFT, ReadError, SettingError
+from ...base.foreign import ours_alone, unchanged
 from ..demonstration import Recording
 from .folders import files_in
 from .formats import format_of
@@ -100,8 +101,9 @@ def read_blocks(path: PathLike, reading: Reading | None = None, *, whole: bool =
     if told.columns is not None and known.has_names:
         raise SettingError(f"columns (--columns): {file} says itself what its columns are called; leave them off.")
     assembly = Assembly(file, told)
-    for table in (known.read if whole or known.blocks is None else known.blocks)(file, told):
-        yield from assembly.recordings(table)
+    with ours_alone(file, known.expected), unchanged(file):
+        for table in (known.read if whole or known.blocks is None else known.blocks)(file, told):
+            yield from assembly.recordings(table)
 
 
 def expand(paths: PathLike | Iterable[PathLike]) -> list[Path]:

@@ -19,7 +19,7 @@ from ...base.arrays import Array
 from ...base.errors import ReadError
 from .packed import stem
 from .reading import Reading
-from .table import Format, Table, ours_alone, unique_names
+from .table import Format, Table, unique_names
 
 BLOCK = 512
 """The format counts in blocks of so many bytes."""
@@ -44,8 +44,7 @@ class Capture(NamedTuple):
 
 def read_c3d(path: Path, _: Reading) -> Iterator[Table]:
     """Read one file; see :class:`~.table.ReadFile`."""
-    with ours_alone(path, "motion capture as C3D"):
-        capture = read_capture(path.read_bytes())
+    capture = read_capture(path.read_bytes())
     parameters = capture.parameters
     frames, markers, _three = capture.points.shape
     labels = _labels(parameters, "POINT", markers, "marker")
@@ -180,4 +179,10 @@ def _numbers(values: list[Any], count: int, otherwise: float) -> Array:
     return np.array(known if len(known) == count else [otherwise] * count)
 
 
-FORMAT = Format((".c3d",), lambda head: len(head) > 1 and head[1] == 0x50 and head[0] == 2, read_c3d, has_names=True)
+FORMAT = Format(
+    (".c3d",),
+    lambda head: len(head) > 1 and head[1] == 0x50 and head[0] == 2,
+    read_c3d,
+    has_names=True,
+    expected="motion capture as C3D",
+)

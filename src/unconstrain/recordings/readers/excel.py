@@ -17,7 +17,7 @@ from .layout import find_block
 from .lines import Lines
 from .packed import stem
 from .reading import Reading
-from .table import Format, Table, ours_alone
+from .table import Format, Table
 from .text import joined, tables_of_text
 
 DELIMITER = "\t"
@@ -38,9 +38,8 @@ def read_excel(path: Path, reading: Reading) -> Iterator[Table]:
 def _sheets(path: Path) -> dict[str, list[str]]:
     """The rows of each sheet, as lines of text."""
     calamine = require_extra("python_calamine", "formats")
-    with ours_alone(path, "a workbook; or save it as CSV"):
-        book = calamine.load_workbook(io.BytesIO(path.read_bytes()))
-        return {title: [_line(row) for row in book.get_sheet_by_name(title).to_python()] for title in book.sheet_names}
+    book = calamine.load_workbook(io.BytesIO(path.read_bytes()))
+    return {title: [_line(row) for row in book.get_sheet_by_name(title).to_python()] for title in book.sheet_names}
 
 
 def _line(row: list[Any]) -> str:
@@ -71,4 +70,6 @@ def _is_workbook(head: bytes) -> bool:
     return is_zip or head.startswith(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1")
 
 
-FORMAT = Format((".xlsx", ".xlsm", ".xls", ".xlsb", ".ods"), _is_workbook, read_excel)
+FORMAT = Format(
+    (".xlsx", ".xlsm", ".xls", ".xlsb", ".ods"), _is_workbook, read_excel, expected="a workbook; or save it as CSV"
+)

@@ -16,8 +16,9 @@ import numpy as np
 
 from ...base.arrays import BLOCK_ROWS, require_extra
 from .clocks import find_clock
+from .nodes import Visit
 from .reading import Reading
-from .table import Format, Table, ours_alone
+from .table import Format, Table
 from .trees import Branch, tables_of
 
 AFTER = re.compile(r"next_(obs|observations?)|mask|metadata|images?|#refs#|#subsystem#")
@@ -36,9 +37,6 @@ _DEMONSTRATION = re.compile(r"/data/demo_\d+$")
 _CONTROL_RATE = re.compile(r'"control_freq"\s*:\s*([\d.]+)')
 _ROLES = {"groups": "group"}
 
-DEEPEST = 32
-"""Groups within groups, beyond which a file is damaged."""
-
 
 def read_hdf5(path: Path, reading: Reading) -> Iterator[Table]:
     """Read one file whole; see :class:`~.table.ReadFile`."""
@@ -52,20 +50,19 @@ def read_hdf5_blocks(path: Path, reading: Reading) -> Iterator[Table]:
 
 def _read(path: Path, reading: Reading, rows: int | None) -> Iterator[Table]:
     h5py = require_extra("h5py", "data")
-    with ours_alone(path, "an HDF5 file"), h5py.File(path, "r") as file:
-        yield from tables_of(_branch(file, path.stem, reading, _masks(file)), path, reading.columns, rows)
+    with h5py.File(path, "r") as file:
+        branch = _branch(file, path.stem, reading, _masks(file, Visit(h5py)), Visit(h5py))
+        yield from tables_of(branch, path, reading.columns, rows)
 
 
-def _branch(node: Any, name: str, reading: Reading, masks: Mapping[str, list[str]], depth: int = 0) -> Branch:
+def _branch(node: Any, name: str, reading: Reading, masks: Mapping[str, list[str]], visit: Visit) -> Branch:
     """A group with what is in it, as far as it may become columns."""
-    if depth > DEEPEST:
-        raise ValueError("its groups are nested too deep")
     members: dict[str, Any] = {}
-    for title, child in node.items():
-        if child is None or AFTER.fullmatch(title) or _is_picture(child):
+    for title, child in visit.members(node).items():
+        if AFTER.fullmatch(title) or _is_picture(child):
             continue
-        if not hasattr(child, "shape"):
-            below = _branch(child, child.name.strip("/"), reading, masks, depth + 1)
+        if hasattr(child, "keys"):
+            below = _branch(child, child.name.strip("/"), reading, masks, visit)
             members |= _beside(below, title, members) if title in (*OBSERVATIONS, *INFOS) else {title: below}
         elif title in (reading.group, reading.time):
             members[title] = child
@@ -111,11 +108,11 @@ def _episodes(members: Mapping[str, Any]) -> dict[str, Any]:
     return {"episode": np.concatenate([[0], np.cumsum(is_end)[:-1]])}
 
 
-def _masks(file: Any) -> dict[str, list[str]]:
+def _masks(file: Any, visit: Visit) -> dict[str, list[str]]:
     """For each demonstration the lists that it is in."""
     lists: dict[str, list[str]] = {}
-    mask = file.get("mask")
-    for title, names in mask.items() if hasattr(mask, "items") else ():
+    mask = visit.members(file).get("mask")
+    for title, names in visit.members(mask).items() if hasattr(mask, "items") else ():
         for name in names[()].tolist() if getattr(names, "ndim", 0) == 1 else ():
             lists.setdefault(name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name), []).append(
                 title
@@ -134,5 +131,9 @@ def _attributes(node: Any) -> dict[str, Any]:
 
 
 FORMAT = Format(
-    (".h5", ".hdf5", ".hdf", ".he5"), lambda head: head.startswith(b"\x89HDF\r\n\x1a\n"), read_hdf5, read_hdf5_blocks
+    (".h5", ".hdf5", ".hdf", ".he5"),
+    lambda head: head.startswith(b"\x89HDF\r\n\x1a\n"),
+    read_hdf5,
+    read_hdf5_blocks,
+    expected="an HDF5 file",
 )

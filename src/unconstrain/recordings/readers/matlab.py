@@ -14,7 +14,7 @@ import numpy as np
 from ...base.arrays import require_extra
 from .mat5 import read_mat5
 from .reading import Reading
-from .table import Format, Table, ours_alone
+from .table import Format, Table
 from .trees import Branch, tables_of
 
 DEEPEST = 32
@@ -30,10 +30,9 @@ def read_matlab(path: Path, reading: Reading) -> Iterator[Table]:
 
 
 def _contents(path: Path) -> Mapping[str, Any]:
-    with ours_alone(path, "a MATLAB file, as from save"):
-        if _is_hdf5(path):
-            return _of_hdf5(path)
-        return {name: _plain(value) for name, value in read_mat5(path.read_bytes()).items()}
+    if _is_hdf5(path):
+        return _of_hdf5(path)
+    return {name: _plain(value) for name, value in read_mat5(path.read_bytes()).items()}
 
 
 def _is_hdf5(path: Path) -> bool:
@@ -86,4 +85,9 @@ def _structs(fields: dict[str, Any]) -> Any:
     return [dict(zip(fields, members, strict=True)) for members in zip(*fields.values(), strict=True)]
 
 
-FORMAT = Format((".mat",), lambda head: head.startswith(b"MATLAB "), read_matlab)
+FORMAT = Format(
+    (".mat",),
+    lambda head: head.startswith(b"MATLAB "),
+    read_matlab,
+    expected="a MATLAB file, as from save",
+)

@@ -4,6 +4,7 @@ An archive of ``states`` (N, n), ``actions`` (N, d), and if known ``times`` (N,)
 x1..xn and u1..ud. Other arrays are read as :mod:`~.trees` says.
 """
 
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,9 +13,11 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import BLOCK_ROWS
+from ...base.display import listed
 from ...base.errors import ReadError
+from ...base.foreign import check_size
 from .reading import Reading
-from .table import Format, Table, ours_alone
+from .table import Format, Table
 from .trees import UNNAMED, Branch, tables_of
 
 _EXPECTED = "Expected a NumPy archive, as from numpy.savez(path, states=..., actions=..., times=..., groups=...)"
@@ -47,27 +50,58 @@ def read_npy_blocks(path: Path, reading: Reading) -> Iterator[Table]:
 
 
 def _npy(path: Path, reading: Reading, rows: int | None) -> Iterator[Table]:
-    array = _array(path)
+    array: Any = OnDisk(path)
+    if rows is None or not array.is_by_rows:
+        with _nothing_unpickled(path):
+            array = np.load(path, allow_pickle=False)
     fields = array.dtype.names
     members = {UNNAMED: array} if fields is None else {name: array[name] for name in fields}
     yield from tables_of(Branch(members, path.stem), path, reading.columns, rows)
 
 
-def _array(path: Path) -> Any:
-    with ours_alone(path, "an array, as from numpy.save"), _nothing_unpickled(path):
-        return np.load(path, mmap_mode="r", allow_pickle=False)
+class OnDisk:
+    """An array whose rows are read when asked for; mapped into memory, a file that shrinks would end Python."""
+
+    def __init__(self, path: Path) -> None:
+        with path.open("rb") as file:
+            version = np.lib.format.read_magic(file)
+            read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+            self.shape, fortran, self.dtype = read(file)
+            self._start = file.tell()
+        self.path, self.ndim, self.size = path, len(self.shape), math.prod(self.shape)
+        self.is_by_rows = self.ndim == 2 and not fortran and self.shape[0] > self.shape[1] and not self.dtype.hasobject
+        check_size(self.size * self.dtype.itemsize // 8, path.stat().st_size)
+
+    def __getitem__(self, rows: slice) -> Any:
+        """Some rows.
+
+        Raises
+        ------
+        ValueError
+            If the file ends before.
+        """
+        start, stop, _ = rows.indices(self.shape[0])
+        width = self.shape[1] * self.dtype.itemsize
+        with self.path.open("rb") as file:
+            file.seek(self._start + start * width)
+            data = file.read((stop - start) * width)
+        return np.frombuffer(data, self.dtype).reshape(stop - start, self.shape[1])
 
 
 def _load(path: Path) -> dict[str, Any]:
-    expected = _EXPECTED.removeprefix("Expected ")
     # Opened here, since numpy leaves a damaged file open.
     with (
-        ours_alone(path, expected),
         _nothing_unpickled(path),
         path.open("rb") as stream,
         np.load(stream, allow_pickle=False) as archive,
     ):
-        return {key: archive[key] for key in archive.files}
+        held = archive.zip.infolist()
+        check_size(sum(one.file_size for one in held) // 8, sum(one.compress_size for one in held))
+        contents = {key: archive[key] for key in archive.files}
+    strange = [key for key, array in contents.items() if not isinstance(array, np.ndarray)]
+    if strange:
+        raise ReadError(f"{path}: {listed(strange)} in it: no array, as numpy.savez writes them.")
+    return contents
 
 
 @contextmanager
@@ -107,5 +141,11 @@ def _is_archive(head: bytes) -> bool:
     return head.startswith(b"PK\x03\x04") and b".npy" in head[:512]
 
 
-FORMAT = Format((".npz",), _is_archive, read_npz)
-ARRAY = Format((".npy",), lambda head: head.startswith(b"\x93NUMPY"), read_npy, read_npy_blocks)
+FORMAT = Format((".npz",), _is_archive, read_npz, expected=_EXPECTED.removeprefix("Expected "))
+ARRAY = Format(
+    (".npy",),
+    lambda head: head.startswith(b"\x93NUMPY"),
+    read_npy,
+    read_npy_blocks,
+    expected="an array, as from numpy.save",
+)

@@ -17,7 +17,7 @@ from ...base.errors import ReadError
 from .clocks import UNITS
 from .lerobot import DataSet, data_set_of, whole_episodes
 from .reading import Reading
-from .table import Format, Table, find_roles, numbers_of, ours_alone, unique_names
+from .table import Format, Table, find_roles, numbers_of, unique_names
 
 
 def read_parquet(path: Path, reading: Reading) -> Iterator[Table]:
@@ -26,16 +26,20 @@ def read_parquet(path: Path, reading: Reading) -> Iterator[Table]:
     if whole.has_episodes:
         yield from whole_episodes(read_parquet_blocks(path, reading))
         return
-    with ours_alone(path, "a Parquet file"), _opened(path) as file:
+    with _opened(path) as file:
         yield _table(file.read(), path, reading, whole)
 
 
 def read_parquet_blocks(path: Path, reading: Reading) -> Iterator[Table]:
     """Go through one file by some rows at a time."""
     whole = data_set_of(path)
-    with ours_alone(path, "a Parquet file"), _opened(path) as file:
+    with _opened(path) as file:
+        rows = 0
         for batch in file.iter_batches(batch_size=BLOCK_ROWS, use_threads=False):
+            rows += batch.num_rows
             yield _table(batch, path, reading, whole)
+        if rows != file.metadata.num_rows:
+            raise ReadError(f"{path}: says that it has {file.metadata.num_rows:,} rows, but {rows:,} could be read.")
 
 
 def _opened(path: Path) -> Any:
@@ -126,5 +130,10 @@ def _float64(column: Any) -> Array:
 
 
 FORMAT = Format(
-    (".parquet", ".pq"), lambda head: head.startswith(b"PAR1"), read_parquet, read_parquet_blocks, has_names=True
+    (".parquet", ".pq"),
+    lambda head: head.startswith(b"PAR1"),
+    read_parquet,
+    read_parquet_blocks,
+    has_names=True,
+    expected="a Parquet file",
 )

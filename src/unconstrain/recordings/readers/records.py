@@ -11,7 +11,7 @@ import numpy as np
 
 from .packed import opened, stem
 from .reading import Reading
-from .table import Format, Table, ours_alone
+from .table import Format, Table
 from .trees import UNNAMED, Branch, tables_of
 
 LONGEST_CELL = 64
@@ -20,10 +20,8 @@ LONGEST_CELL = 64
 
 def read_json(path: Path, reading: Reading) -> Iterator[Table]:
     """Read one file; see :class:`~.table.ReadFile`."""
-    with ours_alone(path, "JSON: records, or columns of numbers"):
-        with opened(path) as file:
-            content = _parse(file.read().decode("utf-8-sig"))
-        tree = _tree(content)
+    with opened(path) as file:
+        tree = _tree(_parse(file.read().decode("utf-8-sig")))
     members = tree if isinstance(tree, Mapping) else {UNNAMED: tree}
     yield from tables_of(Branch(members, stem(path), is_short=False), path, reading.columns)
 
@@ -103,4 +101,10 @@ def _recognises(head: bytes) -> bool:
     return head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"{", b"["))
 
 
-FORMAT = Format((".json", ".jsonl", ".ndjson"), _recognises, read_json, by_content=False)
+FORMAT = Format(
+    (".json", ".jsonl", ".ndjson"),
+    _recognises,
+    read_json,
+    by_content=False,
+    expected="JSON: records, or columns of numbers",
+)

@@ -21,7 +21,7 @@ from ...base.display import listed
 from ...base.errors import ReadError
 from .packed import stem
 from .reading import Reading
-from .table import Format, Table, ours_alone
+from .table import Format, Table
 
 MOTION = re.compile(r"(JointState|Pose|Twist|Wrench|Accel|Transform|Point|Vector3|Odometry)\w*|TFMessage")
 """Kinds of messages that are taken for the recording where one topic has such and no topic is named."""
@@ -47,10 +47,7 @@ def read_ros(path: Path, reading: Reading) -> Iterator[Table]:
 def _read(path: Path, asked: str | None, several: bool) -> Iterator[Table]:
     """The tables of one topic."""
     highlevel = require_extra("rosbags.highlevel", "formats")
-    with (
-        ours_alone(path, "a ROS recording (.bag, .db3, .mcap)"),
-        highlevel.AnyReader([path], default_typestore=_types()) as bag,
-    ):
+    with highlevel.AnyReader([path], default_typestore=_types()) as bag:
         topic, frame = _chosen(bag, path, asked)
         rows = _rows(bag, topic)
     if not rows:
@@ -159,4 +156,10 @@ def is_recording(folder: Path) -> bool:
     return (folder / "metadata.yaml").is_file() and any(any(folder.glob(kind)) for kind in kinds)
 
 
-FORMAT = Format((".bag", ".db3", ".mcap"), lambda head: head.startswith(_MAGICS), read_ros, has_names=True)
+FORMAT = Format(
+    (".bag", ".db3", ".mcap"),
+    lambda head: head.startswith(_MAGICS),
+    read_ros,
+    has_names=True,
+    expected="a ROS recording (.bag, .db3, .mcap)",
+)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...base.arrays import Array
 from ...base.display import legible, listed
-from ...base.errors import ReadError, UnconstrainError
+from ...base.errors import ReadError
 from ..demonstration import Recording
 from ..remarks import Remark
 from .clocks import Clock, ClockColumns, find_clock, find_clock_of, find_pair, read_words, unit_in_name, unit_of_word
@@ -53,7 +52,9 @@ class ReadFile(Protocol):
         MissingExtraError
             If the library that reads this format is not installed.
         ReadError
-            If it is no such file, or holds no numbers; the message names the file.
+            If it holds no numbers; the message names the file.
+        Exception
+            Any, if it is no such file, or a damaged one.
         """
 
 
@@ -62,7 +63,8 @@ class Format(NamedTuple):
 
     ``suffixes`` in small letters with the dot; ``recognises`` looks at the first bytes of a file; ``read`` reads it
     whole, ``blocks``, if given, by some rows at a time. A format ``by_content`` is known by its first bytes whatever
-    the suffix says; one that ``has_names`` says itself what its columns are called.
+    the suffix says; one that ``has_names`` says itself what its columns are called. ``expected`` is what errors say
+    that such a file is.
     """
 
     suffixes: tuple[str, ...]
@@ -71,6 +73,7 @@ class Format(NamedTuple):
     blocks: ReadFile | None = None
     by_content: bool = True
     has_names: bool = False
+    expected: str = "a file of that format"
 
 
 @dataclass(frozen=True)
@@ -106,24 +109,6 @@ class Table:
     units: Mapping[str, str] = field(default_factory=dict)
     attributes: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[Remark, ...] = ()
-
-
-@contextmanager
-def ours_alone(path: Path, expected: str) -> Iterator[None]:
-    """Whatever a library raises becomes one error that names the file: damaged bytes make it raise what it likes.
-
-    Raises
-    ------
-    ReadError
-        With the first line of what was raised, and the kind of file that was expected.
-    """
-    try:
-        yield
-    except UnconstrainError:
-        raise
-    except Exception as error:
-        said = (str(error).splitlines() or [""])[0][:200] or type(error).__name__
-        raise ReadError(f"{path}: cannot be read ({said}). Expected {expected}.") from error
 
 
 def numbers_of(table: Any) -> Array:

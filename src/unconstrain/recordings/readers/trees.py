@@ -60,6 +60,10 @@ class Branch:
     is_short: bool = True
 
 
+class Elsewhere:
+    """A member that is in another file, which is not read."""
+
+
 @dataclass(frozen=True)
 class Leaf:
     """An array with its samples along ``axis``, the first ``length`` of them."""
@@ -166,6 +170,8 @@ def _remarks(leaves: Mapping[str, Leaf]) -> tuple[Remark, ...]:
 def _left_out(leaves: Mapping[str, Leaf], branch: Branch) -> Iterator[Remark]:
     """A word about each array of numbers that has another length."""
     for name, member in branch.members.items():
+        if isinstance(member, Elsewhere):
+            yield Remark("dropped-column", f"{name!r} is in another file, and was left out.", name)
         if (
             name not in (*leaves, *EPISODE_ENDS)
             and _is_array(member)
