@@ -74,7 +74,7 @@ def test_v_falls_as_much_as_the_ball_says_whatever_the_policy_wants():
         wild = uc.Guided(lambda x, size=size: size * rng.standard_normal(x.shape), GOAL, demonstrations=SHOWN)
         velocities, slope = wild(STARTS), wild.potential_.gradient(STARTS)
         half = np.linalg.norm(slope, axis=1) / 2
-        radius = np.maximum(half - wild.pace_, half / 2)
+        radius = np.maximum(half - wild.aim_.pace, half / 2)
         fall, least = -np.vecdot(slope, velocities), (velocities**2).sum(axis=1) + half**2 - radius**2
         assert (fall >= least * (1 - 1e-9)).all()
 
@@ -131,7 +131,24 @@ def test_a_longer_step_can_be_asked_for(guided):
     by_itself = uc.Guided(drifting, GOAL, demonstrations=SHOWN).dt_
     assert by_itself < 0.02 <= guided.dt_
     assert_allclose(uc.Guided(drifting, GOAL, demonstrations=SHOWN, dt=100.0).dt_, 100.0)
-    assert uc.Guided(drifting, GOAL, demonstrations=SHOWN, dt=by_itself / 10).dt_ == by_itself
+    assert by_itself / 10 <= uc.Guided(drifting, GOAL, demonstrations=SHOWN, dt=by_itself / 10).dt_ < by_itself
+
+
+def test_shorter_steps_need_less_correction():
+    states = uc.stack(SHOWN).states
+    costs = [
+        np.linalg.norm(uc.Guided(drifting, GOAL, demonstrations=SHOWN, dt=dt).correction(states)) for dt in (0.1, 0.01)
+    ]
+    assert costs[1] < 0.5 * costs[0]
+
+
+def test_what_was_learnt_can_be_moved(learnt):
+    by = np.array([1.0, -2.0, 0.5])
+    elsewhere = learnt.moved(by)
+    assert_allclose(elsewhere(STARTS + by), learnt(STARTS), atol=1e-12)
+    assert_allclose(elsewhere.step(STARTS[0] + by), learnt.step(STARTS[0]), atol=1e-12)
+    assert_allclose(elsewhere.goal_, learnt.goal_ + by)
+    assert_allclose(uc.rollout(elsewhere, STARTS[0], 2000, 0.02).states[-1], learnt.goal_ + by, atol=1e-2)
 
 
 @pytest.mark.parametrize("states", [[[0.0, 0.0]], [[1.0, 0.0]], [[0.0, 0.0], [1.0, 1.0]]])
@@ -148,7 +165,7 @@ def test_it_survives_its_file(learnt, tmp_path):
     again = uc.load(tmp_path / "guided.npz", uc.Guided)
     assert_array_equal(again(STARTS), learnt(STARTS))
     assert_array_equal(again.step(STARTS[0]), learnt.step(STARTS[0]))
-    assert (again.dt_, again.pace_) == (learnt.dt_, learnt.pace_)
+    assert (again.dt_, again.aim_.pace) == (learnt.dt_, learnt.aim_.pace)
 
 
 def test_the_slope_of_v_and_of_what_it_is_learnt_by_are_those_of_finite_differences(guided):

@@ -122,7 +122,7 @@ def test_a_rollout_that_is_printed_writes_nothing(folder):
     ("command", "module", "extra"),
     [
         (COMMANDS["report"], "jinja2", "viz"),
-        (COMMANDS["diagnose"], "plotly", "viz"),
+        (COMMANDS["diagnose"], "matplotlib", "viz"),
         (("export", "p.npz", "-o", "a.onnx"), "onnx", "onnx"),
         (("convert", "a.csv", "b.parquet"), "pyarrow", "data"),
     ],

@@ -112,3 +112,39 @@ def test_the_start_is_not_touched():
 def test_what_cannot_be_followed_is_said_in_a_sentence(change, error, sentence):
     with pytest.raises(error, match=sentence):
         uc.rollout(**({"policy": decay, "start": [1.0, 2.0], "steps": 10, "dt": 1.0} | change))
+
+
+TURN = np.array([[-0.1, -2.0], [2.0, -0.1]])
+
+
+def test_better_steps_come_nearer_to_the_exact_movement():
+    from scipy.linalg import expm
+
+    exact = expm(TURN * 10.0) @ [1.0, 0.5]
+    errors = {
+        (method, dt): np.linalg.norm(
+            uc.rollout(lambda x: x @ TURN.T, [1.0, 0.5], round(10 / dt) + 1, dt, method=method).states[-1] - exact
+        )
+        for method in ("euler", "rk4", "adaptive")
+        for dt in (0.1, 0.05)
+    }
+    assert 10 < errors["rk4", 0.1] / errors["rk4", 0.05] < 20  # of fourth order: 16
+    assert errors["rk4", 0.1] < 1e-2 * errors["euler", 0.1]
+    assert errors["adaptive", 0.1] < 1e-5
+
+
+def test_adaptive_steps_get_over_what_is_too_fast_for_others():
+    stiff = uc.rollout(lambda x: -200.0 * x, [1.0], 4, 0.05, method="adaptive")
+    assert np.abs(stiff.states[-1]) < 1e-6
+
+
+def test_better_steps_stay_on_the_constraint_and_keep_its_truth():
+    line = uc.constraints.Plane([0.6, 0.8])
+    run = uc.rollout(lambda x: x @ TURN.T, [1.0, 0.5], 50, 0.05, line, method="rk4")
+    assert_allclose(run.states @ [0.6, 0.8], 1.0, atol=1e-12)
+    assert_allclose(run.truth.policy, run.states @ TURN.T)
+
+
+def test_a_method_that_is_none_is_refused():
+    with pytest.raises(SettingError, match="method: got 'heun', expected one of euler, rk4, adaptive"):
+        uc.rollout(lambda x: -x, [1.0], method="heun")

@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 
 from unconstrain.base.errors import InvalidDataError, MissingExtraError, SettingError, UnconstrainError
-from unconstrain.motion.containment import Contained
 from unconstrain.paper import simulation
 from unconstrain.paper.figures import arms, plates
 from unconstrain.paper.simulation import control, engine, pictures, postures, reproduction
@@ -209,58 +208,3 @@ def test_without_the_engine_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "mink", None)
     with pytest.raises(MissingExtraError, match=r"mink.*sim"):
         postures_along(np.zeros((1, 3)), PLATES[0])
-
-
-def test_contained_changes_nothing_near_the_data_and_comes_back_from_afar():
-    states = np.column_stack([np.cos(np.linspace(0, 6, 200)), np.sin(np.linspace(0, 6, 200))])
-
-    def outwards(at):
-        return 0.2 * at
-
-    kept = Contained(outwards, states, reach=0.2)
-    assert_array_equal(kept(states), outwards(states))
-    far = 50.0 * states[:5]
-    assert ((kept(far) - outwards(far)) * far).sum(axis=1).max() < 0
-    assert np.isfinite(kept(1e12 * states)).all()
-    at, free = states[:1].copy(), states[:1].copy()
-    for _ in range(2000):
-        at, free = at + 0.01 * kept(at), free + 0.01 * outwards(free)
-    assert np.linalg.norm(at) < 1.5 < 10 < np.linalg.norm(free)
-    with pytest.raises(SettingError):
-        Contained(outwards, states, reach=0.0)
-    with pytest.raises(SettingError):
-        Contained(outwards, states, reach=0.1, gain=-1.0)
-
-
-def test_contained_comes_back_wherever_no_demonstrated_state_is_within_reach():
-    along = np.linspace(-1, 1, 41)
-    strands = np.concatenate([np.column_stack([along, np.full(41, side)]) for side in (-0.25, 0.25)])
-
-    def still(at):
-        return np.zeros_like(at)
-
-    kept = Contained(still, strands, reach=0.1, speed=1.0)
-    grid = np.stack(np.meshgrid(np.linspace(-1.5, 1.5, 31), np.linspace(-1, 1, 41)), axis=-1).reshape(-1, 2)
-    distance = np.linalg.norm(grid[:, None] - strands, axis=2).min(axis=1)
-    moving = np.linalg.norm(kept(grid), axis=1) > 0
-    assert_array_equal(moving, distance / 0.1 > 1.0)
-    midway = kept(np.array([[0.0, 0.0], [0.3, 0.0]]))
-    assert (np.abs(midway[:, 1]) > 0.1).all()
-
-
-def test_the_way_back_is_no_faster_than_the_policy_or_than_told():
-    states = np.column_stack([np.cos(np.linspace(0, 6, 200)), np.sin(np.linspace(0, 6, 200))])
-
-    def turning(at):
-        return 0.3 * np.column_stack([-at[:, 1], at[:, 0]]) / np.linalg.norm(at, axis=1, keepdims=True)
-
-    def leaving(at):
-        return 0.2 * at
-
-    far = np.array([[50.0, 3.0], [0.0, -1e6]])
-    away = far / np.linalg.norm(far, axis=1, keepdims=True)
-    for policy, speed, limit in ((turning, None, 0.3), (turning, 0.7, 0.7), (leaving, None, 0.2)):
-        found = Contained(policy, states, reach=0.1, speed=speed)(far)
-        assert_allclose((found * away).sum(axis=1), -limit, rtol=0.05)
-    with pytest.raises(SettingError, match="speed: got 0, expected a number above 0"):
-        Contained(turning, states, reach=0.1, speed=0)

@@ -38,8 +38,8 @@ from .models import Polynomial as Polynomial
 from .models import ReceptiveFields as ReceptiveFields
 from .models import cover as cover
 from .models import spaces as spaces
-from .motion import Contained as Contained
 from .motion import Guided as Guided
+from .motion import certify as certify
 from .motion import rollout as rollout
 from .paper import datasets as datasets
 from .paper import experiments as experiments

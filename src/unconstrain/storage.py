@@ -49,7 +49,8 @@ from .learners import (
     secondary,
 )
 from .models import Affine, Everywhere, KMeansRBF, Model, NormalisedRBF, Polynomial, ReceptiveFields, Scale, spaces
-from .motion import Guided, Potential
+from .motion import STORED as GUIDED
+from .motion import Guided
 from .policies import LocallyLinearPolicy, ParametricPolicy, Policy
 from .risks import FoldedMoments, Moments
 from .training import Folds, HeldOut, Split, Training
@@ -71,7 +72,8 @@ _KNOWN: dict[str, type] = {
         *(spaces.Circle, spaces.Embedding, spaces.Euclidean, spaces.Product, spaces.Sphere),
         *(Belief, Direct, Hybrid, Inconsistency, Judged, Likelihood, NoiseCorrected, Robust, Segments, Solution),
         *(FoldedMoments, Folds, HeldOut, Moments, Split, Training),
-        *(Guided, LocallyLinearPolicy, ParametricPolicy, Potential),
+        *(LocallyLinearPolicy, ParametricPolicy),
+        *GUIDED,
         *STORED,
         *secondary.STORED,
     )

@@ -12,7 +12,7 @@ _MOVED = {
     "evaluation": "diagnosis metrics",
     "learners": "robust",
     "models": "features receptive_fields",
-    "motion": "containment rollouts",
+    "motion": "rollouts",
     "pages": "figures",
     "paper": "datasets experiments simulation systems",
     "recordings": "demonstration preparation readers streams",

@@ -17,6 +17,7 @@ import unconstrain as uc
 from ..base.errors import NOTHING_LEFT, ReadError, SettingError, UnconstrainError
 from ..base.files import write
 from ..paper import experiments
+from .certifying import certify
 from .constraining import constraint, held_of, options_for_held
 from .converting import convert
 from .diagnosing import diagnose
@@ -354,6 +355,7 @@ def doctor(as_json: bool) -> None:
         click.echo(f"  {command}")
 
 
+main.add_command(certify)
 main.add_command(constraint)
 main.add_command(convert)
 main.add_command(diagnose)

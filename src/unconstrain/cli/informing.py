@@ -40,7 +40,7 @@ def info(file: str, as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(told, indent=2))
         return
-    say_verdict(_verdict(held, notes))
+    say_verdict(_verdict(held))
     print_table(["", ""], [[name, _said(value)] for name, value in told.items() if value not in (None, [], {}, "")])
 
 
@@ -78,6 +78,7 @@ def _of(held: Any) -> dict[str, Any]:
     if solution is None:
         return {"fitted": False}
     return {
+        "demonstrations": _demonstrations(policy),
         "learner": type(policy.learner).__name__ if not isinstance(policy.learner, str) else policy.learner,
         "learnt as": solution.method,
         "model": f"{len(solution.weights)} local models" if len(solution.weights) > 1 else str(policy.features_),
@@ -90,15 +91,20 @@ def _rest(notes: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in notes.items() if name not in ("recipe", "units")}
 
 
-def _verdict(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:
+def _verdict(held: Any) -> uc.evaluation.verdicts.Verdict:
     if isinstance(held, uc.LearntConstraint):
         return uc.evaluation.verdicts.of_constraint(held)
     policy = getattr(held, "policy", held)
     if not hasattr(policy, "solution_"):
         mark = uc.evaluation.verdicts.Mark.BAD
         return uc.evaluation.verdicts.Verdict(mark, "Not fitted: it cannot predict.", next="unconstrain fit")
-    sources = len(notes.get("sources", ())) or uc.evaluation.diagnosis.ENOUGH
-    return uc.evaluation.verdicts.of_explained(policy.held_out_score(), sources)
+    told = _demonstrations(policy) or uc.evaluation.diagnosis.ENOUGH
+    return uc.evaluation.verdicts.of_explained(policy.held_out_score(), told)
+
+
+def _demonstrations(policy: uc.Policy) -> int | None:
+    """How many it learnt from; None where nobody told them apart."""
+    return len(policy.training_.split.fold_of) or None
 
 
 def _said(value: Any) -> str:

@@ -1,4 +1,4 @@
-"""A policy in motion: roll-outs, arriving, and keeping near the data.
+"""A policy in motion: roll-outs, arriving, and what is guaranteed of it.
 
 Examples
 --------
@@ -6,9 +6,9 @@ Examples
 array([1.  , 0.5 , 0.25])
 """
 
-from .containment import Contained
-from .guided import Guided
+from .certificate import certify
+from .guided import STORED, Guided
 from .potential import Potential
 from .rollouts import rollout
 
-__all__ = ["Contained", "Guided", "Potential", "rollout"]
+__all__ = ["STORED", "Guided", "Potential", "certify", "rollout"]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
-from math import sqrt
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +17,9 @@ from ..base.errors import InvalidDataError, SettingError
 from ..models import spaces
 from ..recordings import Demonstration, stack
 from ..risks import project
-from .potential import PACE, descended, radius
+from .descent import Descent
+from .orbit import Orbit, encircled, turns
+from .potential import PACE, Potential, descended
 
 _AT_REST = 0.3
 """A demonstration ends at rest, or nearly, below this share of its fastest motion."""
@@ -25,12 +28,32 @@ _TOGETHER = 0.1
 """Demonstrations end in one place within this share of their extent."""
 
 
-class Guided(Shown):
-    """A policy that arrives at a goal, from anywhere and under any constraint, by construction.
+_ROUND = 0.9
+"""Demonstrations of a cycle turn by so much of it, in their mean."""
 
-    Along every movement a convex potential V falls (:class:`~unconstrain.motion.potential.Potential`), which is learnt
-    from the demonstrations so that the policy descends it by itself where it was shown. Elsewhere the velocity is
-    corrected. With ``m = ½ N ∇V`` those velocities are allowed that are in the null space and in a ball,
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """A policy (callable) elsewhere: as it is at states shifted back by (n,)."""
+
+    policy: Callable[[Array], Array]
+    by: Array
+
+    def __call__(self, states: Array) -> Array:
+        """Velocities (N, n)."""
+        return self.policy(states - self.by)
+
+    def step(self, x: ArrayLike, out: Array | None = None) -> Array:
+        """Velocity at one state (n,)."""
+        return _single(self.policy)(np.asarray(x) - self.by, out)
+
+
+class Guided(Shown):
+    """A policy that arrives at a goal or on a cycle, from anywhere and under any constraint, by construction.
+
+    **At a goal.** Along every movement a convex potential V falls (:class:`~unconstrain.motion.potential.Potential`),
+    which is learnt from the demonstrations so that the policy descends it by itself where it was shown. Elsewhere the
+    velocity is corrected. With ``m = ½ N ∇V`` those velocities are allowed that are in the null space and in a ball,
 
         ``‖u + m‖ ≤ r = max(‖m‖ − s, ½ ‖m‖)``,   so that   ``−∇Vᵀu ≥ ‖u‖² + ‖m‖² − r²``:
 
@@ -42,7 +65,10 @@ class Guided(Shown):
 
         ``u = N (π + c) = −m + (Nπ + m) min(1, (2r / ‖Nπ + m‖ − 1)₊)``.
 
-    It is continuous in the state. A constraint that moves, or a task with a drift, may lift V.
+    **On a cycle.** A closed convex surface attracts that the demonstrated cycle is on, and which every plane through
+    its inside cuts in one closed curve; the pace along it is the demonstrated one (:class:`.Orbit`).
+
+    Both are continuous in the state. A constraint that moves, or a task with a drift, may lift V.
 
     Parameters
     ----------
@@ -50,6 +76,9 @@ class Guided(Shown):
         States (N, n) to velocities (N, n).
     goal : array_like, shape (n,), optional
         By default where the demonstrations end at rest.
+    orbit : array_like, shape (T, n), or "shown", optional
+        States on the cycle, all around it; "shown" are those of the demonstrations, from which it is found by default
+        where they do not end at rest but go round.
     demonstrations : Demonstration or sequence of Demonstration, optional
         Movements that are likely, on which the correction is to be small. By default those that the policy has kept.
     dt : float, optional
@@ -57,17 +86,18 @@ class Guided(Shown):
 
     Attributes
     ----------
+    aim_ : Descent or Orbit
+        What does it, as functions of velocities.
     goal_ : ndarray, shape (n,)
+        Or the middle of the cycle.
     potential_ : Potential
-    pace_ : float
-        The s above, in units of the state per second.
     dt_ : float
-        Seconds.
+        Seconds. With Euler steps of this length V falls, or cycles are wider than told by a few hundredths.
 
     Raises
     ------
     SettingError
-        If the policy gives no velocities of flat states, no demonstration is known, or no goal.
+        If the policy gives no velocities of flat states, no demonstration is known, or neither goal nor cycle.
 
     Examples
     --------
@@ -83,30 +113,46 @@ class Guided(Shown):
         self,
         policy: Callable[[Array], Array],
         goal: ArrayLike | None = None,
+        orbit: ArrayLike | Literal["shown"] | None = None,
         *,
         demonstrations: Demonstration | Sequence[Demonstration] | None = None,
         dt: float | None = None,
     ) -> None:
         if dt is not None:
             check_at_least("dt", dt, 0.0, strict=True)
+        if goal is not None and orbit is not None:
+            raise SettingError("orbit: got one beside a goal; expected one of the two.")
+        self.policy = policy
+        if orbit is not None and not isinstance(orbit, str):
+            given = as_matrix(orbit, "orbit")
+            self.aim_: Descent | Orbit = encircled(given, _velocities(policy, given))
+            return
         shown = _kept(policy) if demonstrations is None else demonstrations
         demos = [shown] if isinstance(shown, Demonstration) else list(shown)
-        states = stack(demos).states
-        self.policy = policy
-        self.goal_ = _found(demos) if goal is None else as_vector(goal, "goal", states.shape[1])
+        states, actions, _ = stack(demos)
         wanted = _velocities(policy, states)
-        self.pace_ = PACE * float(np.sqrt((wanted**2).sum(axis=1).mean()))
-        self.potential_ = descended(states, wanted, self.goal_, np.inf if dt is None else 2.0 / dt)
+        round_ = orbit is not None or (goal is None and _repeat(demos))
+        self.aim_ = encircled(states, actions) if round_ else _descent(demos, wanted, goal, dt)
+
+    @property
+    def potential_(self) -> Potential:
+        """V."""
+        return self.aim_.potential
+
+    @property
+    def goal_(self) -> Array:
+        """Where V is zero, shape (n,)."""
+        return self.potential_.goal
 
     @property
     def dt_(self) -> float:
-        """The longest Euler step with which V is sure to fall."""
-        return 2.0 / self.potential_.curvature
+        """Seconds; see above."""
+        return self.aim_.dt
 
     def __call__(self, states: ArrayLike) -> Array:
         """Velocities (N, n) where nothing constrains."""
         table = as_matrix(states, "states")
-        return self._guided(np.asarray(self.policy(table)), 0.5 * self.potential_.gradient(table))
+        return self.aim_.guided(table, np.asarray(self.policy(table)))
 
     predict = __call__
 
@@ -115,44 +161,31 @@ class Guided(Shown):
         table = as_matrix(states, "states")
         wanted = np.asarray(self.policy(table))
         held = project(projections, wanted)
-        return wanted - held + self._guided(held, project(projections, 0.5 * self.potential_.gradient(table)))
+        return wanted - held + self.aim_.guided(table, held, projections)
 
     def correction(self, states: ArrayLike) -> Array:
         """What is added to the policy's velocities where nothing constrains, (N, n)."""
         return self(states) - np.asarray(self.policy(as_matrix(states, "states")))
 
+    def moved(self, by: ArrayLike) -> Guided:
+        """The same motion elsewhere: everything that was learnt, shifted by (n,), as for a plate that was moved."""
+        way, other = as_vector(by, "by", len(self.goal_)), copy(self)
+        other.__dict__.pop("_step", None)
+        other.policy = Moved(self.policy, way)
+        other.aim_ = replace(self.aim_, potential=replace(self.potential_, goal=self.goal_ + way))
+        return other
+
     def step(self, x: ArrayLike, out: Array | None = None) -> Array:
         """Velocity at one state (n,), without overhead: for control loops; see :meth:`~unconstrain.Policy.step`."""
         return self._step(x, out)
 
-    def _guided(self, wanted: Array, half: Array) -> Array:
-        """Velocities (N, n) that the ball around ``−half`` allows."""
-        away = wanted + half
-        distance, depth = (np.linalg.norm(each, axis=1) for each in (away, half))
-        allowed = radius(depth, self.pace_)
-        inside = distance <= allowed
-        share = np.maximum(2.0 * allowed / np.where(inside, 1.0, distance) - 1.0, 0.0)
-        return np.where(inside[:, None], wanted, share[:, None] * away - half)
-
     @cached_property
     def _step(self) -> Callable[[ArrayLike, Array | None], Array]:
-        one, potential, pace = self.policy, self.potential_, self.pace_
-        plain: Callable[..., Array] = getattr(one, "step", None) or (
-            lambda x, out: np.concatenate(one(np.asarray([x], np.float64)), out=out)
-        )
-        directions, halved = potential.directions, 0.5 * potential.weights[:, None] * potential.directions
-        begin = directions @ potential.goal + potential.offsets
-        along, maximum, zeros = directions.dot, np.maximum, np.zeros(len(begin))
+        plain, guide = _single(self.policy), self.aim_.single()
 
         def step(x: ArrayLike, out: Array | None = None) -> Array:
-            wanted, beyond = plain(x, out), along(x)
-            beyond -= begin
-            half = maximum(beyond, zeros).dot(halved)
-            away = wanted + half
-            distance, depth = sqrt(away.dot(away)), sqrt(half.dot(half))
-            allowed = max(depth - pace, 0.5 * depth)
-            if distance > allowed:
-                np.subtract(max(2.0 * allowed / distance - 1.0, 0.0) * away, half, out=wanted)
+            wanted = plain(x, out)
+            guide(x, wanted)
             return wanted
 
         return step
@@ -162,8 +195,21 @@ class Guided(Shown):
         return {name: value for name, value in vars(self).items() if name != "_step"}
 
     def _summary(self) -> tuple[str, ...]:
-        goal = ", ".join(f"{each:.4g}" for each in self.goal_)
-        return type(self.policy).__name__, f"goal=({goal})", f"dt_={self.dt_:.3g}"
+        return type(self.policy).__name__, str(self.aim_)
+
+
+def _single(policy: Callable[[Array], Array]) -> Callable[..., Array]:
+    """A policy as a function of one state (n,) and of where to put the velocity, or None."""
+    step: Callable[..., Array] | None = getattr(policy, "step", None)
+    return step or (lambda x, out: np.concatenate(policy(np.asarray([x], np.float64)), out=out))
+
+
+def _descent(demos: Sequence[Demonstration], wanted: Array, goal: ArrayLike | None, dt: float | None) -> Descent:
+    """To the goal, or to where demonstrations end at rest."""
+    states = stack(demos).states
+    place = _found(demos) if goal is None else as_vector(goal, "goal", states.shape[1])
+    potential = descended(states, wanted, place, np.inf if dt is None else 2.0 / dt)
+    return Descent(potential, PACE * float(np.sqrt((wanted**2).sum(axis=1).mean())))
 
 
 def _velocities(policy: Callable[[Array], Array], states: Array) -> Array:
@@ -198,12 +244,24 @@ def _kept(policy: Any) -> list[Demonstration]:
     return [Demonstration(*pair) for pair in zip(np.split(states, ends), np.split(actions, ends), strict=True)]
 
 
+def _repeat(demos: Sequence[Demonstration]) -> bool:
+    """Whether demonstrations go round, and do not end at rest."""
+    return not any(map(_rests, demos)) and turns(demos) >= _ROUND
+
+
+def _rests(demo: Demonstration) -> bool:
+    speed = np.linalg.norm(demo.actions, axis=1)
+    return bool(speed[-1] <= _AT_REST * speed.max())
+
+
 def _found(demos: Sequence[Demonstration]) -> Array:
     """Where demonstrations end at rest, (n,)."""
-    speeds = [np.linalg.norm(demo.actions, axis=1) for demo in demos]
-    ends = [demo.states[-1] for demo, speed in zip(demos, speeds, strict=True) if speed[-1] <= _AT_REST * speed.max()]
+    ends = [demo.states[-1] for demo in demos if _rests(demo)]
     if not ends:
-        raise SettingError("goal: no demonstration ends at rest, so that none is found. Pass goal=.")
+        raise SettingError(
+            "goal: no demonstration ends at rest, and they do not go round either, so that none is found. Pass goal= "
+            "or orbit=."
+        )
     extent = np.linalg.norm(np.ptp(stack(demos).states, axis=0))
     goal = np.mean(ends, axis=0)
     apart = max(float(np.linalg.norm(end - goal)) for end in ends)
@@ -213,3 +271,7 @@ def _found(demos: Sequence[Demonstration]) -> Array:
             "their extent; expected one place. Pass goal=."
         )
     return np.asarray(goal)
+
+
+STORED = (Descent, Guided, Moved, Orbit, Potential)
+"""What guided policies are made of, for their file."""

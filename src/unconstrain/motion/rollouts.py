@@ -1,7 +1,8 @@
 """Follow a policy under constraints: makes demonstrations, and reproduces what was learnt."""
 
 from collections.abc import Callable, Sequence
-from typing import overload
+from dataclasses import dataclass
+from typing import Literal, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,15 @@ from ..risks import null_space_projection, project
 Task = Callable[[Array, Array], Array]
 """States (K, n) and times (K,) to the b of ``A u = b``, shape (K, k)."""
 
+Method: TypeAlias = Literal["euler", "rk4", "adaptive"]
+"""Of integration, see :func:`rollout`."""
+
+TOLERANCE = 1e-6
+"""Error of an adaptive step, as a share of the way that it goes."""
+
+HALVINGS = 12
+"""An adaptive step is halved no more often."""
+
 
 @overload
 def rollout(
@@ -28,6 +38,7 @@ def rollout(
     task: Task | None = ...,
     name: str = ...,
     space: spaces.Space | None = ...,
+    method: Method = ...,
 ) -> Demonstration: ...
 
 
@@ -42,6 +53,7 @@ def rollout(
     task: Task | None = ...,
     name: str = ...,
     space: spaces.Space | None = ...,
+    method: Method = ...,
 ) -> list[Demonstration]: ...
 
 
@@ -55,8 +67,9 @@ def rollout(
     task: Task | None = None,
     name: str = "rollout",
     space: spaces.Space | None = None,
+    method: Method = "euler",
 ) -> Demonstration | list[Demonstration]:
-    """Follow ``u = N(x, t) π(x)``, or ``u = A⁺b + N π`` under a task, with Euler steps ``x ← x + dt u``.
+    """Follow ``u = N(x, t) π(x)``, or ``u = A⁺b + N π`` under a task, by default with Euler steps ``x ← x + dt u``.
 
     Steps are in the state space.
 
@@ -80,6 +93,10 @@ def rollout(
         Of the demonstrations; several are numbered.
     space : Space, optional
         Which states are angles or orientations (:mod:`unconstrain.spaces`); by default as a fitted policy knows.
+    method : {"euler", "rk4", "adaptive"}
+        How a step from one sample to the next is made: Euler's, as a control loop does; Runge and Kutta's of fourth
+        order (on orientations of a lower one); or that, halved until halving it once more changes it by less than a
+        millionth of the way it goes.
 
     Returns
     -------
@@ -112,17 +129,16 @@ def rollout(
     d = within.sizes[2]
     if constraint is not None and not callable(constraint) and len(constraint) != runs:
         raise SettingError(f"constraint: got {len(constraint)} constraints for {runs} starts, expected one for each.")
+    if method not in _STEPS:
+        raise SettingError(f"method: got {method!r}, expected one of {', '.join(_STEPS)}.")
+    flow = _Flow(policy, constraint, task, within, dt)
     shape = (runs, steps, d)
     states, actions, wanted, projections = (np.empty(s) for s in ((runs, steps, n), shape, shape, (*shape, d)))
     times = dt * np.arange(steps, dtype=np.float64)
     for step in range(steps):
         states[:, step] = state
-        matrices = _matrices(constraint, state, times[step], d)
-        projections[:, step] = null_space_projection(matrices)
-        wanted[:, step] = _action(policy, state, projections[:, step])
-        drift = 0.0 if task is None else _drift(matrices, task(state, np.full(runs, times[step])))
-        actions[:, step] = _without_rounding(project(projections[:, step], wanted[:, step]), wanted[:, step]) + drift
-        state = _moved(within, state, dt * actions[:, step], step)
+        actions[:, step], wanted[:, step], projections[:, step] = flow.at(state, times[step])
+        state = _STEPS[method](flow, state, times[step], dt, actions[:, step])
     names = [name] if single else [f"{name} {k + 1}" for k in range(runs)]
     demos = [
         Demonstration(states[k], actions[k], times, Truth(wanted[k], projections[k]), names[k], within)
@@ -131,14 +147,61 @@ def rollout(
     return demos[0] if single else demos
 
 
-def _moved(space: spaces.Space, states: Array, ways: Array, step: int) -> Array:
-    with np.errstate(over="ignore", invalid="ignore"):
-        moved = space.step(states, ways)
-    if not (np.abs(moved) <= LARGEST).all():
-        raise InvalidDataError(
-            f"the movement left the finite numbers at step {step}: start nearer to the data or take a smaller dt."
-        )
-    return moved
+@dataclass(frozen=True)
+class _Flow:
+    """What moves the states of K runs."""
+
+    policy: Callable[[Array], Array]
+    constraint: Constraint | Sequence[Constraint] | None
+    task: Task | None
+    space: spaces.Space
+    dt: float
+
+    def at(self, state: Array, time: float) -> tuple[Array, Array, Array]:
+        """``A⁺b + N π`` (K, d), π (K, d) and N (K, d, d)."""
+        matrices = _matrices(self.constraint, state, time, self.space.sizes[2])
+        projections = null_space_projection(matrices)
+        wanted = _action(self.policy, state, projections)
+        drift = 0.0 if self.task is None else _drift(matrices, self.task(state, np.full(len(state), time)))
+        return _without_rounding(project(projections, wanted), wanted) + drift, wanted, projections
+
+    def moved(self, states: Array, ways: Array, time: float) -> Array:
+        """States after ways (K, d)."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            moved = self.space.step(states, ways)
+        if not (np.abs(moved) <= LARGEST).all():
+            raise InvalidDataError(
+                f"the movement left the finite numbers at step {int(time / self.dt + 1e-6)}: start nearer to the data, "
+                "take a smaller dt, or guide the policy (uc.Guided)."
+            )
+        return moved
+
+
+def _euler(flow: _Flow, state: Array, time: float, dt: float, action: Array) -> Array:
+    return flow.moved(state, dt * action, time)
+
+
+def _rk4(flow: _Flow, state: Array, time: float, dt: float, action: Array) -> Array:
+    slopes = [action]
+    for share in (0.5, 0.5, 1.0):
+        between = flow.moved(state, share * dt * slopes[-1], time)
+        slopes.append(flow.at(between, time + share * dt)[0])
+    return flow.moved(state, dt / 6.0 * (slopes[0] + 2.0 * slopes[1] + 2.0 * slopes[2] + slopes[3]), time)
+
+
+def _adaptive(flow: _Flow, state: Array, time: float, dt: float, action: Array, left: int = HALVINGS) -> Array:
+    half = 0.5 * dt
+    whole, middle = _rk4(flow, state, time, dt, action), _rk4(flow, state, time, half, action)
+    again = flow.at(middle, time + half)[0]
+    end = _rk4(flow, middle, time + half, half, again)
+    error, way = (np.abs(flow.space.difference(end, other)).max(axis=1) for other in (whole, state))
+    if left == 0 or (error <= TOLERANCE * way).all():
+        return end
+    middle = _adaptive(flow, state, time, half, action, left - 1)
+    return _adaptive(flow, middle, time + half, half, flow.at(middle, time + half)[0], left - 1)
+
+
+_STEPS = {"euler": _euler, "rk4": _rk4, "adaptive": _adaptive}
 
 
 def _matrices(constraint: Constraint | Sequence[Constraint] | None, states: Array, time: float, d: int) -> Array:

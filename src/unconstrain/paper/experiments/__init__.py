@@ -15,10 +15,10 @@ from ...base.errors import SettingError
 
 __all__ = ["NAMES", "find"]
 
-NAMES = ("table1", "figure4", "figure5", "table2", "washing", "regimes", "recorded", "constraints")
+NAMES = ("table1", "figure4", "figure5", "table2", "washing", "regimes", "recorded", "constraints", "arrival")
 """What can be reproduced."""
 
-JOURNALED = ("table1", "figure5", "table2", "regimes", "recorded", "constraints")
+JOURNALED = ("table1", "figure5", "table2", "regimes", "recorded", "constraints", "arrival")
 """Those whose trials are kept as they finish, so that an interrupted run goes on."""
 
 BESIDE = {"recorded": "regimes"}

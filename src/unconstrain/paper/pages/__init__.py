@@ -14,7 +14,7 @@ import numpy as np
 
 from ...base import files
 from ..experiments.trials import Result
-from . import constraints, figure4, figure5, plain, recorded, regimes, table1, table2, washing
+from . import arrival, constraints, figure4, figure5, plain, recorded, regimes, table1, table2, washing
 
 __all__ = ["page", "write"]
 
@@ -28,6 +28,7 @@ _PAGES = {
     "regimes": regimes.page,
     "recorded": recorded.page,
     "constraints": constraints.page,
+    "arrival": arrival.page,
 }
 
 

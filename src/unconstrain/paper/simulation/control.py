@@ -56,7 +56,8 @@ class Controller:
     Parameters
     ----------
     policy : callable
-        Positions (1, 3) relative to the plate's centre, m, to velocities (1, 3), m/s.
+        Positions (1, 3) relative to the plate's centre, m, to velocities (1, 3), m/s; one that can, is told of the
+        plate, see :func:`unconstrain.rollout`.
     scene : Scene
         With the arm.
     rest : ndarray, shape (n,)
@@ -66,10 +67,12 @@ class Controller:
 
     def __init__(self, policy: Callable[[Array], Array], scene: Scene, rest: Array, gains: Gains | None = None) -> None:
         self.gains = gains or Gains()
-        self._policy, self._scene = policy, scene
+        self._scene = scene
         self._reach = Reach(scene.plate, rest, MOMENT * self.gains.upright, MOMENT * self.gains.posture)
         self._normal = scene.plate.rotation[:, 2]
         self._tangent = np.eye(3) - np.outer(self._normal, self._normal)
+        under = getattr(policy, "under", None)
+        self._policy = policy if under is None else lambda places: under(places, self._tangent[None])
         self._mujoco = engine()
         self._jacobian = np.zeros((3, scene.model.nv))
         self._inertia = np.zeros((scene.model.nv, scene.model.nv))

@@ -139,6 +139,11 @@ class Strokes:
         """Frames of one stroke."""
         return round(self.duration * self.rate / self.count)
 
+    def settled(self, demonstration: uc.Demonstration) -> list[uc.Demonstration]:
+        """The last quarter of every stroke, when it has swung in."""
+        rows = np.array_split(np.arange(len(demonstration)), self.count)
+        return [demonstration[one[3 * len(one) // 4] : one[-1] + 1] for one in rows]
+
     def put_down(self, plate: Plate, wipe: WipingPolicy, rng: np.random.Generator) -> Array:
         """Draw where a stroke starts, relative to the plate's centre, shape (3,)."""
         angle, radius = rng.uniform(0.0, 2.0 * np.pi), self.reach * wipe.radius * np.sqrt(rng.uniform(0.01, 1.0))

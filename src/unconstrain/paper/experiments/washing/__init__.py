@@ -59,9 +59,6 @@ class Settings:
         Length of the movements drawn, in samples at ``rate``, and steps of the integration between two of them.
     cycles : int
         Turns that the arm is given on each plate.
-    reach : float
-        The arm goes back from farther than this from where the demonstrations were, m; see
-        :class:`~unconstrain.motion.containment.Contained`.
     """
 
     real: bool = False
@@ -82,7 +79,6 @@ class Settings:
     steps: int = 300
     substeps: int = 5
     cycles: int = 12
-    reach: float = 0.02
 
     def __post_init__(self) -> None:
         if self.simulator not in ("auto", "contact", "kinematic"):
@@ -203,11 +199,12 @@ def _said(surface: str, rows: list[dict[str, Any]]) -> str:
     steadiness = max(row["force_sd"] / row["force_mean"] for row in done)
     drift = max(row["drift_m"] for row in done)
     off = max(abs(row["frequency"] / row["frequency_demonstrated"] - 1.0) for row in done)
+    wider = max((row["spread_m"] / row["spread_demonstrated_m"] - 1.0 for row in done), key=abs)
     often = f" in {len(rows)} runs, the worst" if len(rows) > 1 else ""
     return (
         f"the arm on {surface} ({'seen' if done[0]['seen'] else 'unseen'}){often}: contact {contact:.1%}, "
-        f"force s.d./mean {steadiness:.3f}, frequency off by {off:.1%}, drift {1000 * drift:.1f} mm, "
-        f"{min(row['speed'] for row in done):.0f} times real time"
+        f"force s.d./mean {steadiness:.3f}, frequency off by {off:.1%}, radius by {wider:+.1%}, "
+        f"drift {1000 * drift:.1f} mm, {min(row['speed'] for row in done):.0f} times real time"
         + (f"; {len(failed)} failed: {failed[0]}" if failed else "")
     )
 

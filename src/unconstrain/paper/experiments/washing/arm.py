@@ -16,8 +16,9 @@ from ... import simulation
 from ...simulation.postures import postures_along
 from ...simulation.reproduction import Wipe, turning
 from ...systems.wiping import HELD_OUT, PLATES, Plate, WipingPolicy
+from ..arrival.cycles import measured
 from .learning import Split, fitted
-from .surfaces import Surface
+from .surfaces import Surface, strokes
 
 if TYPE_CHECKING:
     from . import Settings
@@ -124,16 +125,16 @@ def reproduce(
     shown: Sequence[Surface],
     seen: bool,
 ) -> Reproduction:
-    """Let the arm wipe a plate with a policy, kept near the states it was learnt from."""
+    """Let the arm wipe a plate with a policy that is guided onto the cycle of its demonstrations."""
     pairs = [
         (demo, normals["plane"])
         for surface in shown
         for demo, normals in zip(surface.demonstrations, surface.normals, strict=True)
     ]
-    frequency = float(np.mean([abs(turning(demo, normal)) for demo, normal in pairs]))
+    frequency = float(np.mean([_pace(demo, normal, settings) for demo, normal in pairs]))
     spread = float(np.mean([np.sqrt(demo.states.var(axis=0).sum()) for demo, _ in pairs]))
     wipe, failed = None, ""
-    kept = uc.Contained(_in_the_loop(policy), _states(training), settings.reach)
+    kept = uc.Guided(_in_the_loop(policy), orbit="shown", demonstrations=_on_cycle(settings, training))
     try:
         wipe = simulation.wipe(kept, plate, pairs[0][0].states[-1], settings.cycles / frequency)
     except SettingError as error:
@@ -142,13 +143,20 @@ def reproduce(
     return Reproduction(trial, plate, seen, wipe, failed, demonstration, frequency, spread)
 
 
+def _pace(demo: uc.Demonstration, normal: Array, settings: Settings) -> float:
+    """Turns per second: counted in a bout, whose middle wanders, and from angular momentum in strokes put together."""
+    return measured(demo.states, normal, 1.0 / settings.rate)["pace"] if settings.real else abs(turning(demo, normal))
+
+
 def _in_the_loop(policy: uc.Policy) -> Callable[[Array], Array]:
     """The policy as a control loop calls it, one state at a time: ``predict`` spends most of its time on checks."""
     return lambda states: np.stack([policy.step(state) for state in states])
 
 
-def _states(surfaces: Sequence[Surface]) -> Array:
-    return np.concatenate([demo.states for surface in surfaces for demo in surface.demonstrations])
+def _on_cycle(settings: Settings, surfaces: Sequence[Surface]) -> list[uc.Demonstration]:
+    """Where people went round, and simulated strokes once they have swung in."""
+    demos = [demo for surface in surfaces for demo in surface.demonstrations]
+    return demos if settings.real else [one for demo in demos for one in strokes(settings).settled(demo)]
 
 
 def _on(plate: Plate, surfaces: Sequence[Surface]) -> list[Surface]:

@@ -42,12 +42,17 @@ def has_physics() -> bool:
     return all(find_spec(name) is not None for name in ("mujoco", "mink"))
 
 
-def simulated_split(settings: Settings, seed: np.random.SeedSequence) -> tuple[list[Surface], list[Surface]]:
-    """Plates to learn from, and plates to be tested on."""
-    how = Strokes(
+def strokes(settings: Settings) -> Strokes:
+    """How simulated plates are wiped."""
+    return Strokes(
         count=settings.strokes, duration=settings.duration, rate=settings.rate,
         noise=settings.noise, dropped=settings.dropped,
     )  # fmt: skip
+
+
+def simulated_split(settings: Settings, seed: np.random.SeedSequence) -> tuple[list[Surface], list[Surface]]:
+    """Plates to learn from, and plates to be tested on."""
+    how = strokes(settings)
     demonstrate = simulation.demonstrate if settings.contact else wiping.demonstrate
     extra = () if settings.extra is None else (settings.extra,)
     wiped = {

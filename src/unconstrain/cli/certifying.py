@@ -1,0 +1,45 @@
+"""``unconstrain certify``: what is guaranteed of a policy's motion."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+import unconstrain as uc
+
+from ..base.errors import ModelFileError
+
+
+@click.command(epilog="\b\nExample:\n  unconstrain certify guided.npz")
+@click.argument("policy", type=click.Path())
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of starts and planes.")
+def certify(policy: str, seed: int) -> None:
+    """Say what is guaranteed of the motion of POLICY, by what margin, where and under which constraints.
+
+    Exits with 1 where it is not, with a start, and a plane, from which it does not arrive.
+    """
+    import numpy as np
+
+    stored: Any = uc.load(policy, object)
+    if isinstance(stored, uc.Guided):
+        around = stored.goal_ + np.vstack([np.eye(len(stored.goal_)), -np.eye(len(stored.goal_))])
+    elif isinstance(stored, uc.Policy) and hasattr(stored, "solution_"):
+        around = _learnt_at(stored)
+    else:
+        raise ModelFileError(f"{policy}: holds no policy that is fitted or guided. Save one with uc.save.")
+    found = uc.certify(stored, around, seed)
+    click.echo(f"{policy}: {found.said}")
+    if not found.holds:
+        raise SystemExit(1)
+
+
+def _learnt_at(policy: Any) -> Any:
+    """Places of the states that a policy was learnt from, as far as it says: centres of fields, or of kernels."""
+    import numpy as np
+
+    n = policy.n_features_in_
+    held = getattr(policy, "fields_", None) or policy.features_
+    centres = getattr(held, "centres", None)
+    places = np.vstack([np.eye(n), -np.eye(n)]) if centres is None else np.asarray(centres)
+    return places if policy.scale_ is None else places * policy.scale_.states

@@ -1,0 +1,86 @@
+"""A goal that is reached: the smallest change of a velocity with which a potential falls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..base.arrays import Array
+from ..base.display import Shown
+from ..risks import project
+from .potential import Potential, radius
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Descent(Shown):
+    """Velocities in the ball ``‖u + m‖ ≤ r``, ``m = ½ N ∇V``: with each of them V falls; see :class:`.Guided`.
+
+    Parameters
+    ----------
+    potential : Potential
+    pace : float
+        The s in ``r = max(‖m‖ − s, ½ ‖m‖)``, in units of the state per second.
+    """
+
+    potential: Potential
+    pace: float
+
+    @property
+    def dt(self) -> float:
+        """The longest Euler step with which V is sure to fall, seconds."""
+        return 2.0 / self.potential.curvature
+
+    @property
+    def promise(self) -> str:
+        """What is guaranteed, in words."""
+        goal = ", ".join(f"{each:.4g}" for each in self.potential.goal)
+        return (
+            f"From every state, movements arrive: free at ({goal}), and under any flat constraint where V is least on "
+            f"it. V falls with every Euler step of up to {self.dt:.3g} s, by ‖N ∇V‖ times {0.75 * self.pace:.3g} each "
+            "second, or by 3/16 of its square where that is less. A constraint that moves may lift V."
+        )
+
+    def spare(self, states: Array, velocities: Array, slope: Array) -> Array:
+        """By how much V falls faster than it has to where ``N ∇V`` (N, n) is so, as a share of what that is made of."""
+        falls, half = -np.vecdot(slope, velocities), 0.5 * np.linalg.norm(slope, axis=1)
+        least = (velocities**2).sum(axis=1) + half**2 - radius(half, self.pace) ** 2
+        return (falls - least) / np.maximum(np.abs(falls) + half**2, np.finfo(float).tiny)
+
+    def guided(self, states: Array, wanted: Array, projections: Array | None = None) -> Array:
+        """Velocities (N, n) for those that are wanted, both in the null space of projections N (N, n, n)."""
+        half = 0.5 * self.potential.gradient(states)
+        if projections is not None:
+            half = project(projections, half)
+        away = wanted + half
+        distance, depth = (np.linalg.norm(each, axis=1) for each in (away, half))
+        allowed = radius(depth, self.pace)
+        inside = distance <= allowed
+        share = np.maximum(2.0 * allowed / np.where(inside, 1.0, distance) - 1.0, 0.0)
+        return np.where(inside[:, None], wanted, share[:, None] * away - half)
+
+    def single(self) -> Callable[[ArrayLike, Array], None]:
+        """The same for one state (n,) and its velocity (n,), which is changed in place."""
+        potential, pace = self.potential, self.pace
+        directions, halved = potential.directions, 0.5 * potential.weights[:, None] * potential.directions
+        begin = directions @ potential.goal + potential.offsets
+        along, maximum, zeros = directions.dot, np.maximum, np.zeros(len(begin))
+
+        def guide(x: ArrayLike, wanted: Array) -> None:
+            beyond = along(x)
+            beyond -= begin
+            half = maximum(beyond, zeros).dot(halved)
+            away = wanted + half
+            distance, depth = sqrt(away.dot(away)), sqrt(half.dot(half))
+            allowed = max(depth - pace, 0.5 * depth)
+            if distance > allowed:
+                np.subtract(max(2.0 * allowed / distance - 1.0, 0.0) * away, half, out=wanted)
+
+        return guide
+
+    def _summary(self) -> tuple[str, ...]:
+        goal = ", ".join(f"{each:.4g}" for each in self.potential.goal)
+        return f"goal=({goal})", f"dt={self.dt:.3g}"

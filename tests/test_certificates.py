@@ -1,0 +1,105 @@
+"""What is guaranteed of motion, and what refutes it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from numpy.testing import assert_allclose
+
+import unconstrain as uc
+from unconstrain.cli import main
+from unconstrain.constraints.known import Plane
+
+GOAL = np.array([0.3, -0.2, 0.1])
+AROUND = GOAL + np.random.default_rng(0).uniform(-1, 1, (30, 3))
+
+
+def inwards(states):
+    return -(states - GOAL) * (1.0 + (states**2).sum(axis=1, keepdims=True) / 4)
+
+
+def two_goals(states):
+    """Each side of x = 0 has its own."""
+    return np.column_stack([np.where(states[:, 0] > 0, 1.0, -1.0), np.zeros((len(states), 2))]) - states
+
+
+SHOWN = uc.rollout(lambda states: -(states - GOAL), AROUND[:5], 100, 0.05)
+POLICY = uc.LocallyLinearPolicy(learner="direct").fit_demonstrations(SHOWN)
+
+
+def cycle(states):
+    return np.column_stack([-states[:, 1], states[:, 0], -states[:, 2]])
+
+
+@pytest.mark.parametrize(
+    "guided",
+    [
+        uc.Guided(two_goals, GOAL, demonstrations=SHOWN),
+        uc.Guided(cycle, orbit=uc.rollout(cycle, [1.0, 0.0, 0.0], 130, 0.05, method="rk4").states),
+    ],
+    ids=["goal", "cycle"],
+)
+def test_what_is_guided_is_guaranteed_whatever_the_policy(guided):
+    found = uc.certify(guided, AROUND)
+    assert found.holds
+    assert found.start is None
+    assert "under any flat constraint" in found.said
+
+
+@pytest.mark.parametrize("part", ["weights", "offsets"])
+def test_a_potential_that_is_not_convex_is_found_out(part):
+    guided = uc.Guided(two_goals, GOAL, demonstrations=SHOWN)
+    wrong = {part: -np.abs(getattr(guided.potential_, part)) - 0.1}
+    guided.aim_ = replace(guided.aim_, potential=replace(guided.potential_, **wrong))
+    found = uc.certify(guided, AROUND)
+    assert not found.holds
+    assert found.said.startswith("not guaranteed: ")
+
+
+def test_an_affine_policy_is_guaranteed_by_its_eigenvalues():
+    turns = np.array([[-1.0, 3.0, 0.0], [-3.0, -0.5, 0.0], [0.0, 0.0, -2.0]])
+    found = uc.certify(lambda states: (states - GOAL) @ turns.T, AROUND)
+    assert found.holds
+    assert "at 0.5 per second" in found.said
+
+
+def test_an_affine_policy_that_does_not_contract_is_refuted_by_a_start_and_a_plane():
+    # Stable when free: eigenvalues -1 and -1; on the plane along the diagonal it leaves.
+    shear = np.array([[-1.0, 4.0], [0.0, -1.0]])
+
+    def sheared(states):
+        return states @ shear.T
+
+    found = uc.certify(sheared, AROUND[:, :2])
+    assert not found.holds
+    run = uc.rollout(sheared, found.start, 200, 0.05, Plane(found.normal))
+    assert np.linalg.norm(run.states[-1]) > 10 * np.linalg.norm(run.states[0])
+    free = uc.rollout(sheared, found.start, 400, 0.05)
+    assert_allclose(free.states[-1], 0.0, atol=1e-3)
+
+
+def test_a_movement_that_does_not_arrive_is_a_counterexample():
+    found = uc.certify(two_goals, AROUND)
+    assert not found.holds
+    plane = None if found.normal is None else Plane(found.normal)
+    ends = [uc.rollout(two_goals, start, 400, 0.05, plane).states[-1] for start in (found.start, -found.start)]
+    assert np.linalg.norm(ends[0] - ends[1]) > 0.5
+
+
+def test_nothing_is_promised_of_a_policy_that_only_seems_to_arrive():
+    found = uc.certify(inwards, AROUND)
+    assert not found.holds
+    assert found.start is None
+    assert "movements end in one place" in found.said
+
+
+def test_on_the_command_line_the_exit_code_says_it(tmp_path):
+    uc.save(uc.Guided(POLICY, demonstrations=SHOWN), tmp_path / "guided.npz")
+    uc.save(POLICY, tmp_path / "plain.npz")
+    good, bad, wrong = (
+        CliRunner().invoke(main, ["certify", str(tmp_path / name)]) for name in ("guided.npz", "plain.npz", "none.npz")
+    )
+    assert (good.exit_code, bad.exit_code, wrong.exit_code) == (0, 1, 2)
+    assert "From every state, movements arrive: free at (0.3" in good.output
+    assert "guaranteed" in bad.output

@@ -1,0 +1,126 @@
+"""A cycle that attracts, on every plane through its inside, at the pace that was shown."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import unconstrain as uc
+from unconstrain.base.errors import SettingError
+from unconstrain.constraints.known import Plane
+from unconstrain.paper.experiments.arrival.cycles import measured
+
+MIDDLE = np.array([0.2, -0.1, 0.3])
+RATE = 2.0
+TILTS = [[0.0, 0.0, 1.0], [0.3, 0.0, 1.0], [0.0, 0.3, 1.0], [-0.3, 0.0, 1.0], [0.0, -0.3, 1.0]]
+
+
+def turning(states, attraction):
+    x, y, z = (states - MIDDLE).T
+    inward = attraction * (1.0 - np.hypot(x, y) / 0.5)
+    return np.column_stack([inward * x - RATE * y, inward * y + RATE * x, -z])
+
+
+def steady(states):
+    """Round and round, and slowly outwards: what a learner makes of steady cycles."""
+    return turning(states, 0.0) + 0.1 * (states - MIDDLE)
+
+
+def circle(tilt):
+    axes = np.linalg.svd(np.array([tilt]))[2][1:]
+    return MIDDLE + 0.5 * axes[0]
+
+
+SHOWN = uc.rollout(
+    lambda states: turning(states, 2.0), [circle(t) for t in TILTS], 200, 0.05, [Plane(t) for t in TILTS], method="rk4"
+)
+RNG = np.random.default_rng(0)
+NORMALS = RNG.standard_normal((100, 3)) * [0.3, 0.3, 0.0] + [0.0, 0.0, 1.0]
+NORMALS /= np.linalg.norm(NORMALS, axis=1, keepdims=True)
+STARTS = RNG.uniform(-1.5, 1.5, (100, 3))
+STARTS += MIDDLE - NORMALS * (np.vecdot(NORMALS, STARTS) - RNG.uniform(-0.05, 0.05, 100))[:, None]
+"""On planes that pass the middle nearby."""
+
+
+@pytest.fixture(scope="module")
+def guided():
+    return uc.Guided(steady, demonstrations=SHOWN)
+
+
+def off(guided, states):
+    return guided.potential_(states) - 0.5 * guided.aim_.radius**2
+
+
+def test_cycles_are_found_where_demonstrations_repeat(guided):
+    assert_allclose(guided.goal_, MIDDLE, atol=0.02)
+    on = uc.stack(SHOWN).states
+    assert np.abs(off(guided, on)).max() < 0.1 * 0.5 * guided.aim_.radius**2
+    assert_allclose(guided.aim_.radius, 0.5, rtol=0.05)
+    given = uc.Guided(steady, orbit=on)
+    assert_array_equal(given.potential_(STARTS), guided.potential_(STARTS))
+
+
+def test_under_any_plane_the_cycle_comes_nearer_at_every_step_from_both_sides(guided):
+    runs = uc.rollout(guided, STARTS, 200, 0.04, lambda states, _: NORMALS[: len(states), None], method="rk4")
+    begun = [off(guided, run.states[:1])[0] for run in runs]
+    assert min(begun) < 0 < max(begun)
+    for run in runs:
+        far = np.abs(off(guided, run.states)) / guided.aim_.radius**2
+        assert (np.diff(far)[far[:-1] > 5e-3] < 0).all()
+        assert far[-1] < 5e-3
+
+
+def test_radius_and_pace_stay_for_a_hundred_turns_where_the_policy_alone_leaves(guided):
+    plane, start, normal = Plane(TILTS[1]), circle(TILTS[1]), np.array(TILTS[1])
+    steps = int(105 * 2 * np.pi / RATE / 0.2)
+    run = uc.rollout(guided, start, steps, 0.2, plane, method="rk4")
+    whole, last, shown = (measured(each, normal, 0.2) for each in (run.states, run.states[-150:], SHOWN[1].states[::4]))
+    assert whole["turns"] >= 100
+    assert abs(last["radius"] / shown["radius"] - 1) < 0.03
+    assert abs(last["pace"] / shown["pace"] - 1) < 0.03
+    assert whole["drift"] < 0.002
+    alone = uc.rollout(steady, start, 400, 0.2, plane, method="rk4")
+    assert np.linalg.norm(alone.states[-1] - MIDDLE) > 5.0
+
+
+def test_a_policy_that_stands_still_or_turns_back_is_turned_round():
+    for policy in (lambda states: 0.0 * states, lambda states: -turning(states, 1.0)):
+        guided = uc.Guided(policy, demonstrations=SHOWN)
+        velocities = guided(SHOWN[0].states)
+        along = np.vecdot(velocities, SHOWN[0].actions) / (SHOWN[0].actions ** 2).sum(axis=1)
+        assert along.min() > 0.7
+
+
+def test_where_a_plane_misses_the_cycle_the_nearest_place_is_reached(guided):
+    run = uc.rollout(guided, MIDDLE + np.array([0.4, 0.0, 3.0]), 300, 0.1, Plane([0.0, 0.0, 1.0]), method="rk4")
+    assert off(guided, run.states[-1:]) > 0
+    assert np.linalg.norm(run.actions[-1]) < 1e-3 * np.linalg.norm(run.actions[0])
+    assert np.linalg.norm(guided.potential_.gradient(run.states[-1:])[0, :2]) < 1e-3
+
+
+def test_it_is_continuous_also_at_its_middle(guided):
+    along = np.linspace(-1, 1, 20001)[:, None] * [1.0, 0.3, 0.0] + guided.goal_
+    velocities = guided(along)
+    assert np.abs(np.diff(velocities, axis=0)).max() < 0.02 * np.abs(velocities).max()
+
+
+def test_a_step_is_the_prediction(guided):
+    for state, velocity in zip(STARTS, guided(STARTS), strict=True):
+        assert_allclose(guided.step(state), velocity, rtol=1e-9, atol=1e-12)
+
+
+def test_units_do_not_matter(guided):
+    scaled = [uc.Demonstration(1024.0 * d.states, 16.0 * d.actions, 64.0 * d.times) for d in SHOWN]
+    other = uc.Guided(lambda x: 16.0 * steady(x / 1024.0), demonstrations=scaled)
+    assert_allclose(other(1024.0 * STARTS), 16.0 * guided(STARTS), rtol=1e-9, atol=1e-9)
+
+
+def test_it_survives_its_file(tmp_path):
+    policy = uc.LocallyLinearPolicy(learner="direct").fit_demonstrations(SHOWN)
+    guided = uc.Guided(policy, orbit="shown", demonstrations=SHOWN).moved([1.0, 0.0, 0.0])
+    uc.save(guided, tmp_path / "guided.npz")
+    assert_array_equal(uc.load(tmp_path / "guided.npz", uc.Guided)(STARTS), guided(STARTS))
+
+
+def test_a_goal_and_a_cycle_are_two_things():
+    with pytest.raises(SettingError, match="orbit: got one beside a goal"):
+        uc.Guided(steady, goal=MIDDLE, orbit="shown", demonstrations=SHOWN)
