@@ -32,7 +32,7 @@ def test_it_has_sentences_and_a_page_with_a_picture_of_every_shape(small):
     assert arrival.headlines(small)[0].startswith("arrive within 5 %, demonstrated starts: guided 100.0%, else 0.0%")
     page = pages.page(small)
     assert "small pictures" not in page
-    assert '"Line"' in page
+    assert ">Line<" in page
     assert "Narrow hairpins" in page
 
 

@@ -170,6 +170,10 @@ def test_one_constraint_at_a_time_and_of_the_right_size(folder, tmp_path):
     uc.save(uc.LearntConstraint("constant").fit(states, states * [1.0, 0.0]), tmp_path / "flat.npz")
     said = refused(*start, "--constraint", tmp_path / "flat.npz")
     assert "flat.npz: holds 2 actions at 2 states, expected 3 at 3." in said
+    turned = ("--state", "y,x,z", "--action", "vy,vx,vz", "-o", tmp_path / "turned.npz")
+    run("constraint", folder / "wipe_0.csv", *turned)
+    said = refused(*start, "--constraint", tmp_path / "turned.npz")
+    assert "turned.npz: is of y, x, z, expected x, y, z, as the policy." in said
 
 
 def test_what_is_decided_is_said_and_nothing_to_learn_from_is_refused(folder, tmp_path):

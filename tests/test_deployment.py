@@ -196,8 +196,9 @@ def test_threads_do_not_disturb_each_other(arm):
 def test_a_policy_that_has_stepped_is_pickled_copied_and_saved(policy, tmp_path):
     policy.step([0.1, 0.2])
     uc.save(policy, tmp_path / "policy.npz")
-    for other in (pickle.loads(pickle.dumps(policy)), copy.deepcopy(policy), uc.load(tmp_path / "policy.npz")):
-        assert "_prepared" not in vars(other)
+    copies = pickle.loads(pickle.dumps(policy)), copy.deepcopy(policy)
+    assert not any("_prepared" in vars(other) for other in copies)
+    for other in (*copies, uc.load(tmp_path / "policy.npz")):
         assert_array_equal(other.step([0.1, 0.2]), policy.step([0.1, 0.2]))
 
 

@@ -29,6 +29,7 @@ LEFT_OUT = {
     'Client("tcp://': "needs a cluster",
     "--scheduler tcp://": "needs a cluster",
     "make demo": "is a target of the Makefile, and installs",
+    "$ make fuzz": "is a target of the Makefile; tests/test_doors.py has some of its attacks",
     "$ pip install": "installs",
     "unconstrain reproduce": "takes minutes to hours; the experiments have tests of their own",
     "cc -std=c99": "is run with the exported file in the tests of deployment",

@@ -444,7 +444,7 @@ def test_the_learnt_policy_wipes_an_unseen_plate_in_circles(simulated):
 
 def test_the_movement_shown_stays_on_the_first_surface_left_out(simulated):
     [split] = simulated.details["splits"]
-    assert list(split.rollouts) == METHODS
+    assert list(split.rollouts) == [*METHODS, "robust"]
     for path in split.rollouts.values():
         assert len(path) == simulated.settings.steps
         assert_allclose(path.states[0], split.held_out[0].demonstrations[0].states[0])
@@ -469,10 +469,12 @@ def test_on_the_arm_the_sponge_stays_on_the_plate_and_keeps_the_beat(simulated):
         assert row["contact_share"] >= 0.995
         assert row["force_mean"] == pytest.approx(15.0, rel=0.05)
         assert row["force_sd"] <= 0.05 * row["force_mean"]
-        assert row["frequency"] == pytest.approx(row["frequency_demonstrated"], rel=0.05)
+        assert row["frequency"] == pytest.approx(row["frequency_demonstrated"], rel=0.075)
         assert row["drift_m"] <= 0.01
         assert row["cycles"] >= 10
         assert 0.1 < row["torque_share"] < 1.0  # of what its joint can
+    paces = [row["frequency"] / row["frequency_demonstrated"] for row in rows]
+    assert np.mean(paces) == pytest.approx(1.0, abs=0.05)
 
 
 def test_without_physics_the_stand_in_demonstrates_and_says_so():
@@ -563,7 +565,7 @@ def test_an_unknown_experiment_is_answered_with_those_there_are():
 
 @pytest.fixture(scope="module")
 def small_table2(once):
-    settings = table2.Settings(trials=2, demonstrations=12, steps=30, test_demonstrations=3, jacobian_trials=1)
+    settings = table2.Settings(trials=2, demonstrations=20, steps=30, test_demonstrations=3, jacobian_trials=1)
     return once("small table 2", lambda: table2.run(settings))
 
 
@@ -644,7 +646,7 @@ def test_with_the_jacobian_known_the_policy_is_found_where_constraints_hide_most
     assert names == [(method, one) for method in ("hybrid, fresh", table2.JACOBIAN) for one in table2.CONSTRAINTS]
     assert not {row["method"] for row in small_table2.rows} & {table2.JACOBIAN}
     hybrid, knowing = (np.array([row["nupe_mean"] for row in rows]) for rows in (known[:6], known[6:]))
-    assert (knowing[:2] < 0.2 * hybrid[:2]).all()  # twelve trajectories are too few for more rows
+    assert (knowing[:2] < 0.2 * hybrid[:2]).all()  # twenty trajectories are too few for more rows
 
 
 def test_the_arm_moves_as_section_4b_says():

@@ -214,7 +214,7 @@ def score(
     recipe = uc.Recipe.from_dict(notes.get("recipe", {}))
     recordings = uc.read(files, **reading_of(**notes).roles)
     demonstrations = uc.prepare(recordings, recipe)
-    held = held_of(plane, constraint, learnt.n_features_in_, learnt.n_outputs_, "one for each action")
+    held = held_of(plane, constraint, recipe, learnt.n_features_in_, learnt.n_outputs_, "one for each action")
 
     def scores(of: uc.Demonstration | Sequence[uc.Demonstration], name: str, samples: int) -> dict[str, Any]:
         found = {"demonstration": name, "samples": samples, "ninc": uc.ninconsistency(learnt, of)}
@@ -267,7 +267,7 @@ def rollout(
     learnt, recipe = fitted_policy(policy), uc.Recipe.from_dict(uc.storage.load_notes(policy).get("recipe", {}))
     if len(start) != learnt.n_features_in_:
         raise SettingError(f"--start: got {len(start)} numbers, expected {learnt.n_features_in_}, one for each state.")
-    held = held_of(plane, constraint, len(start), learnt.n_outputs_, "one for each action")
+    held = held_of(plane, constraint, recipe, len(start), learnt.n_outputs_, "one for each action")
     task = held.target if isinstance(held, uc.LearntConstraint) and held.task else None
     path = uc.rollout(learnt, list(start), steps, dt, held, task=task)
     named = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))

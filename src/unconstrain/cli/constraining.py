@@ -111,9 +111,9 @@ def options_for_held(what: str) -> Callable[[Callable[..., Any]], Callable[..., 
 
 
 def held_of(
-    plane: tuple[float, ...] | None, path: str | None, states: int, actions: int, meaning: str
+    plane: tuple[float, ...] | None, path: str | None, recipe: uc.Recipe, states: int, actions: int, meaning: str
 ) -> uc.constraints.Constraint | None:
-    """The constraint of the options: a plane, or a learnt one from a file."""
+    """The constraint of the options: a plane, or a learnt one from a file, of the states that a recipe prepares."""
     import numpy as np
 
     if plane is not None and path is not None:
@@ -129,7 +129,14 @@ def held_of(
     found = learnt.choice_.columns, learnt.choice_.actions
     if found != (states, actions):
         raise SettingError(f"{path}: holds {found[1]} actions at {found[0]} states, expected {actions} at {states}.")
+    own = uc.Recipe.from_dict(uc.storage.load_notes(path).get("recipe", {}))
+    if own.states and recipe.states and (own.states, own.centre) != (recipe.states, recipe.centre):
+        raise SettingError(f"{path}: is of {_said_states(own)}, expected {_said_states(recipe)}, as the policy.")
     return learnt
+
+
+def _said_states(recipe: uc.Recipe) -> str:
+    return f"{', '.join(recipe.states or ())}{', centred' if recipe.centre else ''}"
 
 
 def _arm(urdf: str, tip: str | None) -> Any:

@@ -47,8 +47,9 @@ def diagnose(
     paths = uc.readers.expand(files)
     check_outputs((report,), paths, force)
     with shown("reading, placing, learning"):
+        policy = policy_of(model, variance, centres, scale, learner=uc.Robust())
         demonstrations, recipe, first = prepared(paths, reading)
-        policy = policy_of(model, variance, centres, scale, learner=uc.Robust()).fit_demonstrations(demonstrations)
+        policy.fit_demonstrations(demonstrations)
         found = uc.evaluation.diagnose(policy, demonstrations)
     missed = 1.0 - policy.score(*uc.stack(demonstrations)[:2])
     say(uc.preparation.doubts(len(demonstrations), missed))

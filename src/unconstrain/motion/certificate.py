@@ -50,6 +50,13 @@ def certify(policy: Callable[[Array], Array], states: Array, seed: int = 0) -> C
         Where it was learnt; starts are drawn around them.
     seed : int
         Of starts and planes.
+
+    Examples
+    --------
+    >>> def policy(states):
+    ...     return 0.5 * states  # leaves
+    >>> uc.certify(policy, np.eye(2)).holds
+    False
     """
     rng, middle = np.random.default_rng(seed), states.mean(axis=0)
     size = float(np.linalg.norm(states - middle, axis=1).max()) or 1.0

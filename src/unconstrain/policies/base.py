@@ -113,9 +113,8 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
 
         The first batch, which should be typical, fixes features, fields, action dimensions, the spread by which samples
         are dealt into folds, and a scale that is ``"auto"``; a later one that is unlike in it is warned of. Batches of
-        too few different states to tell are kept until there are enough. Parameters, result and errors as in
-        :meth:`fit`. The solution is found anew each time; where only the last counts,
-        :meth:`fit_batches` is faster.
+        too few different states are kept until there are enough. Parameters, result and errors as in :meth:`fit`. The
+        solution is found anew each time; where only the last counts, :meth:`fit_batches` is faster.
         """
         first, learner, draft = not hasattr(self, "solution_"), named(self.learner), self._draft()
         batch = draft._checked(X, y, sample_weight, groups, reset=first)
@@ -134,8 +133,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
 
         What can be walked through twice, such as a list or :class:`unconstrain.Stream`, is: first to choose features,
         fields and folds, then to sum. The result is that of :meth:`fit` on everything, to rounding, however the samples
-        are cut into batches. A generator is walked through once; its first batches fix what would have been chosen, as
-        in :meth:`partial_fit`.
+        are cut into batches. A generator is walked through once; its first batches fix what would have been chosen.
 
         Parameters
         ----------

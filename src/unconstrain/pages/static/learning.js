@@ -18,7 +18,7 @@ const learning = (() => {
   const UNDERFLOW = 1e-290;
   const LEAST_DIFFERENCES = 12; // samples from which on a demonstration tells its own noise
   const MEDIANS = [0, 0.454936423119572, 1.3862943611198906, 2.365973884375338]; // of chi squared
-  const FIRST_SOFTNESS = 1e-2, LEAST_SOFTNESS = 1e-8, BALANCE_STEPS = 6;
+  const FIRST_SOFTNESS = 1e-2, LEAST_SOFTNESS = 1e-8, BALANCE_STEPS = 6, MOST_OF_LEAST = 1.02;
 
   // ------------------------------------------------------------------------------------------------- features
 
@@ -428,26 +428,62 @@ const learning = (() => {
    *
    * The projection N of a demonstration is onto the directions in which its actions exceed the noise; minimised is the
    * sum of |N (u - policy)|^2, plus s times the standard risk. The softness s is the error missed over the risk missed
-   * beside it, times P / n, by iteration.
+   * beside it, times 1 / n, by iteration; times P / n where the error on held-out folds is then clearly less.
    */
-  function segments(demonstrations) {
-    const whole = total(demonstrations.map((one) => one.moments)), { p, d } = whole, size = p * d;
-    const risk = { hessian: forEveryAction(whole.gram, p, p, d), linear: whole.cross, constant: whole.energy, size };
-    const most = () => Math.min(noise(demonstrations.map((one) => one.actions), d), whole.energy / whole.weight);
+  function segments(demonstrations, folds = demonstrations.map((one) => [one])) {
+    const parts = folds.map((fold) => constrained(fold, demonstrations));
+    const every = parts.reduce(plus), { size } = every.error;
+    const tried = [1, size].map((worth) => {
+      const { w, softness } = balanced(every, worth);
+      const missed = parts.map((held) => {
+        const rest = parts.filter((one) => one !== held);
+        return value(held.error, rest.length ? softened(rest.reduce(plus), softness) : w);
+      });
+      return { w, missed: missed.reduce((sum, each) => sum + Math.max(each, 0), 0) };
+    });
+    const least = Math.min(...tried.map((one) => one.missed));
+    return (tried.find((one) => one.missed <= MOST_OF_LEAST * least) || tried[1]).w;
+  }
+
+  /** Constrained error and standard risk of some demonstrations among all. */
+  function constrained(some, all) {
+    const { p, d, gram, cross, energy, weight } = total(some.map((one) => one.moments)), size = p * d;
+    const most = () => {
+      const every = all.reduce((sum, one) => [sum[0] + one.moments.energy, sum[1] + one.moments.weight], [0, 0]);
+      return Math.min(noise(all.map((one) => one.actions), d), every[0] / every[1]);
+    };
     const error = { hessian: new Float64Array(size * size), linear: new Float64Array(size), constant: 0, size };
-    for (const { actions, moments: sums } of demonstrations) {
+    for (const { actions, moments: sums } of some) {
       const variance = actions.length < LEAST_DIFFERENCES ? most() : noise([actions], d);
       addConstrained(error, sums, actions, projection(actions, variance));
     }
-    let softness = FIRST_SOFTNESS, w = null;
-    for (let step = 0; step <= BALANCE_STEPS; step++) {
-      w = minimum(error.hessian.map((each, i) => each + softness * risk.hessian[i]),
-        error.linear.map((each, i) => each + softness * risk.linear[i]), size);
-      const loss = value(error, w), taken = value(risk, w);
-      const next = ((size / whole.weight) * loss) / Math.max(taken - loss, 1e-3 * taken + 1e-300);
+    const risk = { hessian: forEveryAction(gram, p, p, d), linear: cross, constant: energy, size };
+    return { error, risk, weight };
+  }
+
+  function plus(one, other) {
+    const sum = (a, b) => ({
+      hessian: a.hessian.map((each, i) => each + b.hessian[i]), linear: a.linear.map((each, i) => each + b.linear[i]),
+      constant: a.constant + b.constant, size: a.size,
+    });
+    return { error: sum(one.error, other.error), risk: sum(one.risk, other.risk), weight: one.weight + other.weight };
+  }
+
+  /** The least of the error plus the softness times the risk. */
+  function softened({ error, risk }, softness) {
+    return minimum(error.hessian.map((each, i) => each + softness * risk.hessian[i]),
+      error.linear.map((each, i) => each + softness * risk.linear[i]), error.size);
+  }
+
+  /** Softness, and the least with it, of a prior that has the information of so many samples. */
+  function balanced(every, worth) {
+    let softness = FIRST_SOFTNESS;
+    for (let step = 0; step < BALANCE_STEPS; step++) {
+      const w = softened(every, softness), loss = value(every.error, w), taken = value(every.risk, w);
+      const next = ((worth / every.weight) * loss) / Math.max(taken - loss, 1e-3 * taken + 1e-300);
       softness = Math.min(Math.max(next, LEAST_SOFTNESS), 1);
     }
-    return w;
+    return { softness, w: softened(every, softness) };
   }
 
   /** Variance of the noise on each action, from the median of squared fourth differences within demonstrations. */

@@ -114,10 +114,11 @@
     learnt.weights = {};
     if (strokes.length) {
       const parts = Array.from({ length: FOLDS }, (_, f) => strokes.filter((_, i) => i % FOLDS === f));
-      const folds = parts.filter((part) => part.length).map((part) => learning.total(part.map((one) => one.moments)));
+      const filled = parts.filter((part) => part.length);
+      const folds = filled.map((part) => learning.total(part.map((one) => one.moments)));
       const whole = learning.total(folds), hybrid = learning.hybrid(folds);
       Object.assign(learnt, { path: hybrid.path, chosen: hybrid.split });
-      learnt.weights = { direct: learning.direct(whole), segments: learning.segments(strokes) };
+      learnt.weights = { direct: learning.direct(whole), segments: learning.segments(strokes, filled) };
       walk();
     }
     performance.measure("refit", { start: begun });
