@@ -1184,3 +1184,11 @@ def test_fit_and_diagnose_name_the_sample_that_looks_wrong(tmp_path):
     found = json.loads(CliRunner().invoke(cli.main, ["diagnose", *files, *columns, "--json"]).stdout)
     [suspect] = found["suspects"]
     assert suspect == {"demonstration": "cup_2", "sample": 12, "time": pytest.approx(0.55), "file": files[2], "row": 11}
+
+
+def test_what_is_left_out_and_never_came_is_said(files, tmp_path):
+    columns = ("--state", "x,y", "--action", "vx,vy")
+    for command in (("inspect",), ("diagnose", *columns), ("fit", *columns, "-o", tmp_path / "p")):
+        told = call(command[0], *files[:3], *command[1:], "--leave-out", "nobody").err
+        assert "no demonstration is called 'nobody'" in told
+    assert "topic (--topic): " in refused("inspect", files[0], "--topic", "/joint_states")

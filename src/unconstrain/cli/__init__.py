@@ -79,16 +79,18 @@ def main() -> None:
 @option_for_json
 def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     """Describe each FILE: columns, rate, gaps, zero actions."""
-    recipe, first = recipe_of(**reading), list[uc.Recording]()
+    recipe, first, absent = recipe_of(**reading), list[uc.Recording](), set(reading["leave_out"])
 
     def recordings() -> Iterator[uc.Recording]:
         for path in uc.readers.expand(files):
             for recording in uc.readers.read_blocks(path, reading_of(**reading), whole=True):
+                absent.discard(recording.name)
                 if recording.name not in reading["leave_out"]:
                     first[:] = first or [recording]
                     yield recording
 
     surveys = uc.preparation.survey_set(recordings(), recipe)
+    uc.readers.warn_of_absent(absent)
     if not first:
         raise ReadError(NOTHING_LEFT)
     names = uc.readers.unique_names(found.name for found in surveys)

@@ -15,7 +15,7 @@ from ..base.display import counted
 from ..base.errors import ModelFileError, ReadError
 from ..base.files import write
 from .printing import refuse_warnings
-from .reading import options_for_reading, reading_of, recipe_of
+from .reading import left_in, options_for_reading, reading_of, recipe_of
 from .writing import check_outputs, option_for_force
 
 
@@ -59,7 +59,7 @@ def look(files: Sequence[str], output: str, force: bool, **reading: Any) -> None
     policies = [one for one in models.values() if isinstance(one, uc.Policy)]
     constraints = [one for one in models.values() if isinstance(one, uc.LearntConstraint)]
     asked, how = _as_learnt(next(iter(models), None), reading)
-    recordings = [one for one in uc.read(recorded, **how) if one.name not in reading["leave_out"]]
+    recordings = left_in(uc.read(recorded, **how), reading["leave_out"])
     demonstrations = uc.prepare(recordings, asked)
     recipe, _ = uc.preparation.decide(asked, recordings[0])
     refuse_warnings(reading["strict"])

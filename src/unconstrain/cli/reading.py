@@ -188,7 +188,13 @@ def stream_of(
 def prepared(paths: Sequence[Any], reading: dict[str, Any]) -> tuple[list[uc.Demonstration], uc.Recipe, uc.Recording]:
     """Demonstrations, the recipe that made them, and the first recording."""
     every = uc.read(paths, **reading_of(**reading).arguments)
-    recordings = [one for one in every if one.name not in reading["leave_out"]]
+    recordings = left_in(every, reading["leave_out"])
     asked = recipe_of(**reading)
     demonstrations = uc.prepare(recordings, asked)
     return demonstrations, uc.preparation.decide(asked, recordings[0])[0], recordings[0]
+
+
+def left_in(recordings: Sequence[uc.Recording], names: Sequence[str]) -> list[uc.Recording]:
+    """Recordings but those that are left out by name, with a word where a name is of none."""
+    uc.readers.warn_of_absent(sorted(set(names) - {one.name for one in recordings}))
+    return [one for one in recordings if one.name not in names]

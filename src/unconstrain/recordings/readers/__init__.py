@@ -11,11 +11,13 @@ Examples
 """
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+import warnings
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from glob import glob
 from pathlib import Path
 
+from ...base.display import listed
 from ...base.errors import NOTHING_LEFT, ReadError, SettingError
 from ...base.foreign import ours_alone, unchanged
 from ..demonstration import Recording
@@ -24,7 +26,7 @@ from .formats import format_of
 from .reading import Reading
 from .table import Assembly, unique_names
 
-__all__ = ["Reading", "expand", "read", "read_blocks", "unique_names"]
+__all__ = ["Reading", "expand", "read", "read_blocks", "unique_names", "warn_of_absent"]
 
 PathLike = str | os.PathLike[str]
 
@@ -100,10 +102,19 @@ def read_blocks(path: PathLike, reading: Reading | None = None, *, whole: bool =
     known = format_of(file)
     if told.columns is not None and known.has_names:
         raise SettingError(f"columns (--columns): {file} says itself what its columns are called; leave them off.")
+    if told.topic is not None and not known.has_topics:
+        raise SettingError(f"topic (--topic): {file} has none; ROS recordings have topics, and workbooks sheets.")
     assembly = Assembly(file, told)
     with ours_alone(file, known.expected), unchanged(file):
         for table in (known.read if whole or known.blocks is None else known.blocks)(file, told):
             yield from assembly.recordings(table)
+
+
+def warn_of_absent(names: Collection[str]) -> None:
+    """Say which recordings should be left out and never came."""
+    if names:
+        said = listed([*map(repr, names)])
+        warnings.warn(f"leave_out (--leave-out): no demonstration is called {said}.", UserWarning, stacklevel=3)
 
 
 def expand(paths: PathLike | Iterable[PathLike]) -> list[Path]:

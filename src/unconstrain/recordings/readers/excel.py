@@ -71,5 +71,9 @@ def _is_workbook(head: bytes) -> bool:
 
 
 FORMAT = Format(
-    (".xlsx", ".xlsm", ".xls", ".xlsb", ".ods"), _is_workbook, read_excel, expected="a workbook; or save it as CSV"
+    (".xlsx", ".xlsm", ".xls", ".xlsb", ".ods"),
+    _is_workbook,
+    read_excel,
+    has_topics=True,
+    expected="a workbook; or save it as CSV",
 )

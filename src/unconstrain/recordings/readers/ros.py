@@ -161,5 +161,6 @@ FORMAT = Format(
     lambda head: head.startswith(_MAGICS),
     read_ros,
     has_names=True,
+    has_topics=True,
     expected="a ROS recording (.bag, .db3, .mcap)",
 )

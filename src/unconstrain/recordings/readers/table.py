@@ -63,8 +63,8 @@ class Format(NamedTuple):
 
     ``suffixes`` in small letters with the dot; ``recognises`` looks at the first bytes of a file; ``read`` reads it
     whole, ``blocks``, if given, by some rows at a time. A format ``by_content`` is known by its first bytes whatever
-    the suffix says; one that ``has_names`` says itself what its columns are called. ``expected`` is what errors say
-    that such a file is.
+    the suffix says; one that ``has_names`` says itself what its columns are called, one that ``has_topics`` holds
+    several recordings of which one is chosen. ``expected`` is what errors say that such a file is.
     """
 
     suffixes: tuple[str, ...]
@@ -73,6 +73,7 @@ class Format(NamedTuple):
     blocks: ReadFile | None = None
     by_content: bool = True
     has_names: bool = False
+    has_topics: bool = False
     expected: str = "a file of that format"
 
 
