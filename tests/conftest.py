@@ -54,6 +54,13 @@ POLICIES = {
 }
 
 
+def pytest_collection_modifyitems(items):
+    """Coverage is taken by the quick tests: it costs the slow ones a third of their time."""
+    for item in items:
+        if item.get_closest_marker("slow"):
+            item.add_marker("no_cover")
+
+
 @pytest.fixture(params=LEARNERS.values(), ids=LEARNERS)
 def learner(request):
     """Each learner in turn."""

@@ -312,6 +312,7 @@ def test_options_of_the_hybrid_mean_the_hybrid(files, tmp_path):
     assert "auto" in call("fit", *files, "--alpha", "much", "-o", tmp_path / "p.npz").err
 
 
+@pytest.mark.slow
 def test_a_cluster_computes_no_samples(files, tmp_path):
     learner = ("--learner", "robust", "--scheduler", "tcp://nowhere:1")  # learns from sums there
     assert "nothing answers" in refused("fit", *files, *learner, "-o", tmp_path / "p.npz")

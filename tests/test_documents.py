@@ -116,6 +116,7 @@ def run_console(text):
     assert done.returncode == 0, done.stderr + done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::unconstrain.recordings.preparation.PreparationWarning")
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_the_blocks_of_a_page_run(page, names):

@@ -97,6 +97,7 @@ def test_what_it_chose_from_is_kept():
     assert taken.risk < 0.1 * solution.candidates["direct"].risk  # half of the demonstrations are constrained
 
 
+@pytest.mark.slow
 def test_where_constraints_are_a_function_of_the_state_consistency_is_taken():
     rng = np.random.default_rng(17)
     training, test = regimes.demonstrate("arm", "1", rng)
