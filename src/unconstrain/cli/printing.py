@@ -14,6 +14,7 @@ import click
 
 import unconstrain as uc
 
+from ..base.display import counted
 from ..base.errors import InvalidDataError
 from .endings import REFUSED, ending
 from .terminal import plain_output
@@ -126,13 +127,13 @@ def say_fit(policy: uc.Policy, stream: uc.Stream, judged: Judged, learner: str, 
     """Print what a policy explains, and what the data determined."""
     solution, known = policy.solution_, isfinite(judged.training)
     models = f"{len(solution.weights)} local models" if len(solution.weights) > 1 else ""
-    counts = f"{judged.demonstrations} demonstrations, {judged.samples} samples" if known else ""
+    counts = f"{counted(judged.demonstrations, 'demonstration')}, {counted(judged.samples, 'sample')}" if known else ""
     if counts or models:
         click.echo(f"{', '.join(filter(None, (counts, models)))}.")
     if getattr(policy, "features", None) == "auto":
         click.echo(f"Features of least estimated error: {policy.training_.model.features}.")
     if solution.belief is not None:
-        click.echo(_said_of_samples(solution))
+        click.echo(_said_of_samples(solution, judged.demonstrations))
         if known:
             _say_suspects(solution.belief.suspects, stream)
     elif learner != "direct":
@@ -199,15 +200,17 @@ def _say_suspects(rows: NDArray[np.intp], stream: uc.Stream | None) -> None:
             click.echo(f"Note: {line}", err=True)
 
 
-def _said_of_samples(solution: uc.Solution) -> str:
+def _said_of_samples(solution: uc.Solution, demonstrations: int) -> str:
     """The candidate that a robust learner took, and its estimates of noise and free samples."""
     risks = {name: one.risk for name, one in solution.candidates.items()}
-    choice = uc.evaluation.diagnosis.about_choice(solution.method, risks)
-    return (
-        f"{choice} Noise and misfit are about {solution.noise:.3g} on each action, and "
-        f"{solution.free_share:.0%} of the samples were free{_said_of_undecided(solution)}. At least three "
-        f"demonstrations show {solution.determined_share:.0%} of the weight directions."
+    said = (
+        f"{uc.evaluation.diagnosis.about_choice(solution.method, risks)} Noise and misfit are about "
+        f"{solution.noise:.3g} on each action, and {solution.free_share:.0%} of the samples were free"
+        f"{_said_of_undecided(solution)}."
     )
+    if demonstrations < uc.evaluation.diagnosis.ENOUGH:
+        return said
+    return f"{said} At least three demonstrations show {solution.determined_share:.0%} of the weight directions."
 
 
 def _said_of_undecided(solution: uc.Solution) -> str:

@@ -92,7 +92,7 @@ def of_explained(
         The motion.
     """
     across = "What constraints hid: no recording shows it, so no score does."
-    if determined is not None and determined < MOSTLY:
+    if determined is not None and determined < MOSTLY and demonstrations >= ENOUGH:
         across = f"Across the motion: {1 - determined:.0%} of the weight directions are shown by fewer than {ENOUGH} "
         across += "demonstrations; 'unconstrain diagnose' says where."
     if demonstrations < ENOUGH or not np.isfinite(share):
