@@ -34,6 +34,7 @@ house: $(DEV_STAMP) ## print the plan of the rooms and its figures; HOUSE=--walk
 	@$(BIN)/python scripts/house.py $(HOUSE)
 
 docs: $(DEV_STAMP) ## build the documentation; warnings are errors
+	@rm -rf docs/generated  # pages of names that are gone would stay
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs $(DOCS_DIR)
 	@echo "The documentation is in $(CURDIR)/$(DOCS_DIR)/index.html"
 
