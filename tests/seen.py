@@ -91,6 +91,28 @@ def coloured(browser, scheme):
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
 
 
+@contextmanager
+def on_a_phone(browser, width, height, scale=1):
+    """As somebody sees it on a screen of so many pixels, each ``scale`` wide in the glass."""
+    metrics = {"width": width, "height": height, "deviceScaleFactor": scale, "mobile": True}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    try:
+        yield
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def width_of(browser):
+    """Width of a page, to the right of which one would have to scroll."""
+    return browser.execute_script("return document.documentElement.scrollWidth")
+
+
+def unnamed_canvases(browser):
+    """How many drawings have no text for those who cannot see them."""
+    script = "return [...document.querySelectorAll('canvas')].filter((c) => !c.getAttribute('aria-label')).length"
+    return browser.execute_script(script)
+
+
 def below(said):
     """What follows a verdict."""
     verdict, _, rest = said.partition("\n\n")

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 import unconstrain as uc
-from seen import opened
+from seen import on_a_phone, opened, width_of
 from test_cli import call, refused, run, write
 from test_report import References
 from unconstrain.base.errors import InvalidDataError, SettingError
@@ -235,13 +235,9 @@ class TestPage:
     def test_a_page_fits_on_a_phone(self, fitted, browser, tmp_path):
         policy, demos = fitted
         page = diagnosis.diagnosis_page(diagnose(policy, demos), demos, "A diagnosis", ["x", "y"], ["vx", "vy"])
-        metrics = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
-        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
-        try:
+        with on_a_phone(browser, 400, 800):
             assert all(graph["wide"] <= 400 for graph in opened(browser, page, tmp_path))
-            assert browser.execute_script("return document.documentElement.scrollWidth") <= 400
-        finally:
-            browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+            assert width_of(browser) <= 400
 
     def test_the_page_of_a_robust_fit_says_what_is_not_known(self, fitted, browser, tmp_path):
         page = fit.policy_page(*fitted, "A policy")

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from selenium.webdriver import ActionChains, Keys
 
 import unconstrain as uc
+from seen import on_a_phone, unnamed_canvases, width_of
 from test_cli import call, refused, run
 from unconstrain.pages.look import look_page
 
@@ -205,15 +206,9 @@ def test_a_page_of_much_data_is_small_and_drawn_soon(browser, tmp_path):
 
 
 def test_it_fits_a_phone_and_names_what_it_draws(page):
-    page.execute_cdp_cmd(
-        "Emulation.setDeviceMetricsOverride", {"width": 360, "height": 740, "deviceScaleFactor": 2, "mobile": True}
-    )
-    try:
-        assert page.execute_script("return document.documentElement.scrollWidth") <= 360
-        unnamed = "return [...document.querySelectorAll('canvas')].filter((c) => !c.getAttribute('aria-label')).length"
-        assert page.execute_script(unnamed) == 0
-    finally:
-        page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    with on_a_phone(page, 360, 740, scale=2):
+        assert width_of(page) <= 360
+        assert unnamed_canvases(page) == 0
 
 
 def test_without_a_recording_there_is_nothing_to_look_at(folder, tmp_path):

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from selenium.webdriver import ActionChains, Keys
 
 import unconstrain as uc
+from seen import on_a_phone, unnamed_canvases, width_of
 from test_cli import refused, run
 
 SIDE, WIDTH = 5, 0.8
@@ -155,15 +156,9 @@ def test_the_truth_can_be_hidden(plate):
 
 
 def test_it_fits_a_phone_and_names_every_picture(plate):
-    plate.execute_cdp_cmd(
-        "Emulation.setDeviceMetricsOverride", {"width": 360, "height": 740, "deviceScaleFactor": 2, "mobile": True}
-    )
-    try:
-        assert plate.execute_script("return document.documentElement.scrollWidth") <= 360
-        unnamed = "return [...document.querySelectorAll('canvas')].filter((c) => !c.getAttribute('aria-label')).length"
-        assert plate.execute_script(unnamed) == 0
-    finally:
-        plate.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    with on_a_phone(plate, 360, 740, scale=2):
+        assert width_of(plate) <= 360
+        assert unnamed_canvases(plate) == 0
 
 
 def test_the_page_is_small_and_is_not_written_over(page):

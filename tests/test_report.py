@@ -15,7 +15,7 @@ import pytest
 
 import unconstrain as uc
 from recorded import needs_rim
-from seen import coloured, opened, unreadable
+from seen import coloured, on_a_phone, opened, unreadable, width_of
 from unconstrain.base.errors import MissingExtraError, SettingError
 from unconstrain.pages import fit, html
 from unconstrain.paper import pages as report
@@ -320,11 +320,7 @@ class TestInABrowser:
 
     @pytest.mark.parametrize("name", ["table1", "figure5", "washing"])
     def test_a_page_fits_on_a_phone(self, pages, browser, tmp_path, name):
-        metrics = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
-        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
-        try:
+        with on_a_phone(browser, 400, 800):
             graphs = opened(browser, pages(name), tmp_path)
-            assert browser.execute_script("return document.documentElement.scrollWidth") <= 400
+            assert width_of(browser) <= 400
             assert all(graph["wide"] <= 400 for graph in graphs)
-        finally:
-            browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})

@@ -46,7 +46,7 @@ from .printing import (
     say_written,
 )
 from .progress import shown
-from .reading import fitted_policy, numbers, options_for_reading, reading_of, recipe_of, said_recipe, stream_of
+from .reading import fitted_policy, left_in, numbers, options_for_reading, reading_of, recipe_of, said_recipe, stream_of
 from .writing import check_outputs, option_for_force
 
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
@@ -79,18 +79,16 @@ def main() -> None:
 @option_for_json
 def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     """Describe each FILE: columns, rate, gaps, zero actions."""
-    recipe, first, absent = recipe_of(**reading), list[uc.Recording](), set(reading["leave_out"])
+    recipe, first = recipe_of(**reading), list[uc.Recording]()
 
     def recordings() -> Iterator[uc.Recording]:
-        for path in uc.readers.expand(files):
-            for recording in uc.readers.read_blocks(path, reading_of(**reading), whole=True):
-                absent.discard(recording.name)
-                if recording.name not in reading["leave_out"]:
-                    first[:] = first or [recording]
-                    yield recording
+        paths, how = uc.readers.expand(files), reading_of(**reading)
+        every = (one for path in paths for one in uc.readers.read_blocks(path, how, whole=True))
+        for recording in left_in(every, reading["leave_out"]):
+            first[:] = first or [recording]
+            yield recording
 
     surveys = uc.preparation.survey_set(recordings(), recipe)
-    uc.readers.warn_of_absent(absent)
     if not first:
         raise ReadError(NOTHING_LEFT)
     names = uc.readers.unique_names(found.name for found in surveys)

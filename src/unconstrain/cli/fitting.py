@@ -29,9 +29,9 @@ def options_for_model(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options that choose the model of the policy."""
     scale = "What counts as one of each state, such as 1000,1 for mm beside rad; auto finds it."
     metavar = "AUTO|NONE|A,B,..."
-    command = click.option("--scale", type=scale_of, default="none", show_default=True, metavar=metavar, help=scale)(
-        command
-    )
+    command = click.option(
+        "--scale", type=scale_of, default="none", show_default=True, metavar=metavar, help=scale, callback=_levelled
+    )(command)
     variance = "Local: σ² of the receptive fields. By default from the data."
     command = click.option("--centres", type=click.IntRange(1), help="RBF: number of kernels, 25 by default.")(command)
     command = click.option("--variance", type=float, help=variance)(command)
@@ -55,6 +55,13 @@ def alpha_of(text: str) -> float | Literal["auto"]:
 def scale_of(text: str) -> str | tuple[float, ...] | None:
     """Numbers, auto, or None."""
     return {"auto": "auto", "none": None}[text] if text in ("auto", "none") else numbers(text)
+
+
+def _levelled(_: click.Context, __: click.Parameter, scale: Any) -> Any:
+    """Warn of no mixed units where a scale is given, which is what cures them."""
+    if scale is not None:
+        warnings.filterwarnings("ignore", "mixed-units", UserWarning)
+    return scale
 
 
 def default_learner(
@@ -84,8 +91,6 @@ def learner_of(name: str, alpha: float | Literal["auto"] | None, softness: float
 
 def policy_of(model: str, variance: float | None, centres: int | None, scale: Any, **chosen: Any) -> uc.Policy:
     """Make the policy of the options."""
-    if scale is not None:  # is what cures them
-        warnings.filterwarnings("ignore", "mixed-units", UserWarning)
     for option, value, needed in (("variance", variance, "local"), ("centres", centres, "rbf")):
         if value is not None and model != needed:
             raise SettingError(f"--{option}: belongs to --model {needed}, got --model {model}.")

@@ -59,7 +59,7 @@ def look(files: Sequence[str], output: str, force: bool, **reading: Any) -> None
     policies = [one for one in models.values() if isinstance(one, uc.Policy)]
     constraints = [one for one in models.values() if isinstance(one, uc.LearntConstraint)]
     asked, how = _as_learnt(next(iter(models), None), reading)
-    recordings = left_in(uc.read(recorded, **how), reading["leave_out"])
+    recordings = list(left_in(uc.read(recorded, **how), reading["leave_out"]))
     demonstrations = uc.prepare(recordings, asked)
     recipe, _ = uc.preparation.decide(asked, recordings[0])
     refuse_warnings(reading["strict"])

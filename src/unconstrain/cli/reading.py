@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -188,13 +188,17 @@ def stream_of(
 def prepared(paths: Sequence[Any], reading: dict[str, Any]) -> tuple[list[uc.Demonstration], uc.Recipe, uc.Recording]:
     """Demonstrations, the recipe that made them, and the first recording."""
     every = uc.read(paths, **reading_of(**reading).arguments)
-    recordings = left_in(every, reading["leave_out"])
+    recordings = list(left_in(every, reading["leave_out"]))
     asked = recipe_of(**reading)
     demonstrations = uc.prepare(recordings, asked)
     return demonstrations, uc.preparation.decide(asked, recordings[0])[0], recordings[0]
 
 
-def left_in(recordings: Sequence[uc.Recording], names: Sequence[str]) -> list[uc.Recording]:
+def left_in(recordings: Iterable[uc.Recording], names: Sequence[str]) -> Iterator[uc.Recording]:
     """Recordings but those that are left out by name, with a word where a name is of none."""
-    uc.readers.warn_of_absent(sorted(set(names) - {one.name for one in recordings}))
-    return [one for one in recordings if one.name not in names]
+    absent = set(names)
+    for recording in recordings:
+        absent.discard(recording.name)
+        if recording.name not in names:
+            yield recording
+    uc.readers.warn_of_absent(absent)

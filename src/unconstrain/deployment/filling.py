@@ -8,8 +8,12 @@ from importlib.metadata import PackageNotFoundError, version
 
 def filled(part: str, fill: Mapping[str, str]) -> str:
     """A template, ``PART.in``, with its words filled in."""
-    text = (resources.files(__package__) / "templates" / f"{part}.in").read_text()
-    return re.sub(r"@([a-zA-Z_]+)@", lambda found: fill[found[1]], text)
+    return re.sub(r"@([a-zA-Z_]+)@", lambda found: fill[found[1]], template(f"{part}.in"))
+
+
+def template(name: str) -> str:
+    """The text of a file in the folder."""
+    return (resources.files(__package__) / "templates" / name).read_text("utf-8")
 
 
 def own_version() -> str:

@@ -3,27 +3,24 @@
 import json
 import os
 from functools import singledispatch
-from importlib import resources
 from typing import Any
 
 from ..base import files
 from ..models import ClosedForm, spaces
+from .filling import filled, template
 
 
 def export_javascript(form: ClosedForm, path: str | os.PathLike[str]) -> None:
     """Write an ES module that exports ``policy(state)`` and ``support(state)``; see :func:`javascript`."""
-    (_, d, models), n = form.sizes, form.embedding.states(form.origin[None]).shape[1]
+    (_, d, models), n = form.sizes, form.columns
     fill = {
         "what": f"{n} states to {d} actions, {models} model{'s' * (models > 1)}",
         "n": str(n),
         "d": str(d),
-        "runtime": _template("policy.js"),
+        "runtime": template("policy.js"),
         "formula": formula(form),
     }
-    source = _template("policy.js.in")
-    for name, text in fill.items():
-        source = source.replace(f"@{name}@", text)
-    files.write(path, source)
+    files.write(path, filled("policy.js", fill))
 
 
 def javascript(form: ClosedForm) -> str:
@@ -31,7 +28,7 @@ def javascript(form: ClosedForm) -> str:
 
     Where there are no kernels, ``support`` is null.
     """
-    return f"(function () {{\n{_template('policy.js')}\nreturn policyOf({formula(form)});\n}})()"
+    return f"(function () {{\n{template('policy.js')}\nreturn policyOf({formula(form)});\n}})()"
 
 
 def formula(form: ClosedForm) -> str:
@@ -58,7 +55,3 @@ def _circle(space: spaces.Circle) -> dict[str, Any]:
 @_factor.register(spaces.Sphere)
 def _sphere(space: spaces.Sphere) -> dict[str, Any]:
     return {"columns": 4, "places": list(map(int, space.places))}
-
-
-def _template(name: str) -> str:
-    return (resources.files(__package__) / "templates" / name).read_text("utf-8")

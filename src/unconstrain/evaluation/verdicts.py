@@ -158,8 +158,8 @@ def of_constraint(learnt: LearntConstraint) -> Verdict:
     if choice.doubts:
         mark, then = (Mark.DOUBTFUL if mark is Mark.GOOD else mark), "Record what is missing, then learn it again."
     doubt = "; ".join(text.rstrip(".") for text in choice.doubts)
-    wish = "A direction in which nobody wanted to move looks held, too."
-    return Verdict(mark, said, "What was held, near recorded states.", f"{doubt}. {wish}" if doubt else wish, then)
+    still = "A direction in which nobody wanted to move looks held, too."
+    return Verdict(mark, said, "What was held, near recorded states.", f"{doubt}. {still}" if doubt else still, then)
 
 
 def of_support(support: Array, times: Array | None) -> Verdict:

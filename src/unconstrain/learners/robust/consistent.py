@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import reduce
-from operator import add
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,52 +108,57 @@ def least_error(name: str, samples: Samples, errors: Sequence[Quadratic], odds: 
     less. Its softness is the error missed over the risk missed beside it, times that over the number of samples, by
     fixed-point iteration; ``odds`` is the number of coordinates beside the error over the number in it.
     """
+    d = samples.actions.shape[1]
     risks = [part.risk(part.actions, np.ones(len(part))) for part in samples.by_fold()]
-    worths = (1.0, samples.actions.shape[1] * samples.regressors)
-    tried = [_Balanced(errors, risks, samples, odds * worth) for worth in worths]
-    most = MOST_OF_LEAST * min(one.held_out for one in tried)
-    chosen = next((one for one in tried if one.held_out <= most), tried[-1])
-    best = chosen.weights
+    parts = [_Objectives(*pair) for pair in zip(errors, risks, strict=True)]
+    whole = reduce(_Objectives.plus, parts)
+    balances = [whole.balanced(odds * worth, samples.sizes, d) for worth in (1.0, d * samples.regressors)]
+    refits = []
+    for fold in range(len(parts)):
+        rest = reduce(_Objectives.plus, parts[:fold] + parts[fold + 1 :] or parts)
+        refits.append([rest.posterior(softness).weights(d) for softness, _ in balances])
+    missed = [
+        sum(judged(*pair).sum() for pair in zip(errors, map(vec, each), strict=True))
+        for each in zip(*refits, strict=True)
+    ]
+    chosen = next((k for k, each in enumerate(missed) if each <= MOST_OF_LEAST * min(missed)), -1)
+    softness, loss = balances[chosen]
+    found = whole.posterior(softness)
+    best, without = found.weights(d), [each[chosen] for each in refits]
+    residual = np.maximum(loss, 1e-12 * whole.risk.constant) / np.maximum(samples.sizes, 1e-300)
     radial = distances(samples.actions, samples.predict(best)).radial
     time = correlation_time(radial[:, None], samples.groups)
     return Candidate(
         name,
         best,
-        scaled(chosen.found, time * chosen.residual),
-        samples.held_out(chosen.refits),
+        scaled(found, time * residual),
+        samples.held_out(without),
         samples.mean(radial**2),
         Smoothness.of(samples),
-        np.stack(chosen.refits),
+        np.stack(without),
     )
 
 
-class _Balanced:
-    """The least of an error and a prior of standard risk, both by fold, whose softness is found with it."""
+class _Objectives(NamedTuple):
+    """An error of some folds, and their standard risk."""
 
-    def __init__(self, errors: Sequence[Quadratic], risks: Sequence[Quadratic], samples: Samples, worth: float) -> None:
-        self._errors, self._risks, self._samples = errors, risks, samples
-        self._everything, sizes = list(range(len(errors))), samples.sizes
-        risk, factor = reduce(add, risks), unit_information(worth, sizes)
-        self._softness = np.full(len(sizes), FIRST_SOFTNESS)
+    error: Quadratic
+    risk: Quadratic
+
+    def plus(self, other: _Objectives) -> _Objectives:
+        return _Objectives(self.error + other.error, self.risk + other.risk)
+
+    def posterior(self, softness: Array) -> Posterior:
+        return Posterior(self.error, softness * self.risk)
+
+    def balanced(self, worth: float, sizes: Array, d: int) -> tuple[Array, Array]:
+        """Softness (M,) of a prior with the information of ``worth`` samples, and the error missed with it, (M,)."""
+        factor, softness = unit_information(worth, sizes), np.full(len(sizes), FIRST_SOFTNESS)
         for _ in range(BALANCE_STEPS):
-            whole = self._posterior(self._everything)
-            weights = vec(whole.weights(samples.actions.shape[1]))
-            loss, taken = judged(whole.evidence, weights), judged(risk, weights)
-            self._softness = np.clip(factor * loss / np.maximum(taken - loss, 1e-3 * taken + 1e-300), *SOFTNESS_RANGE)
-        self.found = self._posterior(self._everything)
-        self.weights = self._minimum(self.found)
-        self.residual = np.maximum(loss, 1e-12 * risk.constant) / np.maximum(sizes, 1e-300)
-        others = [[i for i in self._everything if i != fold] or self._everything for fold in self._everything]
-        self.refits = [self._minimum(self._posterior(rest)) for rest in others]
-        pairs = zip(errors, self.refits, strict=True)
-        self.held_out = float(sum(judged(error, vec(refit)).sum() for error, refit in pairs))
-
-    def _posterior(self, of: list[int]) -> Posterior:
-        error, risk = (reduce(add, (one[i] for i in of)) for one in (self._errors, self._risks))
-        return Posterior(error, self._softness * risk)
-
-    def _minimum(self, posterior: Posterior) -> Array:
-        return posterior.weights(self._samples.actions.shape[1])
+            weights = vec(self.posterior(softness).weights(d))
+            loss, taken = judged(self.error, weights), judged(self.risk, weights)
+            softness = np.clip(factor * loss / np.maximum(taken - loss, 1e-3 * taken + 1e-300), *SOFTNESS_RANGE)
+        return softness, loss
 
 
 class _Folds:

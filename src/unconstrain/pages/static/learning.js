@@ -431,7 +431,9 @@ const learning = (() => {
    * beside it, times 1 / n, by iteration; times P / n where the error on held-out folds is then clearly less.
    */
   function segments(demonstrations, folds = demonstrations.map((one) => [one])) {
-    const parts = folds.map((fold) => constrained(fold, demonstrations));
+    const { energy, weight } = total(demonstrations.map((one) => one.moments));
+    const most = Math.min(noise(demonstrations.map((one) => one.actions), demonstrations[0].moments.d), energy / weight);
+    const parts = folds.map((fold) => constrained(fold, most));
     const every = parts.reduce(plus), { size } = every.error;
     const tried = [1, size].map((worth) => {
       const { w, softness } = balanced(every, worth);
@@ -445,16 +447,12 @@ const learning = (() => {
     return (tried.find((one) => one.missed <= MOST_OF_LEAST * least) || tried[1]).w;
   }
 
-  /** Constrained error and standard risk of some demonstrations among all. */
-  function constrained(some, all) {
+  /** Constrained error and standard risk of some demonstrations; a short one has the noise of all. */
+  function constrained(some, most) {
     const { p, d, gram, cross, energy, weight } = total(some.map((one) => one.moments)), size = p * d;
-    const most = () => {
-      const every = all.reduce((sum, one) => [sum[0] + one.moments.energy, sum[1] + one.moments.weight], [0, 0]);
-      return Math.min(noise(all.map((one) => one.actions), d), every[0] / every[1]);
-    };
     const error = { hessian: new Float64Array(size * size), linear: new Float64Array(size), constant: 0, size };
     for (const { actions, moments: sums } of some) {
-      const variance = actions.length < LEAST_DIFFERENCES ? most() : noise([actions], d);
+      const variance = actions.length < LEAST_DIFFERENCES ? most : noise([actions], d);
       addConstrained(error, sums, actions, projection(actions, variance));
     }
     const risk = { hessian: forEveryAction(gram, p, p, d), linear: cross, constant: energy, size };
