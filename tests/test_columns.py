@@ -52,6 +52,26 @@ def test_names_mean_columns(asked, meant):
     assert resolve(asked, COLUMNS) == meant
 
 
+@pytest.mark.parametrize(
+    ("asked", "meant"),
+    [
+        (("x", "y"), ("x [m]", "y (m)")),
+        (("q1..q2",), ("q1 [rad]", "q2 [rad]")),
+        (("x..q1",), ("x [m]", "y (m)", "q1 [rad]")),
+        (("d",), ("d",)),
+        (("s",), ("s",)),
+        (("v",), ("v[0]", "v[1]")),
+    ],
+    ids=" ".join,
+)
+def test_units_need_not_be_named(asked, meant):
+    """But where two columns differ in nothing else, nobody knows which one is meant."""
+    assert (
+        resolve(asked, ["x [m]", "y (m)", "q1 [rad]", "q2 [rad]", "d", "d [m]", "s [m]", "s [s]", "v[0]", "v[1]"])
+        == meant
+    )
+
+
 @given(st.lists(st.sampled_from(COLUMNS), min_size=1, unique=True))
 def test_names_of_columns_mean_themselves(names):
     assert resolve(names, COLUMNS) == tuple(names)

@@ -177,6 +177,28 @@ def test_rank_is_of_the_arm_and_not_of_the_features():
         assert uc.nppe(found, demos) < 1e-20
 
 
+@pytest.mark.parametrize(("noise", "rank"), [(1e-3, 2), (3e-3, 2), (1e-2, 2), (1e-1, 1)])
+def test_directions_are_held_though_their_noise_differs_but_not_where_they_move(noise, rank):
+    rng = np.random.default_rng(9)
+    states, actions = rng.standard_normal((1000, 4)), rng.standard_normal((1000, 4)) * [1.0, 1.0, 1e-3, noise]
+    found = uc.LearntConstraint().fit(states, actions, np.arange(1000) // 100)
+    assert found.rank_ == rank
+    assert not found.choice_.doubts
+
+
+@pytest.mark.parametrize("noise", [1e-3, 1e-2])
+def test_a_direction_that_may_be_held_with_more_noise_is_said(noise):
+    """A handle on a crank: two directions are held, but as it only ever turns one way, motion is a function of it."""
+    rng = np.random.default_rng(10)
+    angle, speed = rng.uniform(0.0, 6.0, 1000), rng.uniform(0.5, 1.5, (1000, 1))
+    states = np.column_stack([0.3 * np.cos(angle), 0.3 * np.sin(angle), angle])
+    ways = np.column_stack([-states[:, 1], states[:, 0], np.ones(1000)])
+    actions = ways * speed + rng.standard_normal((1000, 3)) * [1e-3, noise, 1e-3]
+    found = uc.LearntConstraint("affine").fit(states, actions, np.arange(1000) // 100)
+    told = {1e-3: (2, "only one direction was seen"), 1e-2: (1, "One direction more moves by only")}
+    assert (found.rank_, True) == (told[noise][0], told[noise][1] in " ".join(found.choice_.doubts))
+
+
 @pytest.mark.parametrize("grouped", [True, False])
 @pytest.mark.parametrize("features", ["affine", "rbf", "auto"])
 def test_streamed_is_at_once(features, grouped):

@@ -19,7 +19,7 @@ from ..base.display import counted
 from ..base.errors import InvalidDataError
 from .evidence import Evidence, Kept
 from .forms import Form, Lifted
-from .spectrum import Fields
+from .spectrum import HELD, Fields
 
 SMOOTHNESS = (1.0, 1e-2, 1e-4, 0.0)
 """Strengths of the prior that are tried where features have a roughness."""
@@ -102,6 +102,11 @@ class Choice:
             said.append(
                 "At each state only one direction was seen: a free policy that is a function of the state looks the "
                 "same. Record movements that cross each other, or name the features."
+            )
+        elif self.fields.next < HELD:
+            said.append(
+                f"One direction more moves by only {self.fields.next:.1g} of what is free: it is held, too, with more "
+                "noise, or nobody wanted to move along it."
             )
         if max(self.held_out, self.proportional) > DOUBTFUL:
             faster = f", {self.proportional:.0%} where movements are fast" if self.proportional > DOUBTFUL else ""
@@ -211,7 +216,8 @@ class _Trial:
             motion, size, weight = pencil.means(folds)
             return Fields.of(motion + rough * np.trace(motion), size, weight)
 
-        whole = solved(filled).ranked(samples)
+        explained = _explained(samples, kept)
+        whole = solved(filled).ranked(samples, explained <= ONE_WAY)
         rows = whole.rows(samples)
         missed = whole.residuals(samples, rows)
         fitted = _missed(rows, missed, kept)
@@ -220,8 +226,7 @@ class _Trial:
             held, rest = kept.folds == fold, replace(solved(filled[filled != fold]), rank=whole.rank)
             rows[held] = np.where(counting[held], rest.rows(samples.at(held)), 0.0)
             missed[held] = rest.residuals(samples.at(held), rows[held])
-        held_out, explained = _missed(rows, missed, kept), _explained(samples, kept)
-        return cls(name, strength, whole, fitted, held_out, explained)
+        return cls(name, strength, whole, fitted, _missed(rows, missed, kept), explained)
 
 
 def _check(best: _Trial, samples: int) -> None:

@@ -42,6 +42,9 @@ FAINTEST = 0.03
 TYPICAL = 200
 """States that the rank is found at."""
 
+HELD = 1e-3
+"""Directions with more than this share of the largest eigenvalue are held only if their noise is that of the floor."""
+
 
 @dataclass(frozen=True, eq=False)
 class Fields:
@@ -53,16 +56,25 @@ class Fields:
         Of the eigenvectors, each over the square root of its excess; those at the floor first.
     floor : int
         How many these are.
+    noise : float
+        The smallest eigenvalue.
+    motion : float
+        The largest.
     rank : int
         Most directions that are held at once.
     cost : float
         Directions of a larger least excess are free.
+    next : float
+        Cost of the first free direction, as a share of the largest eigenvalue.
     """
 
     coefficients: Array
     floor: int
+    noise: float
+    motion: float
     rank: int = 1
     cost: float = np.inf
+    next: float = 1.0
 
     @classmethod
     def of(cls, motion: Array, size: Array, weight: float) -> Fields:
@@ -70,12 +82,17 @@ class Fields:
         values, vectors = _eigensystem(motion, size)
         if not len(values):
             raise InvalidDataError("the features are the same at all states, and so no surface goes through them.")
-        noise, largest = max(values[0], 0.0), len(values) * max(values[-1], NOTHING)
-        excess = values - values[0] + noise / np.sqrt(weight) + LEAST * largest
-        return cls(vectors / np.sqrt(excess), _count_at_floor(values, weight, ROUNDING * largest))
+        noise, largest = max(values[0], 0.0), max(values[-1], NOTHING)
+        excess = values - values[0] + noise / np.sqrt(weight) + LEAST * len(values) * largest
+        floor = _count_at_floor(values, weight, ROUNDING * len(values) * largest)
+        return cls(vectors / np.sqrt(excess), floor, noise, largest)
 
-    def ranked(self, samples: Lifted) -> Fields:
-        """With the rank where fields at the floor have their largest gap, and the middle of held and free costs."""
+    def ranked(self, samples: Lifted, crossing: bool) -> Fields:
+        """With the rank where fields at the floor have their largest gap, and the middle of held and free costs.
+
+        Where movements cross each other, directions with more noise count, too, if their cost is nearer to the least
+        than to the next one's.
+        """
         typical = samples.at(slice(TYPICAL))
         rows = typical.acting(typical.fields(self.coefficients[:, : self.floor]))
         squares = np.linalg.eigvalsh(rows.swapaxes(1, 2) @ rows).mean(axis=0)[::-1]
@@ -83,8 +100,12 @@ class Fields:
         most = min(self.floor, len(sizes))
         rank = int((sizes[:most] / np.append(sizes[1:most], FAINTEST)).argmax()) + 1
         costs = np.median(self.directions(typical)[0], axis=0)
+        excess = np.minimum(costs + self.noise, self.motion)
+        least = np.minimum(np.sqrt(excess[0] * excess[1:]), HELD * self.motion)
+        while crossing and rank < len(costs) - 1 and excess[rank] < least[rank]:
+            rank += 1
         between = float(np.sqrt(costs[rank - 1] * costs[rank])) if rank < len(costs) else np.inf
-        return replace(self, rank=rank, cost=between)
+        return replace(self, rank=rank, cost=between, next=float(excess[min(rank, len(costs) - 1)] / self.motion))
 
     def directions(self, samples: Lifted) -> tuple[Array, Array]:
         """Least excess of each direction, ascending, shape (N, d), and the directions in rows, shape (N, d, d)."""

@@ -1,30 +1,36 @@
 """Which columns are meant by names, patterns and ranges as a person gives them."""
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
+from functools import lru_cache
 
 _RANGE = re.compile(r"(.*?)(\d+)\.\.(?:\1)?(\d+)")
+_UNIT = re.compile(r"\s*(\[[^\[\]\d][^\[\]]*\]|\([^()\d][^()]*\))$")
 _SHORT = {"states": "x", "actions": "u"}
 
 
 def resolve(asked: Sequence[str], columns: Sequence[str]) -> tuple[str, ...]:
     """Columns that names mean, in order; a name that means none stays.
 
-    A name is a column itself, a pattern (``joint_?``), a range (``q1..q7``), the stem of numbered columns
-    (``observation.state``), or the last part of one column (``X`` of ``hand.X``).
+    A name is a column itself, with or without its unit (``x`` for ``x [m]``), a pattern (``joint_?``), a range
+    (``q1..q7``), the stem of numbered columns (``observation.state``), or the last part of one column (``X`` of
+    ``hand.X``).
     """
     found = (name for each in asked for name in _meant(each, columns) or (each,))
     return tuple(dict.fromkeys(found))
 
 
 def _meant(name: str, columns: Sequence[str]) -> tuple[str, ...]:
-    if name in columns:
-        return (name,)
+    named = _named(tuple(columns))
+    if name in named:
+        return (named[name],)
     if found := _RANGE.fullmatch(name):
-        return tuple(f"{found[1]}{number}" for number in range(int(found[2]), min(int(found[3]), 10_000) + 1))
+        numbers = range(int(found[2]), min(int(found[3]), 10_000) + 1)
+        return tuple(named.get(each, each) for each in (f"{found[1]}{number}" for number in numbers))
     if ".." in name:
-        ends = [columns.index(end) if end in columns else None for end in name.split("..", 1)]
+        ends = [columns.index(named[end]) if end in named else None for end in name.split("..", 1)]
         if None not in ends:
             return tuple(columns[ends[0] : (ends[1] or 0) + 1])
     if any(mark in name for mark in "*?["):
@@ -32,6 +38,16 @@ def _meant(name: str, columns: Sequence[str]) -> tuple[str, ...]:
     numbered = re.compile(rf"({re.escape(name)}|{_SHORT.get(name, '(?!)')})([_. \[]?\d+\]?|\..+)")
     of_stem = tuple(column for column in columns if numbered.fullmatch(column))
     return of_stem or _only([column for column in columns if re.search(rf"[._/ ]{re.escape(name)}$", column)])
+
+
+@lru_cache(maxsize=8)
+def _named(columns: tuple[str, ...]) -> dict[str, str]:
+    """Columns by their names, and by those without their unit where no other has it."""
+    plain = [_UNIT.sub("", column) for column in columns]
+    once = {name for name, count in Counter(plain).items() if count == 1}
+    return {name: column for name, column in zip(plain, columns, strict=True) if name in once} | {
+        column: column for column in columns
+    }
 
 
 def _only(names: Sequence[str]) -> tuple[str, ...]:
