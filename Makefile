@@ -3,7 +3,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check
+PIP := $(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check --no-compile
+COMPILE := $(BIN)/python -m compileall -qq -j 0 $(VENV)/lib src || true  # on all cores, where pip takes one
 USER_STAMP := $(VENV)/.installed-user
 DEV_STAMP := $(VENV)/.installed-dev
 DEMO_DIR := build/demo
@@ -11,6 +12,7 @@ DOCS_DIR := build/docs
 
 .PHONY: help demo test check fuzz house docs bench bench-gpu clean
 .DELETE_ON_ERROR:
+unexport PYTHONDONTWRITEBYTECODE  # each process that a test starts would compile the package again
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null || \
@@ -62,9 +64,11 @@ $(BIN)/pip:
 $(USER_STAMP): pyproject.toml | $(BIN)/pip
 	@echo "Installing unconstrain, its plots and the physics engine into $(VENV)"
 	@$(PIP) --editable '.[viz,sim]'
+	@$(COMPILE)
 	@touch $@
 
 $(DEV_STAMP): pyproject.toml | $(BIN)/pip
 	@echo "Installing unconstrain and everything for its development into $(VENV); this takes a minute or two"
 	@$(PIP) --editable '.[dev]'
+	@$(COMPILE)
 	@touch $(USER_STAMP) $@
