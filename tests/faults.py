@@ -26,12 +26,14 @@ class Fault(NamedTuple):
 
 
 def cycle(x):
-    r2 = x[0] ** 2 + x[1] ** 2
-    return np.concatenate([[x[0] * (0.5 - r2) + x[1], x[1] * (0.5 - r2) - x[0]], -2 * x[2:]])
+    """Velocities (K, n) that go round in the first two coordinates."""
+    grow, turn = 0.5 - (x[:, :2] ** 2).sum(axis=1, keepdims=True), x[:, 1::-1] * [1.0, -1.0]
+    return np.hstack([x[:, :2] * grow + turn, -2 * x[:, 2:]])
 
 
 def goal(x):
-    return -1.5 * x + 0.3 * np.sin(2 * np.roll(x, 1))
+    """Velocities (K, n) that end in one place."""
+    return -1.5 * x + 0.3 * np.sin(2 * np.roll(x, 1, axis=1))
 
 
 def movements(rng, count=None, dimensions=None):
@@ -42,15 +44,18 @@ def movements(rng, count=None, dimensions=None):
     policy, step = (cycle, goal)[rng.integers(2)], rng.uniform(1.5, 5.0)
     unit, noise = float(rng.choice([1.0, 1000.0, 0.1])), float(rng.choice([0, 1e-5, 1e-4, 5e-4]))
     place = rng.normal(size=n) * rng.integers(2)
-    tables = []
-    for _ in range(count):
-        normal, x, rows = rng.normal(size=n), rng.uniform(-1, 1, n), []
-        normal *= (n > 2) / np.linalg.norm(normal)
-        for _ in range(steps):
-            rows.append(x)
-            velocity = policy(x)
-            x = x + step / steps * (velocity - normal * (normal @ velocity))
-        tables.append(unit * (np.array(rows) + place + noise * rng.standard_normal((steps, n))))
+    drawn = [
+        (rng.normal(size=n), rng.uniform(-1, 1, n), place + noise * rng.standard_normal((steps, n)))
+        for _ in range(count)
+    ]
+    normals, x, beside = map(np.stack, zip(*drawn, strict=True))
+    normals *= (n > 2) / np.linalg.norm(normals, axis=1, keepdims=True)
+    rows = np.empty((steps, count, n))
+    for at in rows:  # all side by side
+        at[:] = x
+        velocity = policy(x)
+        x = x + step / steps * (velocity - normals * (normals * velocity).sum(axis=1, keepdims=True))
+    tables = list(unit * (rows.swapaxes(0, 1) + beside))
     return tables, dt
 
 

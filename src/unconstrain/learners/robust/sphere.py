@@ -18,7 +18,7 @@ sphere. Mixing proportions m_k are estimated by expectation maximisation.
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import gammaln, logsumexp
+from scipy.special import gammaln
 
 from ...base.arrays import Array
 from .constants import ANGULAR_SPREADS
@@ -93,6 +93,9 @@ def e_step(actions: Array, policy: Array, place: Distances, variance: float, mix
     radius = 0.25 * (place.lengths**2 + 8.0 * variance)
     area = np.log(2.0) + 0.5 * d * np.log(np.pi) - gammaln(0.5 * d) + 0.5 * (d - 1) * np.log(radius)
     joint = radial[:, None] + np.column_stack([spread, -area]) + np.log(mixture + _TINY)
-    log_likelihood = logsumexp(joint, axis=1)
-    components = np.exp(joint - log_likelihood[:, None])
+    likeliest = joint.max(axis=1, keepdims=True)
+    components = np.exp(joint - likeliest)
+    together = components.sum(axis=1, keepdims=True)
+    components /= together
+    log_likelihood = (likeliest + np.log(together))[:, 0]
     return Responsibilities(components, (components[:, 1:-1] / variances[:, 1:]).sum(axis=1), log_likelihood)
