@@ -1,18 +1,19 @@
 """Every block of the documents does what it says, in the order of the page, as a reader would paste it."""
 
 import re
-import shlex
+import shutil
 import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from scipy.io import savemat
 
 import unconstrain as uc
 from foreign import STATES, STEPS, bag, lasa, lerobot, robomimic
+from unconstrain import cli
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.rst"))]
@@ -57,30 +58,45 @@ def recorded(seed, samples=60):
     return states, wanted - np.outer(wanted @ normal, normal)
 
 
-@pytest.fixture
-def names(tmp_path, monkeypatch):
-    """What the documents take for granted, and a folder with the files that they read."""
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """A folder with the files that the documents read."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path_factory.mktemp("documents"))
+        Path("wipes").mkdir()
+        turn = np.linspace(0, 12, 1200)
+        for k in range(3):
+            path = np.column_stack([turn, np.cos(turn), np.sin(turn), 0.1 * k * np.sin(turn + k)])
+            header = "t,x,y,z"
+            for name in (f"wipes/{k}.csv", *(("held_out.csv", "monday.csv", "tuesday.csv") if k == 2 else ())):
+                np.savetxt(name, path, delimiter=",", header=header, comments="")
+            table_of(f"wipes/{k}.parquet", *recorded(k))
+        rows = [f"{t},{x},{y},{z},{'flat' if t < 6 else 'tilted'}" for t, x, y, z in path]
+        Path("wipes.csv").write_text("\n".join(["t,x,y,z,surface", *rows]) + "\n")
+        states, actions, groups = learnt_from()
+        policy = uc.LocallyLinearPolicy().fit(states, actions, groups=groups)
+        uc.save(policy, "wipe.npz", {"recipe": {"states": ["x", "y", "z"]}})
+        for k in range(2):
+            np.savez(f"batch{k}.npz", states=states[k::2], actions=actions[k::2])
+        robomimic("low_dim.hdf5")
+        lerobot(Path("my_lerobot_set"), "v3.0")
+        bag(Path("wiping.bag"), "bag")
+        savemat("Angle.mat", lasa([(STATES[:, :2] * k, STEPS * 0.1) for k in (1, 2, 3)]))
+        return Path.cwd()
+
+
+def learnt_from():
+    """States, actions and groups of four wipes."""
     states, actions = map(np.concatenate, zip(*map(recorded, range(4)), strict=True))
-    groups = np.repeat(np.arange(4), 60)
-    Path("wipes").mkdir()
-    turn = np.linspace(0, 12, 1200)
-    for k in range(3):
-        path = np.column_stack([turn, np.cos(turn), np.sin(turn), 0.1 * k * np.sin(turn + k)])
-        header = "t,x,y,z"
-        for name in (f"wipes/{k}.csv", *(("held_out.csv", "monday.csv", "tuesday.csv") if k == 2 else ())):
-            np.savetxt(name, path, delimiter=",", header=header, comments="")
-        table_of(f"wipes/{k}.parquet", *recorded(k))
-    rows = [f"{t},{x},{y},{z},{'flat' if t < 6 else 'tilted'}" for t, x, y, z in path]
-    Path("wipes.csv").write_text("\n".join(["t,x,y,z,surface", *rows]) + "\n")
-    policy = uc.LocallyLinearPolicy().fit(states, actions, groups=groups)
-    uc.save(policy, "wipe.npz", {"recipe": {"states": ["x", "y", "z"]}})
-    for k in range(2):
-        np.savez(f"batch{k}.npz", states=states[k::2], actions=actions[k::2])
-    robomimic("low_dim.hdf5")
-    lerobot(Path("my_lerobot_set"), "v3.0")
-    bag(Path("wiping.bag"), "bag")
-    savemat("Angle.mat", lasa([(STATES[:, :2] * k, STEPS * 0.1) for k in (1, 2, 3)]))
+    return states, actions, np.repeat(np.arange(4), 60)
+
+
+@pytest.fixture
+def names(written, tmp_path, monkeypatch):
+    """What the documents take for granted, and a copy of the files that they read."""
+    shutil.copytree(written, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    states, actions, groups = learnt_from()
     turns = iter([True, True, False])
     robot = SimpleNamespace(read=lambda: states[0], command=lambda action: None)
     return {
@@ -107,13 +123,14 @@ def table_of(name, states, actions):
 
 
 def run_console(text):
-    """Each command of a console block, by the command line of this very package, where it has not yet been run."""
+    """Each command of a console block, as the shell parts its words, where it has not yet been run."""
     for written in re.findall(r"(?:-o|--report) (\S+)", text):
         Path(written).unlink(missing_ok=True)
-    commands = [line[2:] for line in text.splitlines() if line.startswith("$ ")]
-    ours = f'unconstrain() {{ {shlex.quote(sys.executable)} -m unconstrain "$@"; }}'
-    done = subprocess.run(["bash", "-ec", "\n".join([ours, *commands])], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr + done.stdout
+    for command in (line[2:] for line in text.splitlines() if line.startswith("$ ")):
+        words = ["bash", "-ec", f"unconstrain() {{ printf '%s\\0' \"$@\"; }}; {command}"]
+        parted = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split("\0")
+        done = CliRunner().invoke(cli.main, parted[:-1], prog_name="unconstrain")
+        assert (done.exit_code, parted[-1]) == (0, ""), f"{command}: {done.output}"
 
 
 @pytest.mark.slow
