@@ -8,6 +8,7 @@ import pickle
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -321,7 +322,7 @@ def test_a_cluster_computes_no_samples(files, tmp_path):
 @pytest.mark.parametrize("learner", cli.LEARNERS)
 @pytest.mark.parametrize("model", fitting.MODELS)
 def test_each_model_takes_each_learner(files, tmp_path, model, learner):
-    said = run("fit", *files, "--model", model, "--learner", learner, "-o", tmp_path / "p.npz")
+    said = run("fit", *files[:4], "--model", model, "--learner", learner, "-o", tmp_path / "p.npz")
     assert ("local models" in said) == (model == "local")
     assert ("The inconsistency determined" in said) == (learner in ("hybrid", "inconsistency"))
     assert ("samples were free" in said) == (learner == "robust")
@@ -1048,7 +1049,7 @@ def demonstrated_with(result, *options):
     """What the demo says of an experiment that ran with its settings, and with a short film."""
 
     def known(settings, workers, progress):
-        assert (settings, workers) == (result.settings, 1)
+        assert (replace(settings, steps=result.settings.steps), workers) == (result.settings, 1)
         progress(1, 1)
         return result
 

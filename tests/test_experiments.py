@@ -110,10 +110,9 @@ def test_in_the_plane_inconsistency_is_the_constrained_error(table1_of_four):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("module", [table1, figure5])
-def test_numbers_do_not_depend_on_the_workers(module):
-    settings = module.Settings(trials=2, seed=3, **({"widest": (0.0, 1.5)} if module is figure5 else {}))
-    assert module.run(settings, 1).to_json() == module.run(settings, 2).to_json()
+def test_numbers_do_not_depend_on_the_workers():  # nor those of table 1, in the tests of the command line
+    settings = figure5.Settings(trials=2, seed=3, widest=(0.0, 1.5))
+    assert figure5.run(settings, 1).to_json() == figure5.run(settings, 2).to_json()
 
 
 def test_the_first_trials_do_not_depend_on_how_many_there_are(table1_of_four):
@@ -471,7 +470,7 @@ def test_on_the_arm_the_sponge_stays_on_the_plate_and_keeps_the_beat(simulated):
         assert row["force_sd"] <= 0.05 * row["force_mean"]
         assert row["frequency"] == pytest.approx(row["frequency_demonstrated"], rel=0.075)
         assert row["drift_m"] <= 0.01
-        assert row["cycles"] >= 10
+        assert row["cycles"] >= simulated.settings.cycles - 2
         assert 0.1 < row["torque_share"] < 1.0  # of what its joint can
     paces = [row["frequency"] / row["frequency_demonstrated"] for row in rows]
     assert np.mean(paces) == pytest.approx(1.0, abs=0.05)
@@ -564,9 +563,8 @@ def test_an_unknown_experiment_is_answered_with_those_there_are():
 
 
 @pytest.fixture(scope="module")
-def small_table2(once):
-    settings = table2.Settings(trials=2, demonstrations=20, steps=30, test_demonstrations=3, jacobian_trials=1)
-    return once("small table 2", lambda: table2.run(settings))
+def small_table2(tabled):
+    return tabled()
 
 
 PRINTED_TABLE2 = """
