@@ -1,5 +1,6 @@
 """What must hold whatever the learner and whatever the policy."""
 
+from copy import deepcopy
 from functools import cache
 from itertools import product
 
@@ -81,7 +82,7 @@ def assert_same_moments(actual, expected, tolerance=1e-11):
 
 def placed(policy, data):
     """The same policy with features and fields laid where these data have them, for good."""
-    fitted = clone(policy).fit(data.states, data.actions)
+    fitted = clone(policy).set_params(learner=uc.Direct()).fit(data.states, data.actions)
     if isinstance(policy, uc.LocallyLinearPolicy):
         return clone(policy).set_params(centres=fitted.fields_.centres, variance=fitted.fields_.variance)
     return clone(policy).set_params(features=fitted.features_)
@@ -292,7 +293,7 @@ def test_rotating_the_actions_rotates_the_policy(policy):
     assert_same(turned, plain @ R.T)
 
 
-@pytest.mark.parametrize("factor", [-1.0, 1e3, 1e-150, 1e25])
+@pytest.mark.parametrize("factor", [-1e3, 1e-150, 1e25])
 def test_scaling_the_actions_scales_the_policy(policy, plain, data, factor):
     scaled = clone(policy).fit(data.states, factor * data.actions).predict(data.states) / factor
     assert_same(scaled, plain.predict(data.states), exactness(policy))
@@ -311,7 +312,7 @@ def exactness(policy):
     return 1e-5 if isinstance(policy.learner, uc.Segments) else 1e-9
 
 
-@pytest.mark.parametrize("weight", [1e-310, 0.1, 10.0, 1e29])
+@pytest.mark.parametrize("weight", [1e-310, 10.0, 1e29])
 def test_scaling_all_weights_changes_nothing(policy, grouped, data, weight):
     weights = np.full(len(data.states), weight)
     heavy = clone(policy).fit(data.states, data.actions, weights, groups=data.groups)
@@ -433,7 +434,7 @@ def test_direct_regression_is_least_squares(data):
 
 
 def test_inconsistency_is_at_most_cpe_and_that_at_most_upe(plain, data):
-    for n in range(len(data.states)):
+    for n in range(0, len(data.states), 3):
         clean = data.projections[n] @ data.policy[n]
         one = uc.Demonstration(
             data.states[n : n + 1],
@@ -470,27 +471,17 @@ def assert_same_in_batches(policy, data, sizes):
     assert_same(stream.predict(data.states), whole.predict(data.states))
 
 
-def test_what_comes_after_the_first_batch_may_come_in_any_pieces(policy, data):
-    once = clone(policy).fit(data.states[:50], data.actions[:50]).partial_fit(data.states[50:], data.actions[50:])
-    pieces = clone(policy).fit(data.states[:50], data.actions[:50])
-    for rows in (slice(50, 51), slice(51, 90)):
-        pieces.partial_fit(data.states[rows], data.actions[rows])
-    assert_same(pieces.predict(data.states), once.predict(data.states))
-
-
-def test_a_batch_without_weight_changes_nothing(policy, data):
+def test_a_batch_without_weight_changes_nothing(policy, plain, data):
     batches = [(data.states[rows], data.actions[rows]) for rows in (slice(0, 40), slice(40, 90))]
-    plain = clone(policy).fit_batches(batches)
+    expected = clone(policy).fit_batches(batches)
     idle = data.states[:7] + 5, data.actions[:7], np.zeros(7)
     assert_same(
-        clone(policy).fit_batches([idle, batches[0], idle, batches[1]]).predict(data.states), plain(data.states)
+        clone(policy).fit_batches([idle, batches[0], idle, batches[1]]).predict(data.states), expected(data.states)
     )
-    stream = clone(policy).fit(data.states, data.actions)
-    before = stream.predict(data.states)
-    assert_same(stream.partial_fit(*idle).predict(data.states), before)
+    assert_same(deepcopy(plain).partial_fit(*idle).predict(data.states), plain.predict(data.states))
 
 
-def test_what_comes_after_the_first_batch_may_come_in_any_order(policy, data):
+def test_what_comes_after_the_first_batch_may_come_in_any_pieces_and_order(policy, data):
     once = clone(policy).fit(data.states[:50], data.actions[:50]).partial_fit(data.states[50:], data.actions[50:])
     pieces = clone(policy).fit(data.states[:50], data.actions[:50])
     for rows in (slice(50, 51), slice(80, 90), slice(51, 80)):
