@@ -33,6 +33,7 @@ LEFT_OUT = {
     "$ make fuzz": "is a target of the Makefile; tests/test_doors.py has some of its attacks",
     "$ pip install": "installs",
     "unconstrain reproduce": "takes minutes to hours; the experiments have tests of their own",
+    "--live": "runs until Ctrl-C; tests/test_scene.py runs it",
     "cc -std=c99": "is run with the exported file in the tests of deployment",
 }
 

@@ -261,8 +261,8 @@ def test_the_mean_normal_of_a_curved_surface_is_that_of_its_slopes():
 
 
 @pytest.mark.slow
-def test_three_mechanisms_of_each_kind():
-    *_, row = mechanisms(36, seed=101)[0]
+def test_sixty_mechanisms():
+    *_, row = mechanisms(60, seed=101)[0]
     assert row["right"] >= 0.90
     assert 0.88 <= row["inside"] <= 0.99
     assert row["confident_and_wrong"] <= 0.02 * row["confident"]

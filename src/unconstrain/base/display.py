@@ -1,5 +1,6 @@
 """How objects that hold arrays show themselves: one line in a terminal, a small table in a notebook."""
 
+import re
 from collections.abc import Sequence
 from html import escape
 from typing import Any
@@ -42,6 +43,21 @@ def counted(number: int, noun: str) -> str:
 def shortened(name: str, most: int = 40) -> str:
     """A name in quotes, its middle left out where it is long."""
     return repr(name if len(name) <= most else f"{name[: most // 2]}…{name[-most // 2 + 1 :]}")
+
+
+def with_unit(name: str, unit: str | None) -> str:
+    """A column's name with its unit, ``"x (mm)"``; as it is where it says one, as ``"x [mm]"``."""
+    return f"{name} ({unit})" if unit and bare(name) == name else name
+
+
+def bare(name: str) -> str:
+    """A column's name without the unit in it: ``"x"`` of ``"x [mm]"``."""
+    return re.sub(r"\s*(\[[^\[\]\d][^\[\]]*\]|\([^()\d][^()]*\))$", "", name)
+
+
+def speed_of(name: str) -> str:
+    """What the velocity of a column is called: ``"vx"`` of ``"x"``, ``"vx [mm/s]"`` of ``"x [mm]"``."""
+    return f"v{bare(name)}" + re.sub(r"([\])])$", r"/s\1", name[len(bare(name)) :])
 
 
 def listed(names: Sequence[str], most: int = 30) -> str:

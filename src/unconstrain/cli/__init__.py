@@ -19,7 +19,7 @@ from ..base.files import write
 from ..paper import experiments
 from .certifying import certify
 from .constraining import constraint, held_of, options_for_held
-from .converting import convert
+from .converting import convert, example
 from .diagnosing import diagnose
 from .exporting import export
 from .fitting import (
@@ -60,6 +60,7 @@ def main() -> None:
     \b
     unconstrain play                      draw, and see what this is about
     unconstrain demo                      the car-washing job, with a report
+    unconstrain example wiping            recordings to begin with
     unconstrain inspect *.csv             what is in your recordings
     unconstrain look *.csv                see them, in space and in time
     unconstrain diagnose *.csv            noise, and what to record next
@@ -359,6 +360,7 @@ main.add_command(certify)
 main.add_command(constraint)
 main.add_command(convert)
 main.add_command(diagnose)
+main.add_command(example)
 main.add_command(export)
 main.add_command(info)
 main.add_command(look)

@@ -58,7 +58,7 @@ def constraint(
     with shown("reading, learning"):
         demonstrations, recipe, first = prepared(paths, reading)
         states, actions, groups = uc.stack(demonstrations)
-        arm = None if jacobian is None else _arm(jacobian, tip).jacobian
+        arm = None if jacobian is None else arm_of(jacobian, tip).jacobian
         learnt = uc.LearntConstraint(features, arm, task=with_task)
         learnt.fit(states, None if surface else actions, groups=groups)
     refuse_warnings(reading["strict"])
@@ -124,7 +124,7 @@ def held_of(
         return uc.constraints.Plane(np.array(plane))
     if path is None:
         return None
-    uc.storage.register(_arms().Arm)
+    known_arms()
     learnt = uc.load(path, uc.LearntConstraint)
     found = learnt.choice_.columns, learnt.choice_.actions
     if found != (states, actions):
@@ -139,15 +139,17 @@ def _said_states(recipe: uc.Recipe) -> str:
     return f"{', '.join(recipe.states or ())}{', centred' if recipe.centre else ''}"
 
 
-def _arm(urdf: str, tip: str | None) -> Any:
-    uc.storage.register(_arms().Arm)
-    return _arms().Arm.from_urdf(urdf, tip)
+def arm_of(urdf: str, tip: str | None) -> Any:
+    """The chain of a robot up to a link."""
+    return known_arms().from_urdf(urdf, tip)
 
 
-def _arms() -> Any:
-    from ..paper.systems import arm
+def known_arms() -> Any:
+    """The class of arms; a learnt constraint that knows one can then be loaded."""
+    from ..paper.systems.arm import Arm
 
-    return arm
+    uc.storage.register(Arm)
+    return Arm
 
 
 def mechanism_of(positions: Any, groups: Any) -> str | None:

@@ -1,10 +1,11 @@
-"""``unconstrain convert``: recordings as files for other programs."""
+"""``unconstrain convert`` and ``example``: recordings as files, for other programs and to begin with."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import click
@@ -42,6 +43,21 @@ def convert(files: Sequence[str], output: str, align: bool, force: bool, as_json
         click.echo(json.dumps({"output": output, **counts}))
     else:
         click.echo(f"✔ {counts['recordings']} recordings, {counts['samples']} samples: {output}")
+
+
+@click.command(epilog="\b\nExample:\n  unconstrain example wiping")
+@click.argument("folder", type=click.Path(file_okay=False))
+@option_for_force
+def example(folder: str, force: bool) -> None:
+    """Write recordings to begin with to FOLDER.
+
+    Simulated wiping of tilted plates, which comes with this package.
+    """
+    check_outputs((folder,), (), force)
+    paths = uc.datasets.write_example(folder)
+    click.echo(f"{len(paths)} recordings: {folder}")
+    click.echo(f"to judge what was learnt: {Path(folder) / 'unseen'}")
+    click.echo(f"  Next: unconstrain inspect {Path(folder) / '*.csv'}")
 
 
 def _columns(recording: uc.Recording, options: dict[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -13,6 +13,8 @@ EXTRAS = {
     "arm": ("arms from URDF files", ("yourdfpy",)),
     "sim": ("wiping with contact", ("mujoco", "mink", "pillow")),
     "onnx": ("export to ONNX", ("onnx", "onnxruntime")),
+    "rerun": ("recordings for the viewer rerun", ("rerun-sdk",)),
+    "live": ("policies in the browser", ("viser", "yourdfpy")),
     "cluster": ("learning on many machines", ("dask", "distributed")),
     "arrays": ("learning from tensors", ("array-api-compat",)),
 }

@@ -1,22 +1,28 @@
-"""``unconstrain look`` and ``play``: pages that run by themselves."""
+"""``unconstrain look`` and ``play``: pages that run by themselves; or the same for rerun, or live."""
 
 from __future__ import annotations
 
 import shlex
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 
 import unconstrain as uc
 
+from ..base.arrays import require_extra
 from ..base.display import counted
-from ..base.errors import ModelFileError, ReadError
+from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainError
 from ..base.files import write
+from .constraining import arm_of, known_arms
 from .printing import refuse_warnings
 from .reading import left_in, options_for_reading, reading_of, recipe_of
 from .writing import check_outputs, option_for_force
+
+MOST_QUICK = 20_000
+"""Samples, at most, that are learnt from only to colour them: a second."""
 
 
 @click.command(epilog="\b\nExample:\n  unconstrain play -o play.html")
@@ -41,17 +47,52 @@ def play(output: str, force: bool) -> None:
 @click.option(
     "-o", "--output", type=click.Path(dir_okay=False), default="look.html", show_default=True, help="HTML file."
 )
+@click.option("--rrd", type=click.Path(dir_okay=False), help="Also write a recording for the viewer rerun there.")
+@click.option("--live", is_flag=True, help="In place of a page, show all in the browser until Ctrl-C.")
+@click.option("--robot", metavar="URDF", help="States are joint angles of this robot: show it (--live), and its hand.")
+@click.option("--tip", help="With --robot: the link that is its hand.")
 @option_for_force
-def look(files: Sequence[str], output: str, force: bool, **reading: Any) -> None:
+def look(
+    files: Sequence[str],
+    output: str,
+    rrd: str | None,
+    live: bool,
+    robot: str | None,
+    tip: str | None,
+    force: bool,
+    **reading: Any,
+) -> None:
     """Write a page that shows demonstrations.
 
     Those in each FILE are seen in space and in time. A FILE may also be a policy (.npz), which is rolled out there, or
     a learnt constraint (.npz), which is drawn. Recordings are then prepared as those of the policy were.
     """
-    from ..pages.look import look_page, marks_of
-
     paths = uc.readers.expand(files)
-    check_outputs((output,), paths, force)
+    _check_asked(live, rrd, robot, tip)
+    check_outputs((None if live else output, rrd), (*paths, robot), force)
+    seen = _seen(paths, reading)
+    scene = None if rrd is None and not live else _scene(seen, robot, tip)
+    samples = sum(map(len, seen.demonstrations))
+    click.echo(f"{counted(len(seen.demonstrations), 'demonstration')}, {counted(samples, 'sample')}")
+    if not live:
+        write(output, _page(seen))
+        click.echo(f"page: {output}")
+    if scene is not None:
+        _show(scene, rrd, live, robot)
+
+
+class Seen(NamedTuple):
+    """What there is to look at, and what it was read from."""
+
+    paths: Sequence[str | Path]
+    recordings: Sequence[uc.Recording]
+    demonstrations: Sequence[uc.Demonstration]
+    recipe: uc.Recipe
+    policy: uc.Policy | None
+    constraint: uc.LearntConstraint | None
+
+
+def _seen(paths: Sequence[str | Path], reading: dict[str, Any]) -> Seen:
     models = {path: found for path in paths if (found := _model(path)) is not None}
     recorded = [path for path in paths if path not in models]
     if not recorded:
@@ -63,21 +104,68 @@ def look(files: Sequence[str], output: str, force: bool, **reading: Any) -> None
     demonstrations = uc.prepare(recordings, asked)
     recipe, _ = uc.preparation.decide(asked, recordings[0])
     refuse_warnings(reading["strict"])
-    surveys = uc.preparation.survey_set(recordings, recipe)
-    page = look_page(
-        demonstrations,
-        recipe.states or (),
-        _title(recorded),
-        units=recordings[0].units,
-        marks=[marks_of(*each) for each in zip(recordings, surveys, demonstrations, strict=True)],
-        command=_to_fit(recorded, recipe),
-        policy=policies[0] if policies else None,
-        constraint=constraints[0] if constraints else None,
+    return Seen(recorded, recordings, demonstrations, recipe, next(iter(policies), None), next(iter(constraints), None))
+
+
+def _page(seen: Seen) -> str:
+    from ..pages.look import look_page, marks_of
+
+    surveys = uc.preparation.survey_set(seen.recordings, seen.recipe)
+    return look_page(
+        seen.demonstrations,
+        seen.recipe.states or (),
+        _title(seen.paths),
+        units=seen.recordings[0].units,
+        marks=[marks_of(*each) for each in zip(seen.recordings, surveys, seen.demonstrations, strict=True)],
+        command=_to_fit(seen.paths, seen.recipe),
+        policy=seen.policy,
+        constraint=seen.constraint,
+        free=_free(seen),
     )
-    write(output, page)
-    samples = sum(map(len, demonstrations))
-    click.echo(f"{counted(len(demonstrations), 'demonstration')}, {counted(samples, 'sample')}")
-    click.echo(f"page: {output}")
+
+
+def _free(seen: Seen) -> Any:
+    """Probability that each sample was free, where a quick fit tells it and there is no policy."""
+    demos, space = seen.demonstrations, uc.spaces.Euclidean(len(seen.recipe.states or ()))
+    enough = len(demos) >= uc.evaluation.diagnosis.ENOUGH and sum(map(len, demos)) <= MOST_QUICK
+    if seen.policy is not None or not enough or seen.recipe.space != space:
+        return None
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            return uc.LocallyLinearPolicy(learner=uc.NoiseCorrected()).fit_demonstrations(demos).solution_.free
+    except UnconstrainError:  # a look needs no more than what can be seen
+        return None
+
+
+def _check_asked(live: bool, rrd: str | None, robot: str | None, tip: str | None) -> None:
+    if (robot is None) != (tip is None):
+        raise SettingError("--robot and --tip belong together: a URDF file, and the link that is its hand.")
+    if robot is not None and not live and rrd is None:
+        raise SettingError("--robot: belongs to --live and --rrd; the page shows the states as they are.")
+    if live:
+        require_extra("viser", "live")
+
+
+def _scene(seen: Seen, robot: str | None, tip: str | None) -> Any:
+    """The same in space; of joint angles, where the hand is."""
+    from ..pages.look import Scene
+
+    states = seen.recipe.states or ()
+    arm = None if robot is None else arm_of(robot, tip)
+    if arm is not None and arm.joints != len(states):
+        raise SettingError(f"--robot: has {arm.joints} joints on the way to {tip!r}, got {len(states)} states.")
+    directions = seen.recipe.actions or seen.recipe.directions
+    return Scene(seen.demonstrations, states, directions, seen.policy, seen.constraint, arm)
+
+
+def _show(scene: Any, rrd: str | None, live: bool, robot: str | None) -> None:
+    from ..pages.look import recorded, serve
+
+    if rrd is not None:
+        write(rrd, recorded(scene))
+        click.echo(f"rerun: {rrd}")
+    if live:
+        serve(scene, robot, lambda address: click.echo(f"live: {address} (Ctrl-C ends it)"))
 
 
 def _title(paths: Sequence[str | Path]) -> str:
@@ -88,6 +176,7 @@ def _title(paths: Sequence[str | Path]) -> str:
 
 def _model(path: str | Path) -> Any:
     """The policy or constraint in a file; None where it holds a recording."""
+    known_arms()
     for kind in (uc.Policy, uc.LearntConstraint) if Path(path).suffix.lower() == ".npz" else ():
         try:
             return uc.load(path, kind)
@@ -116,7 +205,7 @@ def _to_fit(paths: Sequence[str | Path], recipe: uc.Recipe) -> tuple[str, str]:
     for option in context.command.params:
         name = option.name or ""
         given = context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE
-        if given and name not in ("files", "output", "force", "leave_out"):
+        if given and name not in ("files", "output", "force", "leave_out", "rrd", "robot", "tip"):
             value = context.params[name]
             for one in value if getattr(option, "multiple", False) else [value]:
                 told += _option(option.opts[0], one)

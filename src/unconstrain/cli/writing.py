@@ -16,6 +16,7 @@ NEEDED: dict[str, tuple[str, tuple[str, ...]]] = {
     ".html": ("viz", ("jinja2", "matplotlib")),
     ".onnx": ("onnx", ("onnx",)),
     ".parquet": ("data", ("pyarrow",)),
+    ".rrd": ("rerun", ("rerun",)),
     ".mcap": ("formats", ("rosbags",)),
 }
 """For files that end so, the extra that writes them, and what it brings."""

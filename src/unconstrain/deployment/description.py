@@ -9,7 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..base.display import legible
+from ..base.display import legible, speed_of, with_unit
 from ..models import ClosedForm
 
 _WIDTH = 116
@@ -40,7 +40,7 @@ class Description:
         notes = dict(notes or {})
         recipe, units = notes.pop("recipe", {}), notes.pop("units", {})
         states = _named(recipe.get("states"), form.columns, "x")
-        given = recipe.get("actions") or [f"v{name}" for name in recipe.get("states") or ()]
+        given = recipe.get("actions") or [*map(speed_of, recipe.get("states") or ())]
         lines = {"learnt by": learnt, "relative to": ", ".join(f"{value:.6g}" for value in form.origin)}
         lines |= {name: _said(value) for name, value in notes.items()}
         lines["sha256"] = digest(form)
@@ -50,11 +50,10 @@ class Description:
     @property
     def whole(self) -> dict[str, str]:
         """Everything, by what it is of."""
-        states, actions = (", ".join(map(self._with_unit, names)) for names in (self.states, self.actions))
+        states, actions = (
+            ", ".join(with_unit(name, self.units.get(name)) for name in names) for names in (self.states, self.actions)
+        )
         return {"states": states, "actions": actions, **self.lines}
-
-    def _with_unit(self, name: str) -> str:
-        return f"{name} ({self.units[name]})" if self.units.get(name) else name
 
     def comment(self) -> Iterator[str]:
         """Lines for a comment in C, which nothing in them ends or begins."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from ..base.arrays import Array
+from ..base.display import bare
 from ..base.errors import SettingError
 from ..base.files import put_folder, workshop
 from ..models import ClosedForm, spaces
@@ -108,7 +109,7 @@ def _words(package: str, form: ClosedForm, described: Description, kind: Message
 
 def _are_coordinates(described: Description) -> bool:
     """Whether the states are called after three coordinates."""
-    return [name[-1:].lower() for name in described.states] == ["x", "y", "z"]
+    return [bare(name)[-1:].lower() for name in described.states] == ["x", "y", "z"]
 
 
 def _check(form: ClosedForm, kind: Messages) -> None:

@@ -1,4 +1,4 @@
-"""The page to look at demonstrations: in space, in time, and what a policy makes of them."""
+"""To look at demonstrations: in space, in time, and what a policy makes of them; as a page, for rerun, or live."""
 
 from __future__ import annotations
 
@@ -14,6 +14,10 @@ from ..base.arrays import Array
 from ..base.errors import MissingBeliefError, SettingError
 from ..recordings import Demonstration, Recording, stack
 from .alone import assembled, literal
+from .live import serve as serve
+from .rrd import recorded as recorded
+from .scene import Scene as Scene
+from .scene import patches_of
 
 if TYPE_CHECKING:
     from ..constraints import LearntConstraint
@@ -24,9 +28,6 @@ MOST_SAMPLES = 40_000
 
 MOST_QUERIES = 4_000_000
 """Samples times demonstrations, beyond which only some samples are asked who else comes near."""
-
-MOST_PATCHES = 250
-"""Pieces of a learnt constraint that are drawn."""
 
 NEAR = 0.05
 """Within this share of the largest extent of the states is the same region."""
@@ -54,6 +55,7 @@ def look_page(
     command: Sequence[str] = ("", ""),
     policy: Policy | None = None,
     constraint: LearntConstraint | None = None,
+    free: Array | None = None,
 ) -> str:
     """Make the page, a whole HTML document that needs nothing else.
 
@@ -74,20 +76,25 @@ def look_page(
         Fitted, of as many states.
     constraint : LearntConstraint, optional
         Fitted, of as many states.
+    free : ndarray, shape (N,), optional
+        Probability that each of all samples was free, by a quick look; a policy that learnt from them knows better.
     """
     demos = list(demonstrations)
     every = max(1, -(-sum(map(len, demos)) // MOST_SAMPLES))
     thinned = [demo[np.unique([*range(0, len(demo), every), len(demo) - 1])] for demo in demos]
     states = stack(thinned).states
+    learnt = _free(policy, demos)
+    known = free if learnt is None else learnt
     described = None if policy is None else _described(policy, len(columns))
     data = {
         "columns": list(columns),
         "units": [(units or {}).get(name, "") for name in columns],
         "timed": all(demo.times is not None for demo in demos),
-        "demonstrations": list(_packed(thinned, _free(policy, demos, every))),
+        "demonstrations": list(_packed(thinned, _thinned(known, demos, every))),
+        "quick": learnt is None,
         "marks": [[mark._asdict() for mark in each] for each in marks],
         "command": list(command),
-        "patches": [] if constraint is None else _patches(constraint, states),
+        "patches": list(_patches(constraint, states)),
         "samples": sum(map(len, demos)),
         "policy": described,
     }
@@ -170,13 +177,18 @@ def _regions(demos: Sequence[Demonstration]) -> list[Array]:
     return counts
 
 
-def _free(policy: Policy | None, demos: Sequence[Demonstration], every: int) -> list[Array] | None:
+def _free(policy: Policy | None, demos: Sequence[Demonstration]) -> Array | None:
     """Probability that each sample was free, of a policy that learnt from these."""
     try:
         known = None if policy is None else policy.solution_.free
     except MissingBeliefError:
         return None
-    if known is None or len(known) != sum(map(len, demos)):
+    return None if known is None or len(known) != sum(map(len, demos)) else known
+
+
+def _thinned(known: Array | None, demos: Sequence[Demonstration], every: int) -> list[Array] | None:
+    """What is known of each sample, of those that are shown, by demonstration."""
+    if known is None:
         return None
     parts = np.split(known, np.cumsum([len(demo) for demo in demos])[:-1])
     return [part[np.unique([*range(0, len(part), every), len(part) - 1])] for part in parts]
@@ -197,28 +209,8 @@ def _described(policy: Policy, columns: int) -> dict[str, Any]:
     return {"method": policy.solution_.method, "trouble": trouble}
 
 
-def _patches(constraint: LearntConstraint, states: Array) -> list[dict[str, Any]]:
-    """What a constraint leaves free at some of the states: two directions are a piece of a surface, one is a line."""
-    chosen = states[_spread(states, MOST_PATCHES)]
-    rows = constraint(chosen)
-    if rows.shape[2] != states.shape[1]:
-        return []
-    patches = []
-    for state, held in zip(chosen, rows, strict=True):
-        _, singular, axes = np.linalg.svd(held)
-        free = axes[int((singular > 0.5).sum()) :]
-        patches.append({"at": state.tolist(), "free": free.tolist()})
-    return patches
-
-
-def _spread(states: Array, most: int) -> Array:
-    """Indices of states far from each other: one of each cell of the finest grid that has at most so many."""
-    low, extent = states.min(axis=0), max(float(np.ptp(states, axis=0).max()), 1e-300)
-    found = np.array([0])
-    for cells in range(2, 200):
-        corners = np.floor((states - low) * (cells / extent)).astype(np.int64)
-        first = np.unique(corners, axis=0, return_index=True)[1]
-        if len(first) > most:
-            break
-        found = first
-    return found
+def _patches(constraint: LearntConstraint | None, states: Array) -> Iterator[dict[str, Any]]:
+    """What a constraint leaves free at some of the states."""
+    found = None if constraint is None else patches_of(constraint, states)
+    for state, free in zip(*(found or ((), ())), strict=True):
+        yield {"at": state.tolist(), "free": free.tolist()}

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from functools import lru_cache
 
+from ..base.display import bare
+
 _RANGE = re.compile(r"(.*?)(\d+)\.\.(?:\1)?(\d+)")
-_UNIT = re.compile(r"\s*(\[[^\[\]\d][^\[\]]*\]|\([^()\d][^()]*\))$")
 _SHORT = {"states": "x", "actions": "u"}
 
 
@@ -43,7 +44,7 @@ def _meant(name: str, columns: Sequence[str]) -> tuple[str, ...]:
 @lru_cache(maxsize=8)
 def _named(columns: tuple[str, ...]) -> dict[str, str]:
     """Columns by their names, and by those without their unit where no other has it."""
-    plain = [_UNIT.sub("", column) for column in columns]
+    plain = [*map(bare, columns)]
     once = {name for name, count in Counter(plain).items() if count == 1}
     return {name: column for name, column in zip(plain, columns, strict=True) if name in once} | {
         column: column for column in columns

@@ -39,7 +39,7 @@
   const lengthOf = (demo) => demo.times[demo.times.length - 1] || 0;
   const several = (number, noun) => `${number} ${noun}${number === 1 ? "" : "s"}`;
   const count = shown.columns.length;
-  const named = shown.columns.map((name, i) => (shown.units[i] ? `${name}, ${shown.units[i]}` : name));
+  const named = shown.columns.map((name, i) => (shown.units[i] && !/[\])]$/.test(name) ? `${name}, ${shown.units[i]}` : name));
   const clock = shown.timed ? "s" : "samples";
   const longest = Math.max(...demos.map((one) => lengthOf(one)), 1e-9);
 
@@ -146,7 +146,8 @@
   const COLOURS = {
     demonstration: { label: "Colour: demonstration" },
     speed: { label: "Colour: speed", says: speedSays, range: () => [0, top], more: "or more" },
-    free: { label: "Colour: probability of being free", says: "probability of being free", range: () => [0, 1] },
+    free: { label: "Colour: probability of being free", says: "probability of being free", range: () => [0, 1],
+      note: shown.quick ? "A quick look; with a policy among the files, as that learnt it." : "" },
     regions: { label: "Colour: demonstrations per region", says: "demonstrations that come by",
       range: () => [1, Math.max(2, range("regions")[1])],
       note: "1: free, or always held in the same way; that cannot be told." },

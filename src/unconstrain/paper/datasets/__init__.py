@@ -1,7 +1,7 @@
-"""Recordings of others: found, checked and, only if asked for, fetched; none comes with this package.
+"""Recordings of others: found, checked and, only if asked for, fetched; and a few of our own, which come along.
 
-Each loader takes ``download=True`` and keeps what it fetched, save that of the signs: nobody offers these as a plain
-file at a fixed place. Local copies are looked for in the folder named by ``UNCONSTRAIN_DATA``.
+Each loader of those of others takes ``download=True`` and keeps what it fetched, save that of the signs: nobody offers
+these as a plain file at a fixed place. Local copies are looked for in the folder named by ``UNCONSTRAIN_DATA``.
 
 Examples
 --------
@@ -10,6 +10,7 @@ Examples
 """
 
 from .contours import load_contour as load_contour
+from .example import write_example as write_example
 from .fingertip import load_fingertip as load_fingertip
 from .hands import load_hand_tracks as load_hand_tracks
 from .handwriting import load_handwriting as load_handwriting

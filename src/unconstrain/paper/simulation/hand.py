@@ -44,9 +44,13 @@ def demonstrate(
         them, with the policy and the plate's projection at those positions.
     """
     wipe, how = policy or WipingPolicy(), strokes or Strokes()
+    return observed(plate, wipe, record(plate, rng, wipe, how), how)
+
+
+def record(plate: Plate, rng: np.random.Generator, wipe: WipingPolicy, how: Strokes) -> list[uc.Recording]:
+    """What the camera sees of each stroke: positions relative to the plate's centre, m."""
     scene = hand_scene(plate)
-    recordings = [_stroke(scene, wipe, how, rng) for _ in range(how.count)]
-    return observed(plate, wipe, recordings, how)
+    return [_stroke(scene, wipe, how, rng) for _ in range(how.count)]
 
 
 def _stroke(scene: Scene, wipe: WipingPolicy, how: Strokes, rng: np.random.Generator) -> uc.Recording:

@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from ...base.arrays import Array, check_at_least
+from ...base.display import speed_of, with_unit
 from ...base.errors import SettingError
 from ...models import spaces
 from ..demonstration import Recording
@@ -180,12 +181,12 @@ class Recipe:
         scalars = {ordered[sphere.order.index("w")] for ordered, sphere in self._orientations}
         turning = {name for group in self.quaternions for name in group}
         moving = [name for name in self.states or () if name not in scalars]
-        return tuple(f"{'w' if name in turning else 'v'}{name}" for name in moving)
+        return tuple(f"w{name}" if name in turning else speed_of(name) for name in moving)
 
     def labels(self, units: Mapping[str, str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Names of states and actions with the units of their columns: ``x (mm)``, ``vx (mm/s)``."""
-        known = {name: f"{name} ({unit})" for name, unit in units.items() if unit}
-        speeds = {f"v{name}": f"v{name} ({unit}/s)" for name, unit in units.items() if unit}
+        known = {name: with_unit(name, unit) for name, unit in units.items()}
+        speeds = {speed_of(name): with_unit(speed_of(name), f"{unit}/s") for name, unit in units.items() if unit}
         actions = [known.get(name, name) for name in self.actions or ()]
         actions = actions or [speeds.get(name, name) for name in self.directions]
         return tuple(known.get(name, name) for name in self.states or ()), tuple(actions)
