@@ -103,6 +103,17 @@ def in_onnx(policy: uc.LocallyLinearPolicy, folder: Path, states: Array) -> dict
     }
 
 
+def guided(policy: uc.LocallyLinearPolicy, states: Array) -> dict[str, float]:
+    """How many times as long a step takes that is guided: to a goal, and on a cycle."""
+    out = np.empty(JOINTS)
+    demos = [uc.Demonstration(states[:300], policy(states[:300]))]
+    angles = np.linspace(0.0, 2.0 * np.pi, 300)[:, None] + np.linspace(0.0, 2.0, JOINTS)
+    cycle = uc.Guided(policy, orbit=np.cos(angles))
+    aims = {"to a goal": uc.Guided(policy, np.zeros(JOINTS), demonstrations=demos), "on a cycle": cycle}
+    plain = median_us(lambda state: policy.step(state, out), states)
+    return {name: median_us(lambda state, aim=aim: aim.step(state, out), states) / plain for name, aim in aims.items()}
+
+
 def main() -> list[Row]:
     """Rows of all."""
     policy = arm_policy()
@@ -114,6 +125,7 @@ def main() -> list[Row]:
         row(f"step into a buffer, {what}", median_us(lambda state: policy.step(state, out), states), "µs", 20.0, 8.0),
         row(f"predict of one state, {what}", median_us(lambda state: policy.predict(state[None]), states[:200]), "µs"),
     ]
+    rows += [row(f"step guided {aim} / plain, {what}", took, "×", 2.0) for aim, took in guided(policy, states).items()]
     with TemporaryDirectory() as made:
         if shutil.which("cc"):
             rows.append(row(f"exported C, {what}", in_c(policy, Path(made), states), "µs", 3.0, 1.0))

@@ -468,12 +468,10 @@ def test_on_the_arm_the_sponge_stays_on_the_plate_and_keeps_the_beat(simulated):
         assert row["contact_share"] >= 0.995
         assert row["force_mean"] == pytest.approx(15.0, rel=0.05)
         assert row["force_sd"] <= 0.05 * row["force_mean"]
-        assert row["frequency"] == pytest.approx(row["frequency_demonstrated"], rel=0.075)
+        assert row["frequency"] == pytest.approx(row["frequency_demonstrated"], rel=0.05)
         assert row["drift_m"] <= 0.01
         assert row["cycles"] >= simulated.settings.cycles - 2
         assert 0.1 < row["torque_share"] < 1.0  # of what its joint can
-    paces = [row["frequency"] / row["frequency_demonstrated"] for row in rows]
-    assert np.mean(paces) == pytest.approx(1.0, abs=0.05)
 
 
 def test_without_physics_the_stand_in_demonstrates_and_says_so():

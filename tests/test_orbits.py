@@ -124,3 +124,19 @@ def test_it_survives_its_file(tmp_path):
 def test_a_goal_and_a_cycle_are_two_things():
     with pytest.raises(SettingError, match="orbit: got one beside a goal"):
         uc.Guided(steady, goal=MIDDLE, orbit="shown", demonstrations=SHOWN)
+
+
+def test_turns_take_as_long_as_those_shown_however_slow_the_policy_and_uneven_the_turns():
+    rng = np.random.default_rng(1)
+    times, tilted = 0.05 * np.arange(400), np.linalg.svd([[0.3, 0.0, 1.0]])[2][1:]
+    angle = 2.0 * times + 0.3 * np.sin(2.0 * times)
+    radius = 0.5 + 0.04 * np.sin(0.9 * times)  # people do not repeat themselves
+    flat = radius[:, None] * np.column_stack([np.cos(angle), 0.8 * np.sin(angle)])
+    velocities = np.gradient(flat, times, axis=0) + 0.15 * rng.standard_normal(flat.shape)
+    shown = uc.Demonstration(flat @ tilted, velocities @ tilted, times)
+    for share in (0.7, 1.3):
+        guided = uc.Guided(lambda x, share=share: share * steady(x + MIDDLE), demonstrations=shown)
+        run = uc.rollout(guided, shown.states[0], 250, 0.1, Plane([0.3, 0.0, 1.0]), method="rk4")
+        both = (measured(each.states, np.array([0.3, 0.0, 1.0]), each.times[1]) for each in (run, shown))
+        found, asked = (each["pace"] for each in both)
+        assert abs(found / asked - 1) < 0.035

@@ -58,7 +58,7 @@ def export(
     header = str(Path(output).with_suffix(".h")) if output is not None and kind == ".c" else None
     _check(output, kind, ros2, name, single)
     check_outputs((output, header, ros2), (policy,), force)
-    learnt, notes = fitted_policy(policy), uc.storage.load_notes(policy)
+    learnt, notes = fitted_policy(policy, uc.Policy | uc.Guided), uc.storage.load_notes(policy)
     if output is not None:
         target, options = TARGETS[kind], {"name": name, "single": single, "notes": notes}
         getattr(learnt, target.method)(output, **{option: options[option] for option in target.takes})

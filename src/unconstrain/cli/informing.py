@@ -15,7 +15,7 @@ import unconstrain as uc
 
 from ..base.errors import ModelFileError
 from .printing import print_table, say_verdict
-from .reading import reading_of
+from .reading import innermost, reading_of
 
 
 def provenance(paths: Iterable[str | Path], recipe: uc.Recipe, first: uc.Recording, **reading: Any) -> dict[str, Any]:
@@ -73,7 +73,7 @@ def _of(held: Any) -> dict[str, Any]:
     if isinstance(held, uc.LearntConstraint):
         choice = held.choice_
         return {"held": f"{held.rank_} of {choice.actions} directions", "features": choice.name, "noise": held.noise_}
-    policy = getattr(held, "policy", held)
+    policy = innermost(held)
     solution = getattr(policy, "solution_", None)
     if solution is None:
         return {"fitted": False}
@@ -84,6 +84,7 @@ def _of(held: Any) -> dict[str, Any]:
         "model": f"{len(solution.weights)} local models" if len(solution.weights) > 1 else str(policy.features_),
         "explained held out": None if (share := policy.held_out_score()) != share else round(share, 4),
         "noise": None if solution.belief is None else solution.noise,
+        "guided": held.aim_.promise if isinstance(held, uc.Guided) else None,
     }
 
 
@@ -94,7 +95,7 @@ def _rest(notes: Mapping[str, Any]) -> dict[str, Any]:
 def _verdict(held: Any) -> uc.evaluation.verdicts.Verdict:
     if isinstance(held, uc.LearntConstraint):
         return uc.evaluation.verdicts.of_constraint(held)
-    policy = getattr(held, "policy", held)
+    policy = innermost(held)
     if not hasattr(policy, "solution_"):
         mark = uc.evaluation.verdicts.Mark.BAD
         return uc.evaluation.verdicts.Verdict(mark, "Not fitted: it cannot predict.", next="unconstrain fit")

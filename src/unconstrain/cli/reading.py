@@ -138,18 +138,23 @@ def recipe_of(
     return recipe if window is None else replace(recipe, window_s=window)
 
 
-def fitted_policy(path: str) -> uc.Policy:
-    """The policy in a file.
+def fitted_policy(path: str, kind: Any = uc.Policy) -> Any:
+    """The policy in a file, or another that ``kind`` asks for.
 
     Raises
     ------
     ModelFileError
         Also if it is not fitted.
     """
-    policy = uc.load(path)
-    if not hasattr(policy, "solution_"):
+    policy = uc.load(path, kind)
+    if not hasattr(innermost(policy), "solution_"):
         raise ModelFileError(f"{path}: holds a policy that is not fitted. Fit it before saving.")
     return policy
+
+
+def innermost(policy: Any) -> Any:
+    """The policy that is guided or moved, or itself."""
+    return innermost(policy.policy) if hasattr(policy, "policy") else policy
 
 
 def said_recipe(recipe: uc.Recipe, recording: uc.Recording) -> str:

@@ -3,6 +3,6 @@
 All are made from a :class:`~unconstrain.ClosedForm`; a new target is one more function of it.
 """
 
-from .deployable import Deployable
+from .deployable import Deployable, Exportable
 
-__all__ = ["Deployable"]
+__all__ = ["Deployable", "Exportable"]

@@ -80,9 +80,9 @@ def c_source(
 ) -> Source:
     """Source and header of ``void NAME_step(const double state[n], double action[d])`` and what belongs to it.
 
-    They are C99 as well as C++11. Constants have all digits. The file needs nothing but ``exp``, where states are
-    angles also ``sin`` and ``cos``, from the standard library. With ``NAME_SELF_TEST`` defined, in capitals, it has a
-    ``main`` that compares itself with the policy.
+    They are C99 as well as C++11. Constants have all digits. The file needs nothing but ``exp``, for angles
+    ``sin`` and ``cos``, and for a guided policy ``sqrt``, from the standard library. With ``NAME_SELF_TEST`` defined,
+    in capitals, it has a ``main`` that compares itself with the policy.
 
     Parameters
     ----------
@@ -107,6 +107,8 @@ def c_source(
         raise SettingError(f"name: got {name!r}, expected a name in C: a letter, then letters, digits, underscores.")
     fill = {"name": name, "NAME": name.upper(), "macro": f"{name.upper()}_SELF_TEST", "file": file}
     fill |= _sizes(form, described) | _numbers(form, name, policy, single)
+    fill |= _correction(form, name, _single if single else _double)
+    fill["under"] = filled("under.h", fill) if form.correction else ""
     header = filled("header.h", fill)
     return Source(header, header + "\n" + "".join(filled(f"{part}.c", fill) for part in _parts(form)))
 
@@ -118,7 +120,17 @@ def _parts(form: ClosedForm) -> tuple[str, ...]:
         body: tuple[str, ...] = ("shares", "maps" if form.is_affine else "constants")
     else:
         body = ("affine",) if form.monomials is None else ("polynomial",)
-    return "head", *relative, *body, "within" if form.precisions is None else "support", "self_test"
+    guided = () if form.correction is None else ("potential", form.correction.kind, "guided")
+    return "head", *relative, *body, *guided, "within" if form.precisions is None else "support", "self_test"
+
+
+def _correction(form: ClosedForm, name: str, said: Callable[[Any], str]) -> dict[str, str]:
+    """What templates say of a guided policy; ``step`` is the function of the policy in it."""
+    if form.correction is None:
+        return {"step": f"void {name}_step"}
+    tables = {key: _braced(table, said) for key, table in form.correction.tables.items()}
+    numbers = {key: said(value) for key, value in form.correction.numbers.items()}
+    return {"step": f"static void {name}_wanted", "slopes_of_v": str(len(form.correction.weights)), **tables, **numbers}
 
 
 def _sizes(form: ClosedForm, described: Description) -> dict[str, str]:
@@ -126,6 +138,7 @@ def _sizes(form: ClosedForm, described: Description) -> dict[str, str]:
     (m, d, models), n = form.sizes, form.columns
     needs = [] if form.exponents is None else ["exp()"]
     needs += [] if form.embedding.frame is None else ["sin()", "cos()"]
+    needs += [] if form.correction is None else ["sqrt()"]
     kernels = "How near to the data a state is: from 1 to 0 far from all of it."
     box = "1 where each coordinate is within the reach of the data, else 0: more is not known of such a policy."
     return {

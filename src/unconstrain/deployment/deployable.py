@@ -20,7 +20,113 @@ from .scaled import Scaler, scaled
 from .stepping import Step, stepper
 
 
-class Deployable:
+class Exportable:
+    """What has a formula, on other machines."""
+
+    @abstractmethod
+    def __call__(self, states: ArrayLike) -> Array:
+        """Actions (N, d) at states (N, n)."""
+
+    @abstractmethod
+    def closed_form(self, scaler: Scaler | None = None) -> ClosedForm:
+        """The policy as one formula: what is exported, and what other targets can be made from."""
+
+    @abstractmethod
+    def describe(self, form: ClosedForm, notes: Mapping[str, Any] | None = None) -> Description:
+        """What is said of the formula where it is used, with the notes of the policy's file."""
+
+    def export_c(
+        self,
+        path: str | os.PathLike[str],
+        name: str | None = None,
+        *,
+        single: bool = False,
+        scaler: Scaler | None = None,
+        notes: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Write the policy as a C source that needs only the mathematics of the standard library, and its header.
+
+        They are C99 and C++11, and offer ``void NAME_step(const double state[n], double action[d])``,
+        ``double NAME_support(const double state[n])``, and limits of states and speed. With ``NAME_SELF_TEST`` (in
+        capitals) defined, there is a ``main`` that compares the file with :meth:`predict`.
+
+        Parameters
+        ----------
+        path : str or path-like
+            Of the source; the header has the suffix ``.h``.
+        name : str, optional
+            What all names begin with, a C identifier; by default as the file is called.
+        single : bool
+            Compute in ``float`` rather than ``double``.
+        scaler : object, optional
+            As in :meth:`closed_form`.
+        notes : mapping, optional
+            What to say in the comment, as :func:`unconstrain.storage.load_notes` reads it from a policy's file.
+
+        Raises
+        ------
+        SettingError
+            For another name, if a number does not fit ``float``, and as :meth:`closed_form` does.
+        """
+        form = self.closed_form(scaler)
+        export_c(form, self._after(scaler), path, name, self.describe(form, notes), single=single)
+
+    def export_onnx(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        single: bool = False,
+        scaler: Scaler | None = None,
+        notes: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Write the policy as an ONNX graph, ``states`` (N, n) to ``actions`` (N, d), in float64 or float32.
+
+        Needs the extra ``onnx``. Parameters and errors as in :meth:`export_c`; what is said goes into the metadata.
+        """
+        form = self.closed_form(scaler)
+        export_onnx(form, path, self.describe(form, notes), single=single)
+
+    def export_ros2(
+        self,
+        folder: str | os.PathLike[str],
+        name: str | None = None,
+        *,
+        messages: Messages | None = None,
+        scaler: Scaler | None = None,
+        notes: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Write a ROS 2 package with a node around the C source, and a loop in Python.
+
+        Other parameters and errors are as in :meth:`export_c`; the name is by default that of the folder.
+
+        Parameters
+        ----------
+        messages : {"joints", "pose"}, optional
+            Whether states are the positions of joints (``JointState`` in, ``Float64MultiArray`` out) or of a pose
+            (``PoseStamped`` in, ``TwistStamped`` out); by default of a pose where they are called x, y and z.
+        """
+        form = self.closed_form(scaler)
+        export_ros2(form, self._after(scaler), folder, name, self.describe(form, notes), messages)
+
+    def _after(self, scaler: Scaler | None) -> Callable[[ArrayLike], Array]:
+        return self if scaler is None else lambda states: self(scaler.transform(np.asarray(states)))
+
+    def export_javascript(self, path: str | os.PathLike[str], *, scaler: Scaler | None = None) -> None:
+        """Write the policy as an ES module that needs nothing else, with ``policy(state)`` and ``support(state)``.
+
+        The scaler and errors are as in :meth:`closed_form`.
+        """
+        export_javascript(self.closed_form(scaler), path)
+
+    def javascript(self, scaler: Scaler | None = None) -> str:
+        """The policy as a JavaScript expression, to put into a page; it is an object of the same two functions.
+
+        The scaler and errors are as in :meth:`closed_form`.
+        """
+        return javascript(self.closed_form(scaler))
+
+
+class Deployable(Exportable):
     """A model and the weights of a solution, in control loops and on other machines."""
 
     learner: Any
@@ -28,10 +134,6 @@ class Deployable:
     solution_: Any
     n_features_in_: int
     scale_: Scale | None
-
-    @abstractmethod
-    def __call__(self, states: ArrayLike) -> Array:
-        """Actions (N, d) at states (N, n)."""
 
     def step(self, x: ArrayLike, out: Array | None = None) -> Array:
         """Predict for one state, without overhead: for control loops.
@@ -93,102 +195,13 @@ class Deployable:
         form = form if self.scale_ is None else self.scale_.form(form)
         return form if scaler is None else scaled(form, scaler)
 
-    def export_c(
-        self,
-        path: str | os.PathLike[str],
-        name: str | None = None,
-        *,
-        single: bool = False,
-        scaler: Scaler | None = None,
-        notes: Mapping[str, Any] | None = None,
-    ) -> None:
-        """Write the policy as a C source that needs only the mathematics of the standard library, and its header.
-
-        They are C99 and C++11, and offer ``void NAME_step(const double state[n], double action[d])``,
-        ``double NAME_support(const double state[n])``, and limits of states and speed. With ``NAME_SELF_TEST`` (in
-        capitals) defined, there is a ``main`` that compares the file with :meth:`predict`.
-
-        Parameters
-        ----------
-        path : str or path-like
-            Of the source; the header has the suffix ``.h``.
-        name : str, optional
-            What all names begin with, a C identifier; by default as the file is called.
-        single : bool
-            Compute in ``float`` rather than ``double``.
-        scaler : object, optional
-            As in :meth:`closed_form`.
-        notes : mapping, optional
-            What to say in the comment, as :func:`unconstrain.storage.load_notes` reads it from a policy's file.
-
-        Raises
-        ------
-        SettingError
-            For another name, if a number does not fit ``float``, and as :meth:`closed_form` does.
-        """
-        form = self.closed_form(scaler)
-        export_c(form, self._after(scaler), path, name, self._described(form, notes), single=single)
-
-    def export_onnx(
-        self,
-        path: str | os.PathLike[str],
-        *,
-        single: bool = False,
-        scaler: Scaler | None = None,
-        notes: Mapping[str, Any] | None = None,
-    ) -> None:
-        """Write the policy as an ONNX graph, ``states`` (N, n) to ``actions`` (N, d), in float64 or float32.
-
-        Needs the extra ``onnx``. Parameters and errors as in :meth:`export_c`; what is said goes into the metadata.
-        """
-        form = self.closed_form(scaler)
-        export_onnx(form, path, self._described(form, notes), single=single)
-
-    def export_ros2(
-        self,
-        folder: str | os.PathLike[str],
-        name: str | None = None,
-        *,
-        messages: Messages | None = None,
-        scaler: Scaler | None = None,
-        notes: Mapping[str, Any] | None = None,
-    ) -> None:
-        """Write a ROS 2 package with a node around the C source, and a loop in Python.
-
-        Other parameters and errors are as in :meth:`export_c`; the name is by default that of the folder.
-
-        Parameters
-        ----------
-        messages : {"joints", "pose"}, optional
-            Whether states are the positions of joints (``JointState`` in, ``Float64MultiArray`` out) or of a pose
-            (``PoseStamped`` in, ``TwistStamped`` out); by default of a pose where they are called x, y and z.
-        """
-        form = self.closed_form(scaler)
-        export_ros2(form, self._after(scaler), folder, name, self._described(form, notes), messages)
-
-    def _after(self, scaler: Scaler | None) -> Callable[[ArrayLike], Array]:
-        return self if scaler is None else lambda states: self(scaler.transform(np.asarray(states)))
-
-    def _described(self, form: ClosedForm, notes: Mapping[str, Any] | None) -> Description:
+    def describe(self, form: ClosedForm, notes: Mapping[str, Any] | None = None) -> Description:
+        """Columns, units and origin, by the notes of the policy's file, and what it was learnt by."""
         names = getattr(self, "feature_names_in_", None)
         told = {"recipe": {"states": None if names is None else list(names)}} | dict(notes or {})
         learner = type(self.learner).__name__ if self.learner is not None else "Robust"
         method = getattr(self.solution_, "method", "")
         return Description.of(form, f"{learner}: {method}" if method else learner, told)
-
-    def export_javascript(self, path: str | os.PathLike[str], *, scaler: Scaler | None = None) -> None:
-        """Write the policy as an ES module that needs nothing else, with ``policy(state)`` and ``support(state)``.
-
-        The scaler and errors are as in :meth:`closed_form`.
-        """
-        export_javascript(self.closed_form(scaler), path)
-
-    def javascript(self, scaler: Scaler | None = None) -> str:
-        """The policy as a JavaScript expression, to put into a page; it is an object of the same two functions.
-
-        The scaler and errors are as in :meth:`closed_form`.
-        """
-        return javascript(self.closed_form(scaler))
 
     def __getstate__(self) -> Any:
         """Leave out buffers, which are made again where they are needed."""

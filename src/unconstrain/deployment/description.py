@@ -43,6 +43,7 @@ class Description:
         given = recipe.get("actions") or [*map(speed_of, recipe.get("states") or ())]
         lines = {"learnt by": learnt, "relative to": ", ".join(f"{value:.6g}" for value in form.origin)}
         lines |= {name: _said(value) for name, value in notes.items()}
+        lines["guided"] = form.correction.promise if form.correction else ""
         lines["sha256"] = digest(form)
         actions = _named(given, form.sizes[1], "u")
         return cls(states, actions, units, {name: said for name, said in lines.items() if said})
@@ -65,7 +66,17 @@ class Description:
 def digest(form: ClosedForm) -> str:
     """SHA-256 of a closed form: the same for the same policy, another for another."""
     found = hashlib.sha256(repr(form.embedding.space).encode())
-    for table in (form.origin, form.maps, form.exponents, form.monomials, form.precisions, form.embedding.frame):
+    guide = form.correction
+    added = [] if guide is None else [*guide.tables.values(), np.array(list(guide.numbers.values()))]
+    for table in (
+        form.origin,
+        form.maps,
+        form.exponents,
+        form.monomials,
+        form.precisions,
+        form.embedding.frame,
+        *added,
+    ):
         if table is not None:
             found.update(f"{table.shape}".encode() + np.ascontiguousarray(table, np.float64).tobytes())
     return found.hexdigest()

@@ -11,7 +11,7 @@ from .filling import filled, template
 
 
 def export_javascript(form: ClosedForm, path: str | os.PathLike[str]) -> None:
-    """Write an ES module that exports ``policy(state)`` and ``support(state)``; see :func:`javascript`."""
+    """Write an ES module that exports what :func:`javascript` offers."""
     (_, d, models), n = form.sizes, form.columns
     fill = {
         "what": f"{n} states to {d} actions, {models} model{'s' * (models > 1)}",
@@ -24,7 +24,7 @@ def export_javascript(form: ClosedForm, path: str | os.PathLike[str]) -> None:
 
 
 def javascript(form: ClosedForm) -> str:
-    """JavaScript expression of an object with functions ``policy`` and ``support`` of one state.
+    """JavaScript expression of an object with functions ``policy``, ``support``, and ``under`` of a projection as well.
 
     Where there are no kernels, ``support`` is null.
     """
@@ -39,6 +39,9 @@ def formula(form: ClosedForm) -> str:
     if form.embedding.frame is not None:
         plain["frame"] = form.embedding.frame.tolist()
         plain["factors"] = [_factor(factor) for factor in form.embedding.space.factors]
+    if form.correction is not None:
+        tables = {name: table.tolist() for name, table in form.correction.tables.items()}
+        plain["correction"] = {"kind": form.correction.kind, **tables, **form.correction.numbers}
     return json.dumps(plain, allow_nan=False)
 
 

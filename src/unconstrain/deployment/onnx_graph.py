@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from functools import partial, reduce, singledispatch
 from typing import Any
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..base import files
 from ..base.arrays import Array, require_extra
-from ..models import ClosedForm, spaces
+from ..models import ClosedForm, Correction, spaces
 from .description import Description
 
 OPSET = 17
@@ -47,20 +48,26 @@ def onnx_model(form: ClosedForm, described: Description, *, single: bool = False
     from onnx import TensorProto, checker, helper
 
     n, d, _ = form.sizes
+    to = "actions" if form.correction is None else "wanted"
     graph = _Graph(np.float32 if single else np.float64)
     relative = graph.add("Sub", _coordinates(graph, form), graph.constant("origin", form.origin))
     if form.exponents is not None:
         exponents = graph.affine(relative, form.exponents[:, :n].T, form.exponents[:, n], "exponents")
-        _blended(graph, form, relative, graph.add("Softmax", exponents, axis=-1))
+        _blended(graph, form, relative, graph.add("Softmax", exponents, axis=-1), to)
     elif form.monomials is not None:
-        _polynomial(graph, form, relative, form.monomials)
+        _polynomial(graph, form, relative, form.monomials, to)
     else:
-        graph.affine(relative, form.maps[0, :, :n].T, form.maps[0, :, n], "map", to="actions")
+        graph.affine(relative, form.maps[0, :, :n].T, form.maps[0, :, n], "map", to=to)
+    if form.correction is not None:
+        _corrected(graph, form.correction)
     kind = TensorProto.FLOAT if single else TensorProto.DOUBLE
     made = helper.make_graph(
         graph.nodes,
         "unconstrain_policy",
-        [helper.make_tensor_value_info("states", kind, ["N", form.columns])],
+        [
+            helper.make_tensor_value_info("states", kind, ["N", form.columns]),
+            *([] if form.correction is None else [helper.make_tensor_value_info("projections", kind, ["M", d, d])]),
+        ],
         [helper.make_tensor_value_info("actions", kind, ["N", d])],
         graph.constants,
     )
@@ -106,11 +113,11 @@ def _of_quaternion(space: spaces.Sphere, graph: _Graph, columns: NDArray[np.intp
     return graph.add("MatMul", unit, graph.constant(f"{name}_rotation", spaces.ROTATION.T))
 
 
-def _blended(graph: _Graph, form: ClosedForm, relative: str, shares: str) -> None:
+def _blended(graph: _Graph, form: ClosedForm, relative: str, shares: str, to: str) -> None:
     n, d, models = form.sizes
     maps = graph.constant("maps", form.maps.reshape(models, -1))
     if not form.is_affine:
-        graph.add("MatMul", shares, maps, to="actions")
+        graph.add("MatMul", shares, maps, to=to)
         return
     # Each row of the blended map times (z, 1), without a change of shape: a runtime takes longer to begin with
     # a node than to do what little is in it.
@@ -120,11 +127,11 @@ def _blended(graph: _Graph, form: ClosedForm, relative: str, shares: str) -> Non
         "MatMul",
         graph.add("Mul", blend, tiled),
         graph.constant("sum", np.repeat(np.eye(d), n + 1, axis=0)),
-        to="actions",
+        to=to,
     )
 
 
-def _polynomial(graph: _Graph, form: ClosedForm, relative: str, monomials: NDArray[np.intp]) -> None:
+def _polynomial(graph: _Graph, form: ClosedForm, relative: str, monomials: NDArray[np.intp], to: str) -> None:
     n = len(form.origin)
     whole = graph.affine(relative, np.eye(n, n + 1), np.eye(n + 1)[n], "whole")  # (z, 1)
     factors = [
@@ -132,7 +139,56 @@ def _polynomial(graph: _Graph, form: ClosedForm, relative: str, monomials: NDArr
         for place, column in enumerate(monomials.T)
     ]
     terms = reduce(partial(graph.add, "Mul"), factors)
-    graph.add("MatMul", terms, graph.constant("map", form.maps[0].T), to="actions")
+    graph.add("MatMul", terms, graph.constant("map", form.maps[0].T), to=to)
+
+
+def _corrected(graph: _Graph, correction: Correction) -> None:
+    """From what is ``wanted`` to ``actions`` under ``projections`` (M, n, n), M = 1 or N; by default nothing holds."""
+    goal, steep = correction.goal, correction.weights[:, None] * correction.directions
+    projections = graph.constant("projections", np.eye(len(goal))[None])
+    column = graph.constant("column", np.array([2]))
+
+    def held(vectors: str) -> str:
+        return graph.add("Squeeze", graph.add("MatMul", projections, graph.add("Unsqueeze", vectors, column)), column)
+
+    z = graph.add("Sub", "states", graph.constant("goal", goal))
+    beyond = graph.add("Relu", graph.affine(z, correction.directions.T, -correction.offsets, "beyond"))
+    squares, weights = graph.add("Mul", beyond, beyond), graph.constant("weights", correction.weights[:, None])
+    slope = held(graph.add("MatMul", beyond, graph.constant("steep", steep)))
+    number = {name: graph.constant(name, np.array(value)) for name, value in correction.numbers.items()}
+    if correction.kind == "descent":
+        _descended(graph, number, held("wanted"), slope)
+        return
+    turning = held(graph.add("MatMul", z, graph.constant("turn", correction.turn.T)))
+    _circled(graph, number, held("wanted"), slope, turning, graph.add("MatMul", squares, weights))
+
+
+def _descended(graph: _Graph, number: Mapping[str, str], v: str, slope: str) -> None:
+    add, zero, one, two = graph.add, *(graph.constant(f"number_{each}", np.array(float(each))) for each in range(3))
+    half = add("Div", slope, two)
+    away = add("Add", v, half)
+    distance, depth = graph.length(away), graph.length(half)
+    allowed = add("Max", add("Sub", depth, number["pace"]), add("Div", depth, two))
+    ratio = add("Div", add("Mul", two, allowed), add("Max", distance, graph.tiny()))
+    moved = add("Sub", add("Mul", add("Max", add("Sub", ratio, one), zero), away), half)
+    add("Where", add("LessOrEqual", distance, allowed), v, moved, to="actions")
+
+
+def _circled(graph: _Graph, number: Mapping[str, str], v: str, slope: str, turning: str, twice: str) -> None:
+    add, one, two = graph.add, *(graph.constant(f"number_{each}", np.array(float(each))) for each in (1, 2))
+    steep, width = graph.length(slope), add("Mul", number["middle"], add("Sqrt", add("Max", twice, number["level"])))
+    off = add("Div", add("Sub", twice, number["level"]), add("Mul", two, add("Max", steep, width)))
+    outward = add("Div", slope, add("Max", steep, graph.tiny()))
+    speed, ends = graph.inner(outward, v), [add("Neg", add("Mul", number[name], off)) for name in ("slow", "fast")]
+    radial = add("Max", add("Min", *ends), add("Min", speed, add("Max", *ends)))
+    along = add("Sub", turning, add("Mul", graph.inner(outward, turning), outward))
+    pace = graph.length(along)
+    longest = add("Max", pace, add("Mul", number["rate"], width))
+    now = add("Div", graph.inner(along, v), longest)
+    low, high = (add("Mul", number[name], pace) for name in ("least", "most"))
+    kept = add("Sub", add("Max", low, add("Min", now, high)), now)
+    moved = add("Sum", v, add("Mul", add("Div", kept, longest), along), add("Mul", add("Sub", radial, speed), outward))
+    add("Mul", add("Min", one, add("Div", steep, width)), moved, to="actions")
 
 
 class _Graph:
@@ -148,7 +204,8 @@ class _Graph:
 
         table = np.asarray(values)
         kind = table.dtype if np.issubdtype(table.dtype, np.integer) else self.dtype
-        self.constants.append(numpy_helper.from_array(np.ascontiguousarray(table, kind), name))
+        if not any(each.name == name for each in self.constants):
+            self.constants.append(numpy_helper.from_array(np.ascontiguousarray(table, kind), name))
         return name
 
     def add(self, operator: str, *inputs: str, to: str = "", **settings: Any) -> str:
@@ -157,6 +214,19 @@ class _Graph:
         result = to or f"{operator.lower()}_{len(self.nodes)}"
         self.nodes.append(helper.make_node(operator, inputs, [result], **settings))
         return result
+
+    def inner(self, one: str, other: str) -> str:
+        """Inner products (N, 1) of rows."""
+        axis = self.constant("axis", np.array([1]))
+        return self.add("ReduceSum", self.add("Mul", one, other), axis, keepdims=1)
+
+    def length(self, vectors: str) -> str:
+        """Lengths (N, 1) of rows."""
+        return self.add("Sqrt", self.inner(vectors, vectors))
+
+    def tiny(self) -> str:
+        """What a length is at least where it divides."""
+        return self.constant("tiny", np.array(1e-30))
 
     def gathered(self, columns: NDArray[np.intp], name: str) -> str:
         """Some columns of the states."""

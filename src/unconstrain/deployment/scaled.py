@@ -22,7 +22,7 @@ def scaled(form: ClosedForm, scaler: Scaler) -> ClosedForm:
     Raises
     ------
     SettingError
-        If the scaler does anything else than to shift and scale each column, or states hold angles.
+        If the scaler does anything else than to shift and scale each column, states hold angles.
     """
     n = form.columns
     if form.embedding.frame is not None:

@@ -8,7 +8,7 @@ array([[0.5, 0.5]])
 
 from . import spaces
 from .features import Affine, FeatureMap, KMeansRBF, NormalisedRBF, Placeable, Polynomial
-from .formula import ClosedForm
+from .formula import ClosedForm, Correction
 from .model import Model
 from .receptive_fields import Everywhere, ReceptiveFields, choose_variance, cover
 from .scale import Scale
@@ -16,6 +16,7 @@ from .scale import Scale
 __all__ = [
     "Affine",
     "ClosedForm",
+    "Correction",
     "Everywhere",
     "FeatureMap",
     "KMeansRBF",

@@ -1,5 +1,6 @@
 """Closed form of a fitted policy, without estimator, moments or feature map."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,6 +9,42 @@ from numpy.typing import NDArray
 from ..base.arrays import Array
 from ..base.display import Shown, counted
 from .spaces import Embedding
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """What makes a policy's velocities arrive, at a goal or on a cycle, as numbers.
+
+    Parameters
+    ----------
+    kind : str
+        Of the formula: ``"descent"`` or ``"orbit"``, as described in :class:`~unconstrain.Guided`.
+    goal : ndarray, shape (n,)
+    directions : ndarray, shape (K, n)
+    offsets, weights : ndarray, shape (K,)
+        Of ``V(x) = ½ Σ w (aᵀ(x − x*) − b)₊²``.
+    numbers : mapping of str to float
+        The other constants of the formula, by name.
+    turn : ndarray, shape (n, n)
+        B of a cycle, else zero.
+    promise : str
+        What is guaranteed, in words.
+    """
+
+    kind: str
+    goal: Array
+    directions: Array
+    offsets: Array
+    weights: Array
+    numbers: Mapping[str, float]
+    turn: Array
+    promise: str
+
+    @property
+    def tables(self) -> dict[str, Array]:
+        """All numbers but the single ones, by name."""
+        names = ("goal", "directions", "offsets", "weights", "turn")
+        return {name: getattr(self, name) for name in names}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,6 +77,8 @@ class ClosedForm(Shown):
     precisions : ndarray, shape (m,), optional
         ``λ = 1 / σ²`` along each axis, which is ``slope_m`` over the centre of kernel m. The kernel of the nearest
         centre, the support of a state, is ``exp(max_m e_m − ½ Σ_i λ_i z_i²)``.
+    correction : Correction, optional
+        What is done to the actions afterwards.
 
     Examples
     --------
@@ -55,6 +94,7 @@ class ClosedForm(Shown):
     monomials: NDArray[np.intp] | None = None
     embedding: Embedding = field(default_factory=Embedding)
     precisions: Array | None = None
+    correction: Correction | None = None
 
     @property
     def sizes(self) -> tuple[int, int, int]:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..base.arrays import Array
 from ..base.display import Shown
+from ..models import Correction
 from ..risks import project
 from .potential import Potential, radius
 
@@ -43,6 +44,12 @@ class Descent(Shown):
             f"it. V falls with every Euler step of up to {self.dt:.3g} s, by ‖N ∇V‖ times {0.75 * self.pace:.3g} each "
             "second, or by 3/16 of its square where that is less. A constraint that moves may lift V."
         )
+
+    def correction(self) -> Correction:
+        """The same as numbers, for where there is no Python."""
+        table = self.potential
+        parts = table.goal, table.directions, table.offsets, table.weights
+        return Correction("descent", *parts, {"pace": self.pace}, np.zeros((0, len(table.goal))), self.promise)
 
     def spare(self, states: Array, velocities: Array, slope: Array) -> Array:
         """By how much V falls faster than it has to where ``N ∇V`` (N, n) is so, as a share of what that is made of."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 from ..base.arrays import Array, as_matrix, as_vector, check_at_least
 from ..base.display import Shown
 from ..base.errors import InvalidDataError, SettingError
-from ..models import spaces
+from ..deployment import Exportable
+from ..models import ClosedForm, spaces
 from ..recordings import Demonstration, stack
 from ..risks import project
 from .descent import Descent
@@ -43,12 +44,21 @@ class Moved:
         """Velocities (N, n)."""
         return self.policy(states - self.by)
 
+    def closed_form(self) -> ClosedForm:
+        """The formula elsewhere."""
+        form = _formula(self.policy)
+        return replace(form, origin=form.origin + self.by)
+
+    def describe(self, form: ClosedForm, notes: Mapping[str, Any] | None = None) -> Any:
+        """What is said of it."""
+        return self.policy.describe(form, notes)  # type: ignore[attr-defined]  # what has a formula says of it
+
     def step(self, x: ArrayLike, out: Array | None = None) -> Array:
         """Velocity at one state (n,)."""
         return _single(self.policy)(np.asarray(x) - self.by, out)
 
 
-class Guided(Shown):
+class Guided(Exportable, Shown):
     """A policy that arrives at a goal or on a cycle, from anywhere and under any constraint, by construction.
 
     **At a goal.** Along every movement a convex potential V falls (:class:`~unconstrain.motion.potential.Potential`),
@@ -125,14 +135,13 @@ class Guided(Shown):
         self.policy = policy
         if orbit is not None and not isinstance(orbit, str):
             given = as_matrix(orbit, "orbit")
-            self.aim_: Descent | Orbit = encircled(given, _velocities(policy, given))
+            self.aim_: Descent | Orbit = encircled([Demonstration(given, _velocities(policy, given))])
             return
         shown = _kept(policy) if demonstrations is None else demonstrations
         demos = [shown] if isinstance(shown, Demonstration) else list(shown)
-        states, actions, _ = stack(demos)
-        wanted = _velocities(policy, states)
+        wanted = _velocities(policy, stack(demos).states)
         round_ = orbit is not None or (goal is None and _repeat(demos))
-        self.aim_ = encircled(states, actions) if round_ else _descent(demos, wanted, goal, dt)
+        self.aim_ = encircled(demos) if round_ else _descent(demos, wanted, goal, dt)
 
     @property
     def potential_(self) -> Potential:
@@ -175,20 +184,32 @@ class Guided(Shown):
         other.aim_ = replace(self.aim_, potential=replace(self.potential_, goal=self.goal_ + way))
         return other
 
+    def closed_form(self, scaler: Any = None) -> ClosedForm:
+        """The policy in it as one formula, and the correction; see :meth:`~unconstrain.Policy.closed_form`.
+
+        Raises
+        ------
+        SettingError
+            If the policy in it has no formula, or a scaler is given.
+        """
+        if scaler is not None:
+            raise SettingError("scaler: a guided policy is guided in the units of its own states. Export without one.")
+        return replace(_formula(self.policy), correction=self.aim_.correction())
+
+    def describe(self, form: ClosedForm, notes: Mapping[str, Any] | None = None) -> Any:
+        """What is said of the formula where it is used."""
+        return self.policy.describe(form, notes)  # type: ignore[attr-defined]  # what has a formula says of it
+
     def step(self, x: ArrayLike, out: Array | None = None) -> Array:
         """Velocity at one state (n,), without overhead: for control loops; see :meth:`~unconstrain.Policy.step`."""
-        return self._step(x, out)
+        plain, guide = self._step
+        wanted = plain(x, out)
+        guide(x, wanted)
+        return wanted
 
     @cached_property
-    def _step(self) -> Callable[[ArrayLike, Array | None], Array]:
-        plain, guide = _single(self.policy), self.aim_.single()
-
-        def step(x: ArrayLike, out: Array | None = None) -> Array:
-            wanted = plain(x, out)
-            guide(x, wanted)
-            return wanted
-
-        return step
+    def _step(self) -> tuple[Callable[..., Array], Callable[[ArrayLike, Array], None]]:
+        return _single(self.policy), self.aim_.single()
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what is prepared for single steps."""
@@ -196,6 +217,15 @@ class Guided(Shown):
 
     def _summary(self) -> tuple[str, ...]:
         return type(self.policy).__name__, str(self.aim_)
+
+
+def _formula(policy: Any) -> ClosedForm:
+    """Closed form of the policy that is guided."""
+    if not hasattr(policy, "closed_form"):
+        raise SettingError(
+            f"policy: got {policy!r}, which has no formula to export. Guide a fitted policy of this package."
+        )
+    return cast(ClosedForm, policy.closed_form())
 
 
 def _single(policy: Callable[[Array], Array]) -> Callable[..., Array]:

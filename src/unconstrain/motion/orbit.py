@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import hypot, sqrt
+from operator import mul
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.arrays import Array
 from ..base.display import Shown, counted
+from ..models import Correction
 from ..recordings import Demonstration, stack
 from ..risks import project
 from .potential import Potential, spread_over
@@ -24,11 +26,16 @@ RUSH = 2.0
 MIDDLE = 0.2
 """Where V is as level as nearer to the middle than this share of the radius, motion is slower in proportion."""
 
-STRAY = 0.2
+STRAY = 0.02
 """The pace is that of the demonstrations to within this share."""
+
+WELL_SHOWN = 0.15
+"""Of the turning, what demonstrations say at least at this share of what they say best."""
 
 ROUND = 1e-3
 """Weight of a sphere beside the demonstrated states, where these say nothing of the shape."""
+
+_TINY = 1e-150
 
 _DIRECTIONS = 24
 """Of the slopes that the shape is made of, for each dimension."""
@@ -72,6 +79,14 @@ class Orbit(Shown):
             "it."
         )
 
+    def correction(self) -> Correction:
+        """The same as numbers, for where there is no Python."""
+        table, rate = self.potential, self.rate
+        numbers = {"level": self.radius**2, "middle": MIDDLE, "rate": rate, "slow": PULL * rate, "fast": RUSH * rate}
+        numbers |= {"least": 1.0 - STRAY, "most": 1.0 + STRAY}
+        parts = table.goal, table.directions, table.offsets, table.weights
+        return Correction("orbit", *parts, numbers, self.turn, self.promise)
+
     def spare(self, states: Array, velocities: Array, slope: Array) -> Array:
         """By how much the surface attracts more than it has to where ``N ∇V`` (N, n) is so, as a share of that."""
         off = self.potential(states) - 0.5 * self.radius**2
@@ -111,35 +126,42 @@ class Orbit(Shown):
 
     def single(self) -> Callable[[ArrayLike, Array], None]:
         """The same for one state (n,) and its velocity (n,), which is changed in place."""
-        table, n, rate = self.potential, len(self.turn), self.rate
-        directions, weighted = table.directions, table.weights[:, None] * table.directions
-        rows = np.concatenate([np.eye(n), self.turn, directions])
-        begin, zeros = rows @ table.goal, np.zeros(len(directions))
-        level = self.radius**2
+        n, maximum = len(self.turn), np.maximum
+        rows, floor, sums = self._rows()
+        slow, fast = PULL * self.rate, RUSH * self.rate
+        level, rate, least, most = self.radius**2, self.rate, 1.0 - STRAY, 1.0 + STRAY
 
         def guide(x: ArrayLike, wanted: Array) -> None:
-            seen = rows.dot(x)
-            seen -= begin
-            vectors = np.empty((4, n))  # z, B z, ∇V and what is wanted: all else is in their inner products
-            vectors[:2] = seen[: 2 * n].reshape(2, n)
-            np.maximum(seen[2 * n :], zeros).dot(weighted, out=vectors[2])
-            vectors[3] = wanted
-            (_, _, gz, _), (_, ww, gw, vw), (_, _, gg, vg), _ = vectors.dot(vectors.T).tolist()
-            # V is quadratic: 2 V = ∇Vᵀ z.
-            steep, least = max(sqrt(gg), 1e-150), MIDDLE * sqrt(max(gz, level))
-            off, speed = 0.5 * (gz - level) / max(steep, least), vg / steep
-            first, last = -PULL * rate * off, -RUSH * rate * off
-            radial = min(max(speed, min(first, last)), max(first, last))
-            across = gw / (steep * steep)
-            pace = sqrt(max(ww - across * gw, 0.0))
-            longest = max(pace, rate * least)
-            now = (vw - across * vg) / longest
-            kept = (min(max(now, (1.0 - STRAY) * pace), (1.0 + STRAY) * pace) - now) / longest
-            share = min(1.0, steep / least)
-            weights = np.array([0.0, share * kept, share * ((radial - speed) / steep - kept * across), share])
-            weights.dot(vectors, out=wanted)
+            # Of few numbers Python's sums take less time than NumPy's, and comparisons less than calls of min and max.
+            v, seen = wanted.tolist(), maximum(rows.dot(x), floor).dot(sums).tolist()
+            z, w, g = seen[:n], seen[n : 2 * n], seen[2 * n :]
+            gz, gw, gv, wv = sum(map(mul, g, z)), sum(map(mul, g, w)), sum(map(mul, g, v)), sum(map(mul, w, v))
+            steep, width = hypot(*g) or _TINY, MIDDLE * sqrt(gz if gz > level else level)  # ∇Vᵀ z = 2 V  # noqa: FURB136
+            off, speed, across = 0.5 * (gz - level) / (steep if steep > width else width), gv / steep, gw / steep  # noqa: FURB136
+            low, high = (-fast * off, -slow * off) if off > 0.0 else (-slow * off, -fast * off)
+            radial = low if speed < low else high if speed > high else speed  # noqa: FURB136
+            pace = sqrt(abs(hypot(*w) ** 2 - across**2))
+            longest = pace if pace > rate * width else rate * width  # noqa: FURB136
+            now = (wv - across * speed) / longest
+            kept = (least * pace if now < least * pace else most * pace if now > most * pace else now) - now  # noqa: FURB136
+            way = kept / longest
+            out, share = (radial - speed - way * across) / steep, steep / width if steep < width else 1.0
+            wanted[:] = [share * (a + way * b + out * c) for a, b, c in zip(v, w, g, strict=True)]
 
         return guide
+
+    def _rows(self) -> tuple[Array, Array, Array]:
+        """Of x all that is added up, what each is at least, and the sums: z, B z and ∇V."""
+        table, n = self.potential, len(self.turn)
+        rows = np.concatenate([np.eye(n), table.directions, np.zeros((1, n))])
+        floor = np.concatenate([np.full(n, -np.inf), table.directions @ table.goal, [1.0]])
+        sums = np.zeros((len(rows), 3 * n))
+        sums[:n, : 2 * n], sums[n:-1, 2 * n :] = (
+            np.hstack([np.eye(n), self.turn.T]),
+            table.weights[:, None] * table.directions,
+        )
+        sums[-1] = -np.concatenate([table.goal, floor[n:-1]]) @ sums[:-1]
+        return rows, floor, sums
 
     def _summary(self) -> tuple[str, ...]:
         return counted(len(self.turn), "state"), f"radius={self.radius:.4g}", f"rate={self.rate:.4g}"
@@ -156,8 +178,9 @@ def turns(demos: Sequence[Demonstration]) -> float:
     return float(abs(sum(np.angle(z[1:] * z[:-1].conj()).sum() for z in plane))) / (2.0 * np.pi * len(demos))
 
 
-def encircled(states: Array, velocities: Array) -> Orbit:
-    """The orbit that these states (N, n) are on, with the way round of velocities (N, n) there."""
+def encircled(demos: Sequence[Demonstration]) -> Orbit:
+    """The orbit that the states of demonstrations are on, with the way round of their velocities there."""
+    states, velocities, _ = stack(demos)
     middle = states.mean(axis=0)
     z = states - middle
     radius = float(np.sqrt((z**2).sum(axis=1).mean()))
@@ -166,8 +189,48 @@ def encircled(states: Array, velocities: Array) -> Orbit:
     weights = _level((np.maximum(z @ directions.T, 0.0) / radius) ** 2)
     used = weights > 0.0
     potential = Potential(middle, directions[used], np.zeros(int(used.sum())), weights[used])
-    turn = np.linalg.lstsq(z, velocities, rcond=1e-6)[0].T
+    turn = _turning(potential, demos, np.linalg.lstsq(z, velocities, rcond=1e-6)[0].T)
     return Orbit(potential, radius, turn, float(np.sqrt((velocities**2).sum(axis=1).mean())) / radius)
+
+
+def _turning(potential: Potential, demos: Sequence[Demonstration], plain: Array) -> Array:
+    """B (n, n) of which the part along the cycle is that of the demonstrations, and turns take as long.
+
+    Least squares of whole velocities are too slow: what is across the cycle, and what a plane takes away, counts as
+    well. So their part along it is fitted, and of B the plain one is left where that says little.
+    """
+    z, tangents, phases, velocities = map(
+        np.concatenate, zip(*(_round(potential, demo) for demo in demos), strict=True)
+    )
+    rows = (tangents[:, :, None] * z[:, None, :]).reshape(len(z), -1)
+    left = np.vecdot(tangents, velocities) - rows @ plain.ravel()
+    turn = plain.ravel() + np.linalg.lstsq(rows, left, rcond=WELL_SHOWN)[0]
+    turned = float((np.vecdot(phases, tangents) * (rows @ turn)).sum())
+    faster = float(np.vecdot(phases, velocities).sum()) / turned if turned else 1.0
+    return faster * turn.reshape(plain.shape)
+
+
+def _round(potential: Potential, demo: Demonstration) -> tuple[Array, Array, Array, Array]:
+    """Of one demonstration on its plane: z, unit vectors along the cycle, slopes of the phase, velocities; each (T, n).
+
+    Of one that goes round, the last whole turns, so that no part of the cycle counts more.
+    """
+    z, tiny = demo.states - potential.goal, np.finfo(float).tiny
+    plane = np.linalg.svd(z, full_matrices=False)[2][:2]
+    flat, slope = z @ plane.T @ [1.0, 1j], potential.gradient(demo.states) @ plane.T @ [1.0, 1j]
+    angle = np.unwrap(np.angle(flat))
+    back = np.abs(angle - angle[-1]) / (2.0 * np.pi)
+    last = back <= (np.floor(back[0]) or np.inf)
+    way = np.sign(angle[-1] - angle[0])
+    along, phase = (
+        way * 1j * each
+        for each in (slope / np.maximum(np.abs(slope), tiny), flat / np.maximum(np.abs(flat) ** 2, tiny))
+    )
+    return (
+        z[last],
+        *(np.column_stack([each.real, each.imag])[last] @ plane for each in (along, phase)),
+        demo.actions[last],
+    )
 
 
 def _level(beyond: Array) -> Array:

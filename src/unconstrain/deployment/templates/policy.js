@@ -5,10 +5,11 @@
  *
  *     action = sum_m s_m(x) (A_m z + b_m),   s_m = exp(e_m) / sum_k exp(e_k),   e_m = slope_m . z + offset_m.
  *
- * Returns policy(state), an array of actions, and support(state): 1 at the centre of a kernel, 0 far from all of them,
- * and null where the policy has no kernels.
+ * Returns policy(state), an array of actions; support(state): 1 at the centre of a kernel, 0 far from all of them,
+ * and null where the policy has no kernels; and under(state, projection), what is left of the action under a constraint
+ * with this projection onto its null space, an array of rows. A correction lets the policy arrive, free and so.
  */
-function policyOf({ origin, maps, exponents, monomials, precision, frame, factors }) {
+function policyOf({ origin, maps, exponents, monomials, precision, frame, factors, correction }) {
   const size = origin.length, actions = maps[0].length, terms = maps[0][0].length;
 
   /** Entries of the rotation matrix of a quaternion, by rows, over the square root of two. */
@@ -56,7 +57,7 @@ function policyOf({ origin, maps, exponents, monomials, precision, frame, factor
     return terms > 1 ? z : [1];
   }
 
-  function policy(state) {
+  function plain(state) {
     const z = relative(state), regressor = regressors(z), action = new Array(actions).fill(0);
     const logs = exponents ? exponents.map((slopes) => dot(slopes, z)) : [0];
     const largest = Math.max(...logs);
@@ -70,6 +71,49 @@ function policyOf({ origin, maps, exponents, monomials, precision, frame, factor
     return action.map((sum) => sum / total);
   }
 
+  const clip = (value, low, high) => Math.max(low, Math.min(high, value));
+
+  /** The velocity in the ball in which V falls, or mirrored at its surface; see the documentation. */
+  function descent(slope, z, twice, v, held) {
+    const half = held(slope.map((each) => each / 2)), away = v.map((each, i) => each + half[i]);
+    const distance = Math.sqrt(dot(away, away)), depth = Math.sqrt(dot(half, half));
+    const allowed = Math.max(depth - correction.pace, depth / 2);
+    if (distance <= allowed) return v;
+    const share = Math.max(0, 2 * allowed / distance - 1);
+    return away.map((each, i) => share * each - half[i]);
+  }
+
+  /** The speed towards a surface within bounds, and the pace along it. */
+  function orbit(slope, z, twice, v, held) {
+    const { turn, level, middle, rate, slow, fast, least, most } = correction;
+    const g = held(slope), w = held(turn.map((row) => dot(row, z)));
+    const steep = Math.sqrt(dot(g, g)), width = middle * Math.sqrt(Math.max(twice, level));
+    const off = (twice - level) / (2 * Math.max(steep, width));
+    const outward = g.map((each) => (steep > 0 ? each / steep : 0)), speed = dot(outward, v);
+    const radial = clip(speed, -(off > 0 ? fast : slow) * off, -(off > 0 ? slow : fast) * off);
+    const across = dot(outward, w), round = w.map((each, i) => each - across * outward[i]);
+    const pace = Math.sqrt(dot(round, round)), longest = Math.max(pace, rate * width), now = dot(round, v) / longest;
+    const way = (clip(now, least * pace, most * pace) - now) / longest, share = Math.min(1, steep / width);
+    return v.map((each, i) => share * (each + way * round[i] + (radial - speed) * outward[i]));
+  }
+
+  function corrected(state, held) {
+    const v = held(plain(state));
+    if (!correction) return v;
+    const { kind, goal, directions, offsets, weights } = correction;
+    const z = goal.map((each, i) => state[i] - each), slope = goal.map(() => 0);
+    let twice = 0;
+    directions.forEach((direction, k) => {
+      const beyond = Math.max(0, dot(direction, z) - offsets[k]);
+      twice += weights[k] * beyond * beyond;
+      direction.forEach((each, i) => { slope[i] += weights[k] * beyond * each; });
+    });
+    return { descent, orbit }[kind](slope, z, twice, v, held);
+  }
+
+  const policy = (state) => corrected(state, (v) => v);
+  const under = (state, projection) => corrected(state, (v) => projection.map((row) => dot(row, v)));
+
   function support(state) {
     if (!exponents || !precision) return null;
     const z = relative(state);
@@ -77,5 +121,5 @@ function policyOf({ origin, maps, exponents, monomials, precision, frame, factor
     return Math.exp(Math.min(0, nearest - 0.5 * precision.reduce((sum, each, i) => sum + each * z[i] * z[i], 0)));
   }
 
-  return { policy, support };
+  return { policy, support, under };
 }

@@ -68,8 +68,8 @@ class Wipe:
             ``contact_share`` of the time; ``force_mean`` and ``force_sd`` (N);
             ``frequency`` (turns per second); ``spread_m``, the rms distance
             from the middle of the cycle; ``drift_m`` from the middle of the
-            first cycle to that of the last; ``path_error_m``, the rms distance
-            from the planned path.
+            second cycle, as the first swings in, to that of the last;
+            ``path_error_m``, the rms distance from the planned path.
         """
         steps = np.diff(self.times)[:, None]
         motion = uc.Demonstration(self.positions[:-1], np.diff(self.positions, axis=0) / steps)
@@ -80,7 +80,7 @@ class Wipe:
             "force_sd": float(self.forces.std()),
             "frequency": abs(turning(motion, self.plate.rotation[:, 2])),
             "spread_m": _spread(self.positions),
-            "drift_m": float(np.linalg.norm(middles[-1] - middles[0])),
+            "drift_m": float(np.linalg.norm(middles[-1] - middles[:2][-1])),
             "path_error_m": _distance(self.positions, self.planned),
             "cycles": float(len(middles)),
         }

@@ -30,6 +30,9 @@ SEEN = PLATES[3]
 NOT_RECORDED = Plate(-12.0, 24.0)
 """No recorded bout has a tilt near this one."""
 
+TILTED = 45.0
+"""A hand turns at another pace on surfaces that are tilted by more than this against the plate, degrees."""
+
 MEASURES = (
     "contact_share", "force_mean", "force_sd", "frequency", "spread_m", "drift_m", "path_error_m", "cycles",
 )  # fmt: skip
@@ -113,7 +116,7 @@ def jobs(settings: Settings, wiped: Sequence[Plate], splits: Sequence[Split]) ->
         ]
     surfaces = [surface for split in splits for surface in split.held_out]
     policy = fitted(settings, surfaces)["robust"] if wiped else None
-    return [(settings, 0, policy, surfaces, plate, surfaces, False) for plate in wiped]
+    return [(settings, 0, policy, near, plate, near, False) for plate in wiped for near in [_near(plate, surfaces)]]
 
 
 def reproduce(
@@ -157,6 +160,13 @@ def _on_cycle(settings: Settings, surfaces: Sequence[Surface]) -> list[uc.Demons
     """Where people went round, and simulated strokes once they have swung in."""
     demos = [demo for surface in surfaces for demo in surface.demonstrations]
     return demos if settings.real else [one for demo in demos for one in strokes(settings).settled(demo)]
+
+
+def _near(plate: Plate, surfaces: Sequence[Surface]) -> list[Surface]:
+    """Surfaces that are tilted about as the plate, whose cycle and pace are kept; where there is none, all."""
+    least, normal = np.cos(np.radians(TILTED)), plate.rotation[:, 2]
+    near = [surface for surface in surfaces if abs(surface.normals[0]["plane"] @ normal) >= least]
+    return near or list(surfaces)
 
 
 def _on(plate: Plate, surfaces: Sequence[Surface]) -> list[Surface]:
