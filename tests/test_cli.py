@@ -1132,7 +1132,8 @@ def test_inspect_says_how_a_file_was_read(tmp_path):
 
 def test_doctor_finds_everything_that_the_tests_need():
     found = {one["what"]: one for one in json.loads(run("doctor", "--json"))}
-    assert list(found) == ["Python", "viz", "data", "formats", "arm", "sim", "onnx", "cluster", "arrays", "graphics"]
+    extras = ("viz", "data", "formats", "arm", "sim", "onnx", "rerun", "live", "cluster", "arrays")
+    assert list(found) == ["Python", *extras, "graphics"]
     assert found["graphics"]["found"] in ("egl", "osmesa", "the system's own")
     assert all(one["mend"] == "" for one in found.values())
     assert run("doctor").startswith("✔ Everything is there.\n")
@@ -1150,7 +1151,7 @@ def test_doctor_tells_how_to_fix_what_is_missing(monkeypatch):
     assert fixes["viz"] == "pip install 'unconstrain[viz]'"
     assert fixes["graphics"] == "apt-get install libegl1 libegl-mesa0"
     said = run("doctor").splitlines()
-    assert said[0] == "! 2 of 10 are missing something."
+    assert said[0] == "! 2 of 12 are missing something."
     assert [line.strip() for line in said[-2:]] == list(filter(None, fixes.values()))  # each on a line, to be pasted
     assert max(map(len, said)) <= 100
     versions["mujoco"] = None

@@ -12,7 +12,6 @@ import click
 
 import unconstrain as uc
 
-from ..base.arrays import require_extra
 from ..base.display import counted
 from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainError
 from ..base.files import write
@@ -143,6 +142,8 @@ def _check_asked(live: bool, rrd: str | None, robot: str | None, tip: str | None
     if robot is not None and not live and rrd is None:
         raise SettingError("--robot: belongs to --live and --rrd; the page shows the states as they are.")
     if live:
+        from ..base.arrays import require_extra
+
         require_extra("viser", "live")
 
 
