@@ -10,7 +10,7 @@ DEV_STAMP := $(VENV)/.installed-dev
 DEMO_DIR := build/demo
 DOCS_DIR := build/docs
 
-.PHONY: help demo test check fuzz house docs bench bench-gpu clean
+.PHONY: help demo test check fuzz house docs numbers bench bench-gpu clean
 .DELETE_ON_ERROR:
 unexport PYTHONDONTWRITEBYTECODE  # each process that a test starts would compile the package again
 
@@ -36,9 +36,13 @@ house: $(DEV_STAMP) ## print the plan of the rooms and its figures; HOUSE=--walk
 	@$(BIN)/python scripts/house.py $(HOUSE)
 
 docs: $(DEV_STAMP) ## build the documentation; warnings are errors
+	@$(BIN)/python scripts/measured.py
 	@rm -rf docs/generated  # pages of names that are gone would stay
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs $(DOCS_DIR)
 	@echo "The documentation is in $(CURDIR)/$(DOCS_DIR)/index.html"
+
+numbers: $(DEV_STAMP) ## write the figures of README and docs from docs/results; RUNS=FOLDER takes in runs first
+	@$(BIN)/python scripts/measured.py $(RUNS)
 
 fuzz: $(DEV_STAMP) ## attack what is promised for a minute; FUZZ=--long until it is as often as docs/reliability says
 	@$(BIN)/python tests/fuzz.py $(FUZZ)

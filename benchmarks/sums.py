@@ -126,6 +126,7 @@ def parametric(per_axis: int) -> list[Row]:
                 row(f"{name}: plain NumPy, one threshold", seconds[3], "s"),
                 row(f"{name}: plain NumPy / ours, one threshold", ratio(times, 3, 4), "×", 4, 10, more_is_better=True),
                 row(f"{name}: plain NumPy / whole fit", ratio(times, 3, 2), "×", more_is_better=True),
+                row(f"{name}: plain NumPy / floor", ratio(times, 3, 0), "×"),
             ]
     return [*rows, *on_all_threads(name, calls[2], seconds[2])]
 
@@ -159,6 +160,7 @@ def local() -> list[Row]:
         seconds = np.median(times, axis=0)
     return [
         row(f"{name}: one product Wᵀ(vech φφᵀ ⊗ vech ûûᵀ), formed before, the floor", seconds[0], "s"),
+        row(f"{name}: gather", seconds[1], "s"),
         row(f"{name}: gather / floor", ratio(times, 1, 0), "×", 3.0, 1.5),
         row(f"{name}: whole fit, 5 folds, all thresholds", seconds[2], "s", 0.6, 0.25),
         *on_all_threads(name, calls[2], seconds[2]),

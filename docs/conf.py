@@ -1,8 +1,12 @@
 """How the documentation is built; see the `docs` target of the Makefile."""
 
+import json
 from importlib.metadata import version as installed_version
 from os import environ
 from pathlib import Path
+
+from docutils import nodes
+from sphinx.util.docutils import ReferenceRole
 
 project = "unconstrain"
 author = "The unconstrain authors"
@@ -46,6 +50,7 @@ sphinx_gallery_conf = {
 html_theme = "pydata_sphinx_theme"
 html_title = "unconstrain"
 html_static_path = ["_static"]
+html_extra_path = ["results"]
 html_css_files = ["custom.css"]
 html_show_sourcelink = False
 # Pages without pages below them need no list of these.
@@ -77,8 +82,20 @@ html_theme_options = {
 }
 
 
+class Measured(ReferenceRole):
+    """A figure, as a link to the run that it is from; ``make numbers`` holds it to what that found."""
+
+    def run(self):
+        run, _, name = self.target.partition(" ")
+        said = json.loads((Path(__file__).parent / "results" / f"{run}.json").read_text("utf-8"))
+        node = nodes.reference(self.rawtext, self.title, refuri=f"{run}.json", internal=True, classes=["measured"])
+        node["reftitle"] = f"{' '.join(name.split())}. {said['command']}, {said['date']}"
+        return [node], []
+
+
 def setup(app):
-    """Write the pages that run by themselves beside those of the documentation."""
+    """Know measured figures; write the pages that run by themselves beside those of the documentation."""
+    app.add_role("measured", Measured())
     app.connect("build-finished", _write_pages)
 
 

@@ -575,7 +575,8 @@ def test_rollout_stays_on_a_plane(policy):
 def test_rollout_writes_what_it_would_print(policy, tmp_path):
     printed = run("rollout", policy, "--start", "0.5,0", "--steps", 5)
     assert run("rollout", policy, "--start", "0.5,0", "--steps", 5, "-o", "-") == printed
-    assert not run("rollout", policy, "--start", "0.5,0", "--steps", 5, "-o", tmp_path / "path.csv")
+    said = run("rollout", policy, "--start", "0.5,0", "--steps", 5, "-o", tmp_path / "path.csv")
+    assert said == f"movement: {tmp_path / 'path.csv'}\n"
     assert (tmp_path / "path.csv").read_text() == printed
 
 
@@ -626,13 +627,21 @@ def test_export_calls_the_c_function_as_told(policy, tmp_path):
 
 def test_export_writes_a_package_for_ros(policy, tmp_path):
     said = run("export", policy, "--ros2", tmp_path / "swing", "--messages", "joints")
-    assert said == f"ROS 2 package: {tmp_path / 'swing'}\n"
+    assert said.startswith("✔ Explains ")
+    assert said.endswith(f"ROS 2 package: {tmp_path / 'swing'}\n")
     assert 'joints: ["x", "y"]' in (tmp_path / "swing" / "config" / "swing.yaml").read_text()
     assert "swing: is there" in refused("export", policy, "--ros2", tmp_path / "swing")
     assert "expected three of each" in refused("export", policy, "--ros2", tmp_path / "other", "--messages", "pose")
     assert "double precision" in refused("export", policy, "--ros2", tmp_path / "other", "--float")
     assert "got nothing to write to" in refused("export", policy)
     assert not (tmp_path / "other").exists()
+
+
+def test_export_as_json_says_the_same(policy, tmp_path):
+    told = json.loads(run("export", policy, "-o", tmp_path / "swing.c", "--json"))
+    assert {"C source": str(tmp_path / "swing.c"), "header": str(tmp_path / "swing.h")}.items() <= told.items()
+    assert told["verdict"]["mark"] == json.loads(run("info", policy, "--json"))["verdict"]["mark"] == "good"
+    assert "-DSWING_SELF_TEST swing.c" in told["verdict"]["next"]
 
 
 def test_export_refuses_other_suffixes_and_names_where_there_are_none(policy, tmp_path):
@@ -673,14 +682,14 @@ def bad(folder, what):
         (
             lambda at: bad(at, "hole"),
             (
-                "'hole', row 7, column 'y': found nan (1 such cells in the selected columns), expected finite numbers. "
+                "'hole', row 7, column 'y': found nan (1 such cell in the selected columns), expected finite numbers. "
                 "Remove or repair these rows first."
             ),
         ),
         (
             lambda at: bad(at, "nan"),
             (
-                "'nan', row 7, column 'y': found nan (1 such cells in the selected columns), expected finite numbers. "
+                "'nan', row 7, column 'y': found nan (1 such cell in the selected columns), expected finite numbers. "
                 "Remove or repair these rows first."
             ),
         ),
@@ -804,8 +813,8 @@ def test_a_policy_file_that_is_not_ours_is_refused(files, tmp_path, command):
     for name, sentence in (
         ("none.npz", "no such file, expected a policy file."),
         ("", "a folder, expected a policy file."),
-        ("pickle.npz", "is no policy file, or a damaged one. Expected a file that save() wrote."),
-        ("plain.npz", "was not written by unconstrain. Expected a file that save() wrote."),
+        ("pickle.npz", "is no policy file, or a damaged one. Expected a file that 'unconstrain fit' or save() wrote."),
+        ("plain.npz", "was not written by unconstrain. Expected a file that 'unconstrain fit' or save() wrote."),
         ("new.npz", "holds a policy that is not fitted. Fit it before saving."),
     ):
         path = tmp_path / name
@@ -1135,7 +1144,7 @@ def test_doctor_finds_everything_that_the_tests_need():
     extras = ("viz", "data", "formats", "arm", "sim", "onnx", "rerun", "live", "cluster", "arrays")
     assert list(found) == ["Python", *extras, "graphics"]
     assert found["graphics"]["found"] in ("egl", "osmesa", "the system's own")
-    assert all(one["mend"] == "" for one in found.values())
+    assert all(one["fix"] == "" for one in found.values())
     assert run("doctor").startswith("✔ Everything is there.\n")
 
 

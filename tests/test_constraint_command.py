@@ -213,3 +213,19 @@ def test_it_names_the_mechanism_of_a_door(tmp_path):
     assert "radius 0.71" in line
     assert "The mechanism" in page.read_text()
     assert "radius 0.71" in page.read_text()
+
+
+def test_mechanisms_that_differ_stand_in_a_table(tmp_path):
+    rng, time = np.random.default_rng(0), np.linspace(0, 9, 150)
+    for number, tilt in enumerate((0.0, 0.4)):
+        flat = np.column_stack([0.1 * np.cos(3 * time), 0.12 * np.sin(2 * time)])
+        plate = flat @ [[1, 0, 0], [0, np.cos(tilt), np.sin(tilt)]] + 0.001 * rng.standard_normal((150, 3))
+        table = np.column_stack([time, plate])
+        np.savetxt(tmp_path / f"plate_{number}.csv", table, delimiter=",", header="t,x,y,z", comments="")
+    page = tmp_path / "plates.html"
+    paths = sorted(tmp_path.glob("*.csv"))
+    told = json.loads(run("constraint", *paths, "-o", tmp_path / "p.npz", "--report", page, "--json"))
+    assert told["mechanism"].startswith("a plane for each of 2 demonstrations, against")
+    assert list(told["mechanisms"]) == ["plate_0", "plate_1"]
+    assert all(text.startswith("a plane through") for text in told["mechanisms"].values())
+    assert page.read_text().count("a plane through") == 2

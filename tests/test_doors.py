@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import fuzz
 import unconstrain as uc
 from unconstrain import cli
+from unconstrain.base.display import listening
 from unconstrain.base.errors import InvalidDataError, ReadError, SettingError
 from unconstrain.base.foreign import check_size, ours_alone
 from unconstrain.cli import progress
@@ -202,6 +203,18 @@ def test_work_that_takes_long_says_so(tmp_path, monkeypatch):
     ran = CliRunner().invoke(cli.main, ["fit", str(tmp_path / "a.csv"), "--model", "affine", "-o", str(tmp_path / "p")])
     assert ran.exit_code == 0
     assert "reading, placing, learning: ... (0 s)" in ran.stderr
+
+
+@pytest.mark.parametrize("learner", [uc.Robust(), uc.Hybrid()], ids=["robust", "hybrid"])
+def test_a_fit_counts_off_its_folds_to_who_listens(learner):
+    heard = []
+    policy, groups = uc.ParametricPolicy(uc.Affine(), learner, uc.Folds(3)), np.arange(len(STATES)) % 3
+    with listening(lambda what, number, of: heard.append((what.rpartition(" ")[2], number, of))):
+        policy.fit(STATES, ACTIONS, groups=groups)
+    folds = [(number, of) for what, number, of in heard if what == "fold"]
+    assert folds[:3] == [(1, 3), (2, 3), (3, 3)]
+    policy.fit(STATES, ACTIONS, groups=groups)  # nobody listens
+    assert len([one for one in heard if one[0] == "fold"]) == len(folds)
 
 
 def test_what_a_cluster_raises_is_one_sentence():

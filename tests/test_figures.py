@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from seen import contrast
 from unconstrain.base.errors import MissingExtraError
 from unconstrain.pages import figures
+from unconstrain.pages.figures.compact import compact
 from unconstrain.pages.figures.planes import arrow_lines, broken, clipped
 from unconstrain.pages.figures.style import INK, MARKERS, RULE, described, power, readable, svg
 from unconstrain.paper.figures import charts, overview, plates
@@ -247,3 +248,32 @@ def test_without_matplotlib_pictures_say_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.style", None)
     with pytest.raises(MissingExtraError, match=r"'matplotlib', which is not installed.*unconstrain\[viz\]"):
         figures.bars(["a"], {"direct": [1.0]}, title="", label="")
+
+
+class TestCompact:
+    """The same picture in fewer bytes."""
+
+    @given(st.lists(st.tuples(st.sampled_from("MLQC"), st.lists(st.floats(-999, 999), min_size=6, max_size=6))))
+    def test_a_path_ends_every_segment_where_it_did(self, drawn):
+        segments = [
+            ("M", [0.0, 0.0]),
+            *((letter, at[: {"M": 2, "L": 2, "Q": 4, "C": 6}[letter]]) for letter, at in drawn),
+        ]
+        path = " ".join(letter + " " + " ".join(f"{value:f}" for value in at) for letter, at in segments)
+        [short] = re.findall(r' d="([^"]*)"', compact(f'<path d="{path} z"/>'))
+        found, at, letter = [], np.zeros(2), ""
+        tokens = re.findall(r"[MlqcZz]|-?(?:\d+\.?\d*|\.\d+)", short)
+        while tokens[0] != "z":
+            letter = tokens.pop(0) if tokens[0].isalpha() else letter
+            count = {"M": 2, "l": 2, "q": 4, "c": 6}[letter]
+            points = np.array([float(tokens.pop(0)) for _ in range(count)]).reshape(-1, 2)
+            at = (points if letter == "M" else at + points)[-1]
+            found.append(at)
+        wanted = [np.array(points[-2:]) for _, points in segments]
+        np.testing.assert_allclose(found, wanted, atol=0.051)
+        assert len(short) <= len(path) + 2
+
+    def test_groups_that_say_nothing_go(self):
+        assert compact('<g>\n<g data-key="a">\n<g>\n<path d="M 1 2 L 3 4"/>\n</g>\n</g>\n</g>') == (
+            '\n<g data-key="a">\n<path d="M1 2l2 2"/>\n</g>\n'
+        )

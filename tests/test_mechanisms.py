@@ -182,7 +182,7 @@ def test_demonstrations_share_a_mechanism_or_have_one_each_as_the_data_say():
     assert (found.kind, len(found.candidates[0].mechanisms)) == ("plane", 2)
     for k, mechanism in enumerate(found.candidates[0].mechanisms):
         assert_allclose(abs(mechanism.axis), np.abs([0, -np.sin(0.3 * k), np.cos(0.3 * k)]), atol=5e-3)
-    assert found.sentence.startswith("one for each of 2 demonstrations: a plane through")
+    assert found.sentence.startswith("a plane for each of 2 demonstrations: a plane through")
 
 
 def test_the_order_of_demonstrations_changes_nothing():

@@ -394,7 +394,7 @@ def test_a_missing_cell_is_refused_only_in_selected_columns(bad: float) -> None:
     values[1, 1] = bad
     recording = Recording(("x", "force", "vx"), values, None, "wipe")
     assert len(only(prepare(recording))) == 3
-    with pytest.raises(InvalidDataError, match=r"'wipe', row 1, column 'force': found (nan|inf) \(1 such cells in the"):
+    with pytest.raises(InvalidDataError, match=r"'wipe', row 1, column 'force': found (nan|inf) \(1 such cell in the"):
         prepare(recording, Recipe(states=("x", "force"), actions=("vx",)))
 
 

@@ -221,7 +221,7 @@ class TestPages:
         assert "<p><i>&lt;b&gt;</i></p>" in html.paragraph(html.markup("<i>{}</i>").format("<b>"))
 
     def test_without_graphics_the_arm_is_drawn_as_lines(self, results, monkeypatch):
-        def fail(_):
+        def fail(*_):
             raise SettingError("no graphics")
 
         monkeypatch.setattr(washing_arm, "film", fail)

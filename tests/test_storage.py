@@ -377,7 +377,8 @@ def test_a_plain_archive_was_not_written_by_us(tmp_path):
     with pytest.raises(ModelFileError) as caught:
         uc.load(tmp_path / "plain.npz")
     assert str(caught.value) == (
-        f"{tmp_path / 'plain.npz'}: was not written by unconstrain. Expected a file that save() wrote."
+        f"{tmp_path / 'plain.npz'}: was not written by unconstrain. Expected a file that 'unconstrain fit' or save() "
+        "wrote."
     )
 
 
@@ -386,7 +387,9 @@ def test_a_plain_archive_was_not_written_by_us(tmp_path):
 )
 def test_another_header_was_not_written_by_us(tmp_path, header):
     np.savez(tmp_path / "other.npz", header=np.array(header))
-    with pytest.raises(ModelFileError, match=r"was not written by unconstrain\. Expected a file that save\(\) wrote"):
+    with pytest.raises(
+        ModelFileError, match=r"was not written by unconstrain\. Expected a file that 'unconstrain fit'"
+    ):
         uc.load(tmp_path / "other.npz")
 
 

@@ -62,7 +62,7 @@ VERSION = 3
 
 _FORMAT = "unconstrain-policy"
 _HEADER = "header"
-_EXPECTED = "a file that save() wrote"
+_EXPECTED = "a file that 'unconstrain fit' or save() wrote"
 _INCOMPLETE = "the policy in it is not complete"
 
 _KNOWN: dict[str, type] = {
@@ -366,7 +366,7 @@ def _read(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str, np.nd
         what = "a folder" if Path(path).is_dir() else "no such file"
         raise ModelFileError(f"{path}: {what}, expected a policy file.")
     if not zipfile.is_zipfile(path):
-        raise ModelFileError(f"{path}: is no policy file, or a damaged one. Expected a file that save() wrote.")
+        raise ModelFileError(f"{path}: is no policy file, or a damaged one. Expected {_EXPECTED}.")
     with (
         ours_alone(path, _EXPECTED, ModelFileError, "is no policy file, or a damaged one", kinds=True),
         Path(path).open("rb") as stream,  # opened here, because NumPy leaves a damaged one open
@@ -381,7 +381,7 @@ def _read(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str, np.nd
             raise ValueError(f"format {header['format']!r}")
         version = int(header["version"])
     except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise ModelFileError(f"{path}: was not written by unconstrain. Expected a file that save() wrote.") from error
+        raise ModelFileError(f"{path}: was not written by unconstrain. Expected {_EXPECTED}.") from error
     if version > VERSION:
         raise ModelFileError(
             f"{path}: is of format version {version}, and this release reads up to {VERSION}. Upgrade unconstrain."

@@ -1,9 +1,18 @@
-"""How objects that hold arrays show themselves: one line in a terminal, a small table in a notebook."""
+"""How objects that hold arrays show themselves, in a terminal and in a notebook; and how far long work has come."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from html import escape
-from typing import Any
+from typing import Any, TypeVar
+
+Listener = Callable[[str, int, int], None]
+"""Called with what is counted, such as ``"segments: fold"``, the number that begins, and of how many."""
+
+Item = TypeVar("Item")
+
+_listener: ContextVar[Listener | None] = ContextVar("listener", default=None)
 
 
 class Shown:
@@ -64,3 +73,26 @@ def listed(names: Sequence[str], most: int = 30) -> str:
     """Names with commas between, the first of many."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
+
+
+@contextmanager
+def listening(listener: Listener) -> Iterator[None]:
+    """Tell a listener what goes on inside the block, in its threads too."""
+    before = _listener.set(listener)
+    try:
+        yield
+    finally:
+        _listener.reset(before)
+
+
+def tell(what: str, number: int, of: int) -> None:
+    """Say that the so-manyth of some begins."""
+    if (listener := _listener.get()) is not None:
+        listener(what, number, of)
+
+
+def counted_off(items: Sequence[Item], what: str) -> Iterator[Item]:
+    """Each item, said as it begins."""
+    for number, item in enumerate(items, start=1):
+        tell(what, number, len(items))
+        yield item

@@ -282,8 +282,11 @@ def rollout(
         rows = None if output != "-" else _rows(path).tolist()
         told = None if verdict is None else verdict.to_json()
         click.echo(json.dumps({"columns": columns, "rows": rows, "output": output, "verdict": told}))
-    elif verdict is not None and (output != "-" or verdict.doubt):
+        return
+    if verdict is not None and (output != "-" or verdict.doubt):
         say_verdict(verdict, err=output == "-")
+    if output != "-":
+        say_written({"movement": output}, None)
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain reproduce table1 --trials 100 --out results")
@@ -343,7 +346,7 @@ def doctor(as_json: bool) -> None:
 
     found = examine()
     if as_json:
-        click.echo(json.dumps([one.to_json() for one in found], indent=2))
+        click.echo(json.dumps([one._asdict() for one in found], indent=2))
         return
     missing = [one for one in found if one.fix]
     sign = "! " if missing else "✔ "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 
@@ -65,19 +65,17 @@ def constraint(
     if recipe.angles:
         click.echo(f"Note: {', '.join(recipe.angles)} as unwrapped: a turn more is another state to it.", err=True)
     verdict = uc.evaluation.verdicts.of_constraint(learnt)
+    named = mechanism_of(demonstrations) if jacobian is None and _are_positions(recipe) else None
     if not as_json:
         say_verdict(verdict)
         click.echo(f"Learnt from {said_recipe(recipe, first)}.")
-        _say(learnt, "distance from it" if surface else "action")
-    named = mechanism_of(states, groups) if jacobian is None and _are_positions(recipe) else None
-    if named is not None and not as_json:
-        click.echo(f"Mechanism, if these are positions in m: {named}.")
+        _say(learnt, "distance from it" if surface else "action", named)
     uc.save(learnt, output, provenance(paths, recipe, first, **reading))
     if report is not None:
         from ..pages.constraint import constraint_page
 
         names = recipe.labels(first.units)[0]
-        write(report, constraint_page(learnt, demonstrations, Path(report).stem, names, named))
+        write(report, constraint_page(learnt, demonstrations, Path(report).stem, names, *(named or ())))
     written = {"constraint": output} | ({} if report is None else {"report": report})
     say_written(written, _told(learnt, verdict, named) if as_json else None)
 
@@ -89,7 +87,7 @@ def _check_asked(jacobian: str | None, tip: str | None, surface: bool, with_task
         raise SettingError("--surface: got --with-task or --jacobian too; positions alone show neither.")
 
 
-def _told(learnt: uc.LearntConstraint, verdict: uc.evaluation.verdicts.Verdict, named: str | None) -> dict[str, Any]:
+def _told(learnt: uc.LearntConstraint, verdict: uc.evaluation.verdicts.Verdict, named: Named | None) -> dict[str, Any]:
     choice = learnt.choice_
     return {
         "rank": learnt.rank_,
@@ -98,7 +96,8 @@ def _told(learnt: uc.LearntConstraint, verdict: uc.evaluation.verdicts.Verdict, 
         "features": choice.name,
         "candidates": dict(choice.candidates),
         "doubts": list(choice.doubts),
-        "mechanism": named,
+        "mechanism": None if named is None else named.summary,
+        "mechanisms": {} if named is None else dict(named.each),
         "verdict": verdict.to_json(),
     }
 
@@ -152,15 +151,26 @@ def known_arms() -> Any:
     return Arm
 
 
-def mechanism_of(positions: Any, groups: Any) -> str | None:
-    """Which mechanism may have held positions, in words; None where too little was recorded."""
+class Named(NamedTuple):
+    """What may have held some demonstrations, in words; and what each, with its name, where they differ."""
+
+    summary: str
+    each: list[tuple[str, str]]
+
+
+def mechanism_of(demonstrations: Sequence[uc.Demonstration]) -> Named | None:
+    """Which mechanism may have held positions; None where too little was recorded."""
+    positions, _, groups = uc.stack(demonstrations)
     every = -(-len(positions) // MOST_POSITIONS)
     try:
         found = uc.constraints.identify(positions[::every], groups=groups[::every])
     except InvalidDataError as error:
         click.echo(f"Note: no mechanism is named: {error}", err=True)
         return None
-    return found.sentence
+    names = [demonstrations[number].name for number in dict.fromkeys(groups[::every].tolist())]
+    held = found.candidates[0].mechanisms
+    each = [] if len(held) == 1 else [(name, one.sentence) for name, one in zip(names, held, strict=True)]
+    return Named(found.summary, each)
 
 
 def _are_positions(recipe: uc.Recipe) -> bool:
@@ -169,7 +179,7 @@ def _are_positions(recipe: uc.Recipe) -> bool:
     return recipe.actions is None and count in (2, 3) and recipe.space == uc.spaces.Euclidean(count)
 
 
-def _say(learnt: uc.LearntConstraint, what: str) -> None:
+def _say(learnt: uc.LearntConstraint, what: str, named: Named | None) -> None:
     choice = learnt.choice_
     smooth = f", smoothed with {choice.smoothness:g}" if choice.smoothness else ""
     click.echo(f"{learnt.rank_} of {choice.actions} directions held, by {choice.name} features{smooth}.")
@@ -181,3 +191,7 @@ def _say(learnt: uc.LearntConstraint, what: str) -> None:
     print_table(["features", "missed where held out"], rows)
     for doubt in choice.doubts:
         click.echo(f"Note: {doubt}", err=True)
+    if named is not None:
+        click.echo(f"Mechanism, if these are positions in m: {named.summary}.")
+    if named is not None and named.each:
+        print_table(["demonstration", "mechanism"], named.each)

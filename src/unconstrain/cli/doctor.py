@@ -29,10 +29,6 @@ class Finding(NamedTuple):
     found: str
     fix: str
 
-    def to_json(self) -> dict[str, str]:
-        """With the keys of ``doctor --json``, which programs may rely on."""
-        return {"what": self.what, "serves": self.serves, "found": self.found, "mend": self.fix}
-
 
 def examine() -> list[Finding]:
     """Find the versions of Python and the extras, and the back-end that renders the scene."""

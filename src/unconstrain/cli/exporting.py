@@ -10,22 +10,29 @@ import click
 import unconstrain as uc
 
 from ..base.errors import SettingError
+from .informing import verdict_of
+from .printing import option_for_json, say_verdict, say_written
 from .reading import fitted_policy
 from .writing import check_outputs, option_for_force
 
 
 class Target(NamedTuple):
-    """What a file is called, the method of a policy that writes it, and which options that takes."""
+    """What a file is called, the method of a policy that writes it, which options that takes, and what to do next."""
 
     what: str
     method: str
     takes: tuple[str, ...]
+    next: str
 
+
+_NEXT_C = "Let it test itself where it will run: cc -std=c99 -D{NAME}_SELF_TEST {file} -lm -o test && ./test"
+_NEXT_ONNX = "Run it on a recorded state, and compare with 'policy.predict'."
+_NEXT_ROS2 = "colcon build, then colcon test; let it run with the robot held still first."
 
 TARGETS = {
-    ".c": Target("C source", "export_c", ("name", "single", "notes")),
-    ".onnx": Target("ONNX graph", "export_onnx", ("single", "notes")),
-    ".js": Target("JavaScript module", "export_javascript", ()),
+    ".c": Target("C source", "export_c", ("name", "single", "notes"), _NEXT_C),
+    ".onnx": Target("ONNX graph", "export_onnx", ("single", "notes"), _NEXT_ONNX),
+    ".js": Target("JavaScript module", "export_javascript", (), "Import 'policy' and 'support' from it."),
 }
 """By the suffix of the file."""
 
@@ -44,6 +51,7 @@ TARGETS = {
     help="ROS 2: what states are; by default a pose where they are called x, y, z.",
 )
 @option_for_force
+@option_for_json
 def export(
     policy: str,
     output: str | None,
@@ -52,6 +60,7 @@ def export(
     single: bool,
     messages: Literal["joints", "pose"] | None,
     force: bool,
+    as_json: bool,
 ) -> None:
     """Write POLICY as C, ONNX, JavaScript or a ROS 2 package."""
     kind = "" if output is None else Path(output).suffix.lower()
@@ -59,15 +68,21 @@ def export(
     _check(output, kind, ros2, name, single)
     check_outputs((output, header, ros2), (policy,), force)
     learnt, notes = fitted_policy(policy, uc.Policy | uc.Guided), uc.storage.load_notes(policy)
+    written, then = {}, _NEXT_ROS2
+    if ros2 is not None:
+        learnt.export_ros2(ros2, name, messages=messages, notes=notes)
+        written["ROS 2 package"] = ros2
     if output is not None:
         target, options = TARGETS[kind], {"name": name, "single": single, "notes": notes}
         getattr(learnt, target.method)(output, **{option: options[option] for option in target.takes})
-        click.echo(f"{target.what}: {output}")
+        called = (name or Path(output).stem).upper()
+        written[target.what], then = output, target.next.format(NAME=called, file=Path(output).name)
     if header is not None:
-        click.echo(f"header: {header}")
-    if ros2 is not None:
-        learnt.export_ros2(ros2, name, messages=messages, notes=notes)
-        click.echo(f"ROS 2 package: {ros2}")
+        written["header"] = header
+    judged = verdict_of(learnt)._replace(doubt="States far from all data, where its support is near 0.", next=then)
+    if not as_json:
+        say_verdict(judged)
+    say_written(written, {"verdict": judged.to_json()} if as_json else None)
 
 
 def _check(output: str | None, kind: str, ros2: str | None, name: str | None, single: bool) -> None:

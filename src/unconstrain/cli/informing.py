@@ -38,9 +38,9 @@ def info(file: str, as_json: bool) -> None:
     held, notes = _loaded(file), uc.storage.load_notes(file)
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held), **_rest(notes)}
     if as_json:
-        click.echo(json.dumps(told, indent=2))
+        click.echo(json.dumps(told | {"verdict": verdict_of(held).to_json()}, indent=2))
         return
-    say_verdict(_verdict(held))
+    say_verdict(verdict_of(held))
     print_table(["", ""], [[name, _said(value)] for name, value in told.items() if value not in (None, [], {}, "")])
 
 
@@ -92,7 +92,8 @@ def _rest(notes: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in notes.items() if name not in ("recipe", "units")}
 
 
-def _verdict(held: Any) -> uc.evaluation.verdicts.Verdict:
+def verdict_of(held: Any) -> uc.evaluation.verdicts.Verdict:
+    """Judge a policy, constraint or guided policy by what it explained where held out."""
     if isinstance(held, uc.LearntConstraint):
         return uc.evaluation.verdicts.of_constraint(held)
     policy = innermost(held)

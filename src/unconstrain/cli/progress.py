@@ -10,8 +10,13 @@ from contextlib import contextmanager
 
 import click
 
+from ..base.display import listening
+
 Progress = Callable[[int, int | None], None]
 """Called with how much is done, and of how much, if that is known."""
+
+Say = Callable[[str, int, int | None], None]
+"""The same, and of what."""
 
 FIRST_S = 2.0
 """After so many seconds somebody may wonder; so often again where lines are written."""
@@ -19,42 +24,46 @@ FIRST_S = 2.0
 
 @contextmanager
 def shown(title: str) -> Iterator[Progress]:
-    """Show a bar, or a wheel as long as nobody says how much there is to do, and the time, while the block runs."""
-    with (_bar if sys.stderr.isatty() else _lines)(title) as progress:
-        yield progress
+    """Show a bar, or a wheel as long as nobody says how much there is to do, and the time, while the block runs.
+
+    Where what runs counts off its steps (:mod:`unconstrain.base.display`), they take the place of the title.
+    """
+    with (_bar if sys.stderr.isatty() else _lines)() as say, listening(say):
+        say(f"{title}:", 0, None)
+        yield lambda done, of: say(f"{title}:", done, of)
 
 
 @contextmanager
-def _bar(title: str) -> Iterator[Progress]:
+def _bar() -> Iterator[Say]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bar
 
     columns = SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
     with Bar(*columns, console=Console(file=sys.__stderr__), transient=True) as bar:
-        job = bar.add_task(title, total=None)
-        yield lambda done, of: bar.update(job, completed=done, total=of)
+        job = bar.add_task("", total=None)
+        yield lambda what, done, of: bar.update(job, description=what, completed=done, total=of)
 
 
 @contextmanager
-def _lines(title: str) -> Iterator[Progress]:
+def _lines() -> Iterator[Say]:
     """A line after two seconds, four, eight, ..."""
     finished, begun, counted = threading.Event(), time.monotonic(), [""]
 
-    def count(done: int, of: int | None) -> None:
-        counted[0] = f" {done:,}" if of is None else f" {done:,} of {of:,}"
+    def say(what: str, done: int, of: int | None) -> None:
+        counted[0] = f"{what} {done:,} of {of:,}" if of else f"{what} {done:,}" if done else what
 
     def tell() -> None:
         wait = FIRST_S
         while not finished.wait(wait):
             spent = time.monotonic() - begun
-            click.echo(f"{title}:{counted[0]} ... ({spent:.0f} s)", err=True)
+            click.echo(f"{counted[0]} ... ({spent:.0f} s)", err=True)
             wait = spent
 
     teller = threading.Thread(target=tell, daemon=True)
     teller.start()
     try:
-        yield count
+        yield say
     finally:
         finished.set()
         teller.join()

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array, check_at_least
+from ..base.display import tell
 from ..base.errors import SettingError
 from ..base.threads import workers
 from ..risks import FoldedMoments, Moments, Path, Quadratic, unvec, vec
@@ -54,13 +55,15 @@ def solve_at_threshold(
         Name of the learner.
     """
 
-    def judge(training: Moments, held_out: Moments) -> Array:
+    def judge(number: int) -> Array:
+        tell(f"{method}: fold", number + 1, len(rounds))
+        training, held_out = rounds[number]
         return judged(score_of(held_out), path_of(training).weights)
 
     whole = folds.whole
     # With nothing to hold out, the loss on the training data has to do.
     rounds = folds.rounds() or [(whole, whole)] if threshold is None else []
-    calls: list[Callable[[], Any]] = [partial(path_of, whole), *(partial(judge, *pair) for pair in rounds)]
+    calls: list[Callable[[], Any]] = [partial(path_of, whole), *(partial(judge, k) for k in range(len(rounds)))]
     models, size = vec(whole.cross).shape
     with workers() as threads:
         path, *scored = threads.run(calls, len(calls) * models * size**3)

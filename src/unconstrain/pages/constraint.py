@@ -28,6 +28,7 @@ def constraint_page(
     title: str,
     columns: Sequence[str] | None = None,
     mechanism: str | None = None,
+    each: Sequence[tuple[str, str]] = (),
 ) -> str:
     """Make the page of a learnt constraint.
 
@@ -42,6 +43,8 @@ def constraint_page(
         Names of the states.
     mechanism : str, optional
         What may have held them, in words.
+    each : sequence of pairs of str, optional
+        What held each demonstration, with its name, where they differ.
 
     Returns
     -------
@@ -72,12 +75,20 @@ def constraint_page(
         title,
         verdicts.of_constraint(learnt),
         html.words("constraint_lead"),
-        *([html.section("The mechanism", html.bullets([mechanism]))] if mechanism else []),
+        *_named(mechanism, each),
         *parts,
         *doubts,
         html.section("Numbers", html.tiles(tiles)),
         html.section("How its form was chosen", html.table(["features", "missed"], rows, note=note)),
     )
+
+
+def _named(mechanism: str | None, each: Sequence[tuple[str, str]]) -> list[html.Markup]:
+    if mechanism is None:
+        return []
+    note = "Positions in m, with half of their 95 % intervals."
+    table = [html.table(["demonstration", "mechanism"], each, note=note, left=2)] if each else []
+    return [html.section("The mechanism", html.paragraph(f"{mechanism[:1].upper()}{mechanism[1:]}."), *table)]
 
 
 def held_directions(

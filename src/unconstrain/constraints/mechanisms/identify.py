@@ -58,7 +58,13 @@ class Candidate(Shown):
     def sentence(self) -> str:
         """Each mechanism in words."""
         each = "; ".join(mechanism.sentence for mechanism in self.mechanisms)
-        return each if len(self.mechanisms) == 1 else f"one for each of {len(self.mechanisms)} demonstrations: {each}"
+        return each if len(self.mechanisms) == 1 else f"{self.summary}: {each}"
+
+    @property
+    def summary(self) -> str:
+        """One mechanism in words, or how many there are of which kind."""
+        count = len(self.mechanisms)
+        return self.mechanisms[0].sentence if count == 1 else f"a {self.kind} for each of {count} demonstrations"
 
     def _summary(self) -> tuple[str, ...]:
         return (self.sentence,)
@@ -114,7 +120,15 @@ class Identification(Shown):
     @property
     def sentence(self) -> str:
         """The verdict in words: what it is, or what it may be, and what the forces say."""
-        best, odds = self.candidates[0].sentence, f"{self.odds:.{0 if self.odds >= 10 else 1}f}:1"
+        return self._judged(self.candidates[0].sentence)
+
+    @property
+    def summary(self) -> str:
+        """The same, without each mechanism where every demonstration has its own."""
+        return self._judged(self.candidates[0].summary)
+
+    def _judged(self, best: str) -> str:
+        odds = f"{self.odds:.{0 if self.odds >= 10 else 1}f}:1"
         if self.odds > 1e4:
             odds = "more than 10000:1"
         if self.decided:

@@ -10,6 +10,7 @@ import scipy.linalg
 from scipy.stats import t as student
 
 from ...base.arrays import Array
+from ...base.display import counted_off
 from ...models import Model
 from ...risks import Quadratic, eigensystem, vec
 from ...training import Samples
@@ -48,7 +49,8 @@ def solution(chosen: Candidate, samples: Samples, everything: Samples, model: Mo
     free = free_probability(everything, everything.predict(chosen.weights), variance, mixture)
     evidence = shown(samples, policy, variance, free[everything.counts > 0.0])
     priors = _Priors(samples, evidence.seen, chosen.smoothness)
-    told = [_Told(chosen, evidence, priors, samples, m) for m in range(len(chosen.weights))]
+    models = counted_off(range(len(chosen.weights)), "uncertainty: local model")
+    told = [_Told(chosen, evidence, priors, samples, m) for m in models]
     belief = Belief(
         noise=float(np.sqrt(variance)),
         misfit=float(np.sqrt(_misfit(samples, variance))),
@@ -58,12 +60,12 @@ def solution(chosen: Candidate, samples: Samples, everything: Samples, model: Mo
         undetermined=np.stack([one.undetermined for one in told]),
         **more,
     )
-    models, d, p = chosen.weights.shape
+    count, d, p = chosen.weights.shape
     return Solution(
         chosen.weights,
         np.array([one.determined for one in told], dtype=np.intp),
         d * p,
-        np.zeros(models),
+        np.zeros(count),
         method=chosen.name,
         belief=_as_free_as_known(belief, everything, model),
     )

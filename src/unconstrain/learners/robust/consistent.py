@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array
+from ...base.display import counted_off
 from ...risks import (
     NOISE,
     Moments,
@@ -114,7 +115,7 @@ def least_error(name: str, samples: Samples, errors: Sequence[Quadratic], odds: 
     whole = reduce(_Objectives.plus, parts)
     balances = [whole.balanced(odds * worth, samples.sizes, d) for worth in (1.0, d * samples.regressors)]
     refits = []
-    for fold in range(len(parts)):
+    for fold in counted_off(range(len(parts)), f"{name}: fold"):
         rest = reduce(_Objectives.plus, parts[:fold] + parts[fold + 1 :] or parts)
         refits.append([rest.posterior(softness).weights(d) for softness, _ in balances])
     missed = [
@@ -178,7 +179,7 @@ class _Folds:
     def held_out(self, softnesses: Sequence[float], smooth: Quadratic, variance: float) -> tuple[Array, Array, Array]:
         """For K softnesses, cross-validated predictions (K, N, d); by R folds, mean square of ρ (R, K), and weights."""
         samples, refits = self._samples, []
-        for fold in range(len(self._parts)):
+        for fold in counted_off(range(len(self._parts)), "noise correction: fold"):
             rest = self.corrected(variance, without=fold)
             found = softened_minima(rest.consistent + smooth, rest.risk, softnesses)
             refits.append(unvec(np.moveaxis(found, -1, 0), samples.actions.shape[1]))

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array
+from ...base.display import counted_off
 from ...risks import Quadratic, inconsistency
 from ...training import Samples
 from .constants import EIGENVALUE_STANDARD_ERRORS, LEAST_MISFIT, LEFT_OUT, MOST_PARTS
@@ -72,7 +73,7 @@ def shown(samples: Samples, policy: Array, variance: float, free: Array) -> Evid
     unit, parts = _residual(samples, policy, noise, time), parts_of(samples)
     seen = _seen(samples, parts, noise, time)
     consistent, as_free, free = [], [], _of_free_demonstrations(samples, free)
-    for part in range(int(parts.max()) + 1):
+    for part in counted_off(range(int(parts.max()) + 1), "evidence: part"):
         rows = parts == part
         some = samples[rows]
         ones = np.ones(len(some))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array
+from ...base.display import counted_off
 from ...risks import inconsistency
 from ...training import Samples
 from .candidate import Candidate
@@ -77,7 +78,7 @@ def _without_each_fold(samples: Samples, best: _Optimum) -> Iterator[_Optimum]:
     """One step from the optimum of all without each fold, from sums that all folds share."""
     model = _GaussNewton(samples, samples.predict(best.weights), best.variance, best.mixture, best.smoothness)
     parts = [model.posterior(samples.folds == fold) for fold in range(int(samples.folds.max()) + 1)]
-    for fold in range(len(parts)):
+    for fold in counted_off(range(len(parts)), "likelihood: fold"):
         rest = reduce(add, (part for other, part in enumerate(parts) if other != fold or len(parts) == 1))
         yield best._replace(weights=rest.weights(samples.actions.shape[1]))
 

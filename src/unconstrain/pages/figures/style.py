@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import Array, require_extra
+from .compact import compact
 
 METHODS = ("direct", "inconsistency", "hybrid")
 
@@ -138,11 +139,11 @@ def svg(made: Any, width: int, alternative: str) -> str:
     text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text[text.index("<svg") :], flags=re.DOTALL)
     text = re.sub(r"\n\s*", "\n", text)
     text = re.sub(rf'<g id="{_KEY}([^"]*)"', r'<g data-key="\1"', re.sub(rf'<g id="(?!{_KEY})[^"]*"', "<g", text))
-    text = re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d)\d+|\n", r"\1", path[0]), text)
     for colour, variable in THEMED.items():
         text = text.replace(colour, variable)
     opening = re.search(r'viewBox="[^"]*"', text)[0]  # type: ignore[index]
-    return f'<svg {opening} role="img" aria-label="{escape(alternative)}">' + text[text.index(">") + 1 :]
+    opening += f""" font-family="'DejaVu Sans', sans-serif" role="img" aria-label="{escape(alternative)}\""""
+    return f"<svg {opening}>{compact(text[text.index('>') + 1 :])}"
 
 
 def described(made: Any) -> str:

@@ -42,9 +42,10 @@ def on_the_arm(result: Result) -> list[html.Markup]:
 
 def _pictures(shown: Reproduction, wipe: Wipe) -> html.Markup:
     name = f"plate {shown.plate.name}, which nobody {'wiped' if shown.demonstration is None else 'learnt from'}"
+    turn = 1.0 / wipe.measures()["frequency"]  # seconds; of one turn, a film repeats without a jump
     try:
         moving = parts.image(
-            "animation", animation(film(wipe)), "webp", f"The arm wipes a plate tilted {shown.plate.name}",
+            "animation", animation(film(wipe, turn)), "webp", f"The arm wipes a plate tilted {shown.plate.name}",
             f"The arm on {name}, as fast as it is. The line is the path of the sponge.",
         )  # fmt: skip
         if shown.demonstration is None:

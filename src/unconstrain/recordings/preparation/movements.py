@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array, as_matrix, as_vector, check_at_least
+from ...base.display import counted
 from ...base.errors import InvalidDataError, SettingError
 from ..demonstration import Demonstration, Recording, Source
 from ..remarks import Remark
@@ -326,8 +327,9 @@ def _finite(recording: Recording, names: Sequence[str], recipe: Recipe) -> Array
     if len(bad):
         row, column = bad[0]
         raise InvalidDataError(
-            f"'{recording.name}', row {row}, column {names[column]!r}: found {values[row, column]} ({len(bad)} such "
-            "cells in the selected columns), expected finite numbers. Remove or repair these rows first."
+            f"'{recording.name}', row {row}, column {names[column]!r}: found {values[row, column]} "
+            f"({counted(len(bad), 'such cell')} in the selected columns), expected finite numbers. "
+            "Remove or repair these rows first."
         )
     return values
 
