@@ -45,7 +45,7 @@ numbers: $(DEV_STAMP) ## write the figures of README and docs from docs/results;
 	@$(BIN)/python scripts/measured.py $(RUNS)
 
 fuzz: $(DEV_STAMP) ## attack what is promised for a minute; FUZZ=--long until it is as often as docs/reliability says
-	@$(BIN)/python tests/fuzz.py $(FUZZ)
+	@PYTHONPATH=tests $(BIN)/python -m fuzz $(FUZZ)
 
 bench: $(DEV_STAMP) ## time everything against floors and peers; BENCH='--full --against FILE' for more
 	@$(BIN)/python benchmarks/run.py $(BENCH)

@@ -21,11 +21,11 @@ def lasa(strokes):
     return {"demos": cell, "dt": 0.1}
 
 
-def robomimic(path, simulated=False):
+def robomimic(path, simulated=False, demos=3):
     with h5py.File(path, "w") as file:
         data = file.create_group("data")
         data.attrs["env_args"] = json.dumps({"env_name": "Wipe", "env_kwargs": {"control_freq": 20}})
-        for at in range(3):
+        for at in range(demos):
             demo = data.create_group(f"demo_{at}")
             demo["actions"], demo["states"] = ACTIONS, np.ones((30, 11))
             demo.attrs["num_samples"] = 30
@@ -65,7 +65,7 @@ def lerobot(root, version, episodes=3):
     return root
 
 
-def bag(path, kind):
+def bag(path, kind, steps=STEPS, topics=("/joint_states", "/pose", "/tf")):
     """Joints, a pose and two frames of transforms at 50 Hz."""
     from rosbags import rosbag1, rosbag2
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -95,11 +95,14 @@ def bag(path, kind):
     plugins = {"db3": rosbag2.StoragePlugin.SQLITE3, "mcap": rosbag2.StoragePlugin.MCAP}
     opened = rosbag1.Writer(path) if is_first else rosbag2.Writer(path, version=9, storage_plugin=plugins[kind])
     with opened as writer:
-        topics = {
-            topic: writer.add_connection(topic, message.__msgtype__, typestore=types) for topic, message in messages(0)
+        added = {
+            topic: writer.add_connection(topic, message.__msgtype__, typestore=types)
+            for topic, message in messages(0)
+            if topic in topics
         }
-        for at in STEPS.tolist():
+        for at in steps.tolist():
+            stamp = 1_700_000_000_500_000_000 + 20_000_000 * at
             for topic, message in messages(at):
-                stamp = 1_700_000_000_500_000_000 + 20_000_000 * at
-                writer.write(topics[topic], stamp, bytes(write(message, message.__msgtype__)))
+                if topic in topics:
+                    writer.write(added[topic], stamp, bytes(write(message, message.__msgtype__)))
     return path

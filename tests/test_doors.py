@@ -1,6 +1,9 @@
 """One door in: whatever a file holds, it is read, or there is one error of ours that names it."""
 
+import os
+import random
 import threading
+import zipfile
 
 import click
 import h5py
@@ -25,28 +28,61 @@ STATES, ACTIONS = np.arange(18.0).reshape(9, 2), np.ones((9, 2))
 # The attacks of tests/fuzz.py, some of each
 
 
-@pytest.mark.parametrize("attack", fuzz.ATTACKS[:-4], ids=lambda attack: attack.name)
-def test_a_few_attacks_find_nothing(attack, tmp_path):
-    attack.prepare(tmp_path)
-    assert [said for number in range(25) if (said := fuzz.trial(attack, number, tmp_path))] == []
+IN_PROCESSES = ("kills", "commands", "streams")
 
 
-@pytest.mark.parametrize("attack", fuzz.ATTACKS[-3:], ids=lambda attack: attack.name)
-def test_attacks_that_take_long_find_nothing_either(attack):
-    tally = fuzz.run(attack, 60.0, 3)
-    assert (tally.tried, tally.faults, tally.hangs, tally.crashes) == (3, {}, 0, 0)
+@pytest.mark.parametrize("name", [name for name in fuzz.ATTACKS if name not in IN_PROCESSES])
+def test_a_few_attacks_find_nothing(name, tmp_path):
+    fuzz.ATTACKS[name].prepare(tmp_path)
+    assert [said for number in range(25) if (said := fuzz.trial(fuzz.ATTACKS[name], number, tmp_path))] == []
 
 
-def test_attacks_see_what_is_wrong():
+@pytest.mark.parametrize("name", IN_PROCESSES)
+def test_attacks_that_take_long_find_nothing_either(name):
+    tally = fuzz.run(fuzz.ATTACKS[name], wanted=3)
+    assert (tally.tried, tally.faults) == (3, {})
+
+
+def watched(attempt, **told):
+    return fuzz.run(fuzz.ATTACKS["file npy"]._replace(attempt=attempt), wanted=3, **told)
+
+
+def test_attacks_see_what_is_foreign():
     def fails(rng, folder):
         raise AttributeError("not ours")
 
-    def ends(rng, folder):
-        fuzz.os._exit(3)
+    [(said, count)] = watched(fails).faults.items()
+    assert said.startswith("AttributeError: not ours (test_doors.py")
+    assert count == 3
 
-    for attempt, crashes in ((fails, 0), (ends, 3)):
-        tally = fuzz.run(fuzz.ATTACKS[0]._replace(attempt=attempt), 30.0, 3)
-        assert (tally.tried, sum(tally.faults.values()), tally.crashes) == (3, 3, crashes)
+
+def test_a_process_that_ends_or_hangs_is_one_fault_and_others_go_on(monkeypatch):
+    def ends_at_the_second(rng, folder):
+        if rng.random() == random.Random("file npy 1").random():
+            os._exit(3)
+
+    def hangs_at_the_last(rng, folder):
+        while rng.random() == random.Random("file npy 2").random():
+            rng.seed("file npy 2")
+
+    monkeypatch.setattr(fuzz.running, "HANG_S", 0.2)
+    tally = watched(ends_at_the_second, lanes=2)
+    assert (tally.tried, tally.faults, tally.examples) == (
+        3,
+        {"ended the process with 3": 1},
+        {"ended the process with 3": 1},
+    )
+    assert watched(hangs_at_the_last).examples == {"did not end": 2}
+
+
+def test_a_tally_goes_on_until_the_code_that_was_tried_changes(tmp_path, monkeypatch):
+    monkeypatch.setattr(fuzz.running, "ROOT", tmp_path)
+    (tmp_path / "a.py").write_text("1")
+    fuzz.Tally(tried=7, code=fuzz.running.digests(["a.py"])).keep(tmp_path / "kept.json")
+    assert fuzz.Tally.kept(tmp_path / "kept.json").tried == 7
+    (tmp_path / "a.py").write_text("2")
+    assert fuzz.Tally.kept(tmp_path / "kept.json").tried == 0
+    assert fuzz.Tally.kept(tmp_path / "none.json").tried == 0
 
 
 # HDF5
@@ -112,7 +148,7 @@ def test_what_no_file_holds_is_refused_before_it_is_made(tmp_path):
 
 def test_a_member_that_is_no_array_is_named(tmp_path):
     np.savez(tmp_path / "a.npz", states=STATES, actions=ACTIONS)
-    with fuzz.zipfile.ZipFile(tmp_path / "a.npz", "a") as archive:
+    with zipfile.ZipFile(tmp_path / "a.npz", "a") as archive:
         archive.writestr("note", b"hi")
     with pytest.raises(ReadError, match=r"a\.npz: note in it: no array"):
         uc.read(tmp_path / "a.npz")

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
@@ -119,6 +119,23 @@ def test_of_many_columns_some_show_that_rows_are_at_two_places():
     track = np.sin(0.02 * np.arange(200)[:, None] + np.arange(350))
     assert topics(track) is None
     assert topics(np.where(np.arange(200)[:, None] % 2, 9.0 + track, track)) == 1
+
+
+def test_what_is_noise_does_not_depend_on_the_unit():
+    walk = np.random.default_rng(0).normal(size=(50, 3)).cumsum(axis=0)
+    share = [np.sum(np.diff(one) ** 2) / (2 * 49 * np.var(one)) for one in walk.T]
+    for unit in (1e-310, 1e-200, 1.0, 1e200):  # whose squares may be nothing, or more than there is
+        assert_allclose(noise_share(walk * unit), share, rtol=1e-6)
+    assert_array_equal(noise_share(np.array([[0.1, 0.0], [0.1, 5e-324]])), [1.0, 2.0])
+
+
+def test_a_wide_table_has_the_glitches_of_its_columns():
+    rng = np.random.default_rng(1)
+    values = rng.normal(size=(60, 1500)).cumsum(axis=0).cumsum(axis=0)
+    values[rng.integers(60, size=700), rng.integers(1500, size=700)] += 100.0
+    alone = [(column, one.start, one.stop) for column in range(1500) for one in glitches(values[:, [column]])]
+    assert sorted(glitches(values)) == alone
+    assert len(alone) > 300
 
 
 def test_a_look_takes_little_memory_beside_the_recording():

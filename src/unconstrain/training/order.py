@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ..base.arrays import Array
 from .batches import Batch
@@ -148,6 +147,8 @@ def path(states: Array) -> NDArray[np.intp]:
 
 def _nearest_pairs(states: Array, among: NDArray[np.intp]) -> Iterator[tuple[int, int]]:
     """Pairs of neighbouring states, the nearest first."""
+    from scipy.spatial import cKDTree  # takes long to import
+
     reach = min(_NEIGHBOURS + 1, len(among))
     apart, near = cKDTree(states[among]).query(states[among], reach)
     first = np.repeat(np.arange(len(among)), reach)

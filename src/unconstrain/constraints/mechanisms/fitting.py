@@ -7,8 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from ...base.arrays import Array
 from .mechanism import Mechanism
@@ -60,7 +59,7 @@ class Fit:
             return self.mechanism
         information: Any = self.information(variances) / self.time
         freedom = self.residuals.size / self.time - self.mechanism.count
-        quantile = float(student.ppf(0.975, max(freedom, 1.0)))
+        quantile = float(stdtrit(max(freedom, 1.0), 0.975))
         return replace(self.mechanism, covariance=np.linalg.pinv(information, hermitian=True), quantile=quantile)
 
 
@@ -82,6 +81,8 @@ def noise(fits: list[Fit]) -> Array:
 
 def _optimum(start: Mechanism, track: Track, most: int) -> Mechanism:
     """In turn with the noise of the blocks, where there are several."""
+    from scipy.optimize import least_squares  # takes long to import
+
     for _ in start.form.blocks:
         scales = np.sqrt(noise([Fit(start, track)]))
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
-from scipy.stats import t as student
+from scipy.special import ndtri, stdtrit
 
 from ...base.arrays import Array
 from ...base.display import counted_off
@@ -133,7 +133,7 @@ class _Told:
         apart = np.sqrt(JACKKNIFE_IN_INTERVALS * (count - 1) / count) * (weights - weights.mean(axis=0)).T
         apart = self._both @ self._known @ self._back @ apart
         ratio = _ratio(self._axes @ apart, self._axes @ noise @ self._axes.T, samples, m)
-        wide = (student.ppf(0.975, count - 1) / student.ppf(0.975, np.inf)) ** 2
+        wide = (stdtrit(count - 1, 0.975) / ndtri(0.975)) ** 2
         return np.asarray(0.5 * wide * (max(1.0, ratio) * noise + apart @ apart.T))
 
     def _disagreement(self, chosen: Candidate, evidence: Evidence, m: int) -> Array:
@@ -145,7 +145,7 @@ class _Told:
         values, axes = np.linalg.eigh(self._whitened(sum(one.hessian[m] for one in evidence.consistent)))
         parts = slopes @ axes
         mean, error = parts.sum(axis=0), np.sqrt(len(parts) * parts.var(axis=0, ddof=min(1, len(parts) - 1)))
-        chance = student.ppf(0.975, max(len(parts) - 1, 1)) * error
+        chance = stdtrit(max(len(parts) - 1, 1), 0.975) * error
         beyond = np.sqrt(np.maximum(mean**2 - chance**2, 0.0)) / (1.0 + np.maximum(values, 0.0))
         return np.asarray(axes * np.where(values > self._least, beyond, 0.0))
 

@@ -37,7 +37,6 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from ...base.arrays import Array
 from ...risks import unit_actions
@@ -147,6 +146,8 @@ class Comparison:
         They are of the candidate with the least residuals weighted by ‖u‖². The noise given is an upper bound, since
         constraints that change look like noise.
         """
+        from scipy.optimize import nnls  # takes long to import
+
         squares, counts, unit = self._squares, self._samples.counts, self._samples.energy
         best = int((self._residuals**2 @ (counts * squares)).argmin())
         size = np.maximum((self._held_out[best] ** 2).sum(axis=1), squares) / unit

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.cluster.hierarchy import fcluster, linkage
 
 from ...base.arrays import Array
 from ...training import Samples
@@ -44,6 +43,8 @@ def like_constraints(actions: Array, groups: NDArray[np.intp]) -> NDArray[np.int
     ndarray of int, shape (G,)
         Numbers of the clusters, in which no two directions are farther apart than :data:`~.constants.LIKE_CONSTRAINTS`.
     """
+    from scipy.cluster.hierarchy import fcluster, linkage  # takes long to import
+
     found = [np.linalg.eigh(part.T @ part) for group in range(groups.max() + 1) for part in [actions[groups == group]]]
     held = np.array([energy[0] < SHARE_ALONG_HELD * energy.sum() for energy, _ in found])
     least = np.array([axes[:, 0] for _, axes in found])

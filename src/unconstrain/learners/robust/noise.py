@@ -24,7 +24,7 @@ from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from ...base.arrays import Array
 from ...risks import Moments, autocorrelations, standard_risk
@@ -58,7 +58,12 @@ def noise_by_differences(actions: Array, groups: NDArray[np.intp]) -> float:
         return np.inf
     differences = sum(weight * actions[i : i + count] for i, weight in enumerate(weights))
     lengths = (np.asarray(differences)[same] ** 2).sum(axis=1)
-    return float(np.median(lengths) / chi2.median(actions.shape[1]) / (weights**2).sum())
+    return float(np.median(lengths) / _median_chi2(actions.shape[1]) / (weights**2).sum())
+
+
+def _median_chi2(freedom: int) -> float:
+    """The median of a χ² distribution; ``scipy.stats`` takes long to import."""
+    return 2.0 * float(gammaincinv(0.5 * freedom, 0.5))
 
 
 def noise_of_each(actions: Array, labels: NDArray[np.intp], most: float, known: Array | None = None) -> Array:

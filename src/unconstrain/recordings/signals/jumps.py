@@ -51,12 +51,30 @@ def glitches(values: Array) -> list[Glitch]:
     -------
     list of Glitch
     """
+    some = max(BLOCK_ROWS // max(len(values), 1), 1)
+    rough = [at + columns.start for columns in slices(values.T, some) for at in _rough(values[:, columns])]
     found = [
         Glitch(column, start, stop)
-        for column, signal in enumerate(values.T)
-        for start, stop in sorted({*_single(signal), *_bursts(signal)})
+        for column in rough
+        for start, stop in sorted({*_single(values[:, column]), *_bursts(values[:, column])})
     ]
     return sorted(found, key=lambda glitch: (glitch.start, glitch.column))
+
+
+def _rough(values: Array) -> list[int]:
+    """Columns that may have glitches: of the others no residual and no step is far larger than most of them."""
+    if len(values) < 2:
+        return []
+    steps, residuals = np.abs(np.diff(values, axis=0)), np.abs(_residuals(values))
+    rough = steps.max(axis=0) > FAR * np.quantile(steps, 0.9, axis=0)
+    rough |= residuals.max(axis=0) > FAR * np.quantile(residuals, 0.95, axis=0)
+    return np.flatnonzero(rough).tolist()
+
+
+def _residuals(values: Array) -> Array:
+    """Samples minus the cubics through their neighbours, the same shape; beyond the ends values go on as mirrored."""
+    padded = np.pad(values, ((2, 2), *[(0, 0)] * (values.ndim - 1)), mode="reflect", reflect_type="odd")
+    return np.asarray(sum(share * padded[at : at + len(values)] for at, share in enumerate(_INTERPOLATION)))
 
 
 def repaired(values: Array, found: list[Glitch]) -> Array:
@@ -99,7 +117,7 @@ def _single(signal: Array) -> Iterator[tuple[int, int]]:
     """One sample off: the residuals of cubic interpolation around it are those of a lone impulse."""
     if len(signal) < 2 * AROUND:
         return
-    residual = np.convolve(np.pad(signal, 2, mode="reflect", reflect_type="odd"), _INTERPOLATION, "valid")
+    residual = _residuals(signal)
     size, steps = np.abs(residual), np.abs(np.diff(signal))
     moving = steps[steps > 0]
     if not moving.size:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.arrays import Array
+from ...base.arrays import BLOCK_ROWS, Array, slices
 
 SLOW = 0.08
 """Whoever moves by less than this share of a usual movement in the same time stands still."""
@@ -28,19 +28,21 @@ def noise_share(values: Array) -> Array:
 
     A constant column has a share of 1.
     """
-    return _by_column(_share_of_noise, values)
+    return _by_column(_share_of_noise, values) if len(values) else np.ones(values.shape[1])
 
 
-def _share_of_noise(column: Array) -> float:
-    changes = np.diff(column)
-    if not changes.any():  # the variance of a constant may be more than nothing, by rounding
-        return 1.0
-    return float(changes @ changes) / (2 * len(changes) * float(column.var()))
+def _share_of_noise(columns: Array) -> Array:
+    extent = np.ptp(columns, axis=0)
+    moving = extent > 0  # the variance of a constant may be more than nothing, by rounding
+    scaled = (columns - columns.min(axis=0)) / np.where(moving, extent, 1.0)  # squares of what is tiny are nothing
+    changed = 0.5 * (np.diff(scaled, axis=0) ** 2).sum(axis=0) / max(len(columns) - 1, 1)
+    return np.asarray(np.where(moving, changed, 1.0) / np.where(moving, scaled.var(axis=0), 1.0))
 
 
-def _by_column(measure: Callable[[Array], float], values: Array) -> Array:
-    """A number for each column, (n,), with no more than a column in memory beside the table."""
-    return np.array([measure(np.ascontiguousarray(column)) for column in values.T])
+def _by_column(measure: Callable[[Array], Array], values: Array) -> Array:
+    """A number for each column, (n,), with no more than a long one or some short ones in memory beside the table."""
+    some = max(BLOCK_ROWS // max(len(values), 1), 1)
+    return np.concatenate([np.zeros(0), *(measure(values[:, columns]) for columns in slices(values.T, some))])
 
 
 def is_noise(values: Array) -> bool:
@@ -138,8 +140,9 @@ def _span(values: Array) -> int | None:
 
 def _noise(values: Array) -> Array:
     """Standard deviation of white noise on each column, from second differences."""
-    return _by_column(lambda column: float(np.median(np.abs(np.diff(column, 2)))), values) / (0.6745 * np.sqrt(6.0))
+    bends = _by_column(lambda columns: np.median(np.abs(np.diff(columns, 2, axis=0)), axis=0), values)
+    return np.asarray(bends / (0.6745 * np.sqrt(6.0)))
 
 
 def _usual(values: Array, span: int) -> Array:
-    return _by_column(lambda column: float(np.quantile(np.abs(column[span:] - column[:-span]), 0.9)), values)
+    return _by_column(lambda columns: np.quantile(np.abs(columns[span:] - columns[:-span]), 0.9, axis=0), values)
