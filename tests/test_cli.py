@@ -602,6 +602,56 @@ def test_a_movement_far_from_the_data_is_noted(files, tmp_path):
     assert len(far.out.splitlines()) == 4
 
 
+def test_a_movement_stops_where_support_ends_unless_told_to_go_on(files, tmp_path):
+    run("fit", *files, "--learner", "direct", "-o", tmp_path / "p.npz")
+    start = ("rollout", tmp_path / "p.npz", "--start", f"{STARTS[0][0]},{STARTS[0][1]}", "--steps", 60, "--dt", 1.0)
+    _, whole = table(run(*start, "--least-support", 0))  # steps that are much too long
+    cut = call(*start, "-o", tmp_path / "path.csv")
+    assert cut.code == 0
+    assert cut.out.startswith("! rollout stops after ")
+    _, part = table((tmp_path / "path.csv").read_text())
+    assert 0 < len(part) < len(whole) == 60
+    assert_allclose(part, whole[: len(part)])
+    told = json.loads(run(*start, "--json"))
+    assert "stops after" in told["verdict"]["said"]
+    assert len(told["rows"]) == len(part)
+
+
+def test_a_movement_that_diverges_is_written_up_to_there(policy, tmp_path):
+    said = refused("rollout", policy, "--start", "1,0", "--dt", 100, "-o", tmp_path / "path.csv")
+    assert re.match(r"after .* s, at \(.*\), the movement left the finite numbers at step", said)
+    _, part = table((tmp_path / "path.csv").read_text())
+    assert 1 < len(part) < 200
+
+
+def test_rollout_goes_round_what_is_in_the_way(policy):
+    start = ("rollout", policy, "--start", "0.9,0.9", "--steps", 200, "--method", "rk4")
+    _, free = table(run(*start))
+    at = free[60, 1:3]
+    for size, radii in (("0.1", 0.1), ("0.1,0.2", [0.1, 0.2])):
+        _, round_ = table(run(*start, "--obstacle", f"{at[0]},{at[1]},{size}", "--obstacle", "5,5,1"))
+        assert np.linalg.norm((free[:, 1:3] - at) / radii, axis=1).min() < 1
+        assert np.linalg.norm((round_[:, 1:3] - at) / radii, axis=1).min() >= 1 - 1e-7
+        assert_allclose(round_[-1, 1:3], free[-1, 1:3], atol=0.2)  # it gets by
+    assert "--obstacle: got 2 numbers, expected 2 of a centre, then a radius or 2 radii." in refused(
+        *start, "--obstacle", "1,2"
+    )
+
+
+def test_accelerations_are_followed_with_order_2(tmp_path):
+    rng = np.random.default_rng(0)
+    rows = np.column_stack([0.1 * np.arange(60), rng.uniform(-1, 1, (60, 2))])
+    write(tmp_path / "one.csv", "t,q,v,a", np.column_stack([rows, -2.0 * rows[:, 1] - 0.5 * rows[:, 2]]))
+    fit = ("fit", tmp_path / "one.csv", "--state", "q,v", "--action", "a", "--model", "linear", "--learner", "direct")
+    run(*fit, "-o", tmp_path / "p.npz")
+    head, path = table(run("rollout", tmp_path / "p.npz", "--start", "1,0", "--order", 2, "--steps", 40, "--dt", 0.1))
+    assert head == ["t", "q", "v", "a"]
+    q, v = 1.0, 0.0
+    for row in path:
+        assert_allclose(row[1:], [q, v, -2.0 * q - 0.5 * v], atol=1e-6)
+        q, v = q + 0.1 * v, v + 0.1 * row[3]
+
+
 # export
 
 

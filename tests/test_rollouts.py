@@ -148,3 +148,60 @@ def test_better_steps_stay_on_the_constraint_and_keep_its_truth():
 def test_a_method_that_is_none_is_refused():
     with pytest.raises(SettingError, match="method: got 'heun', expected one of euler, rk4, adaptive"):
         uc.rollout(lambda x: -x, [1.0], method="heun")
+
+
+# Where support ends
+
+
+def leaves(states):
+    """Outwards, at one unit per second."""
+    return states / np.maximum(np.linalg.norm(states, axis=1, keepdims=True), 1e-9)
+
+
+def local():
+    """A policy that was learnt within a distance of one from the origin."""
+    states = np.random.default_rng(0).uniform(-0.7, 0.7, (300, 2))
+    return uc.LocallyLinearPolicy(variance=0.05, learner="direct").fit(states, leaves(states))
+
+
+def test_a_movement_stops_where_nothing_was_demonstrated_and_says_when_where_and_why():
+    policy = local()
+    with pytest.warns(UserWarning, match=r"rollout stops after .* s at \(.*support below 0.001.*least support of 0"):
+        run = uc.rollout(policy, [0.3, 0.1], 400, 0.02)
+    whole = uc.rollout(policy, [0.3, 0.1], 400, 0.02, least_support=0.0)
+    far = policy.support(whole.states) < 1e-3
+    assert len(run) == far.argmax() > 0
+    assert_array_equal(run.states, whole.states[: len(run)])
+    assert_array_equal(run.actions, whole.actions[: len(run)])
+    assert len(whole) == 400
+
+
+def test_each_run_stops_for_itself():
+    def turns(states):
+        return np.where(states[:, :1] > 0.0, leaves(states), -states)
+
+    policy = local()
+    policy.predict, starts = turns, np.array([[0.2, 0.0], [-0.5, 0.1], [0.5, 0.5], [-0.1, 0.0]])
+    with pytest.warns(UserWarning, match="2 of 4 roll-outs stop, the first, rollout 3, after"):
+        runs = uc.rollout(policy, starts, 300, 0.02)
+    assert len(runs[2]) < len(runs[0]) < 300 == len(runs[1]) == len(runs[3])
+    for run, start in zip(runs[1::2], starts[1::2], strict=True):
+        assert_allclose(run.states, uc.rollout(policy, start, 300, 0.02).states, atol=1e-12)
+
+
+def test_a_start_far_from_the_data_is_followed_and_may_come_near():
+    policy = local()
+    policy.predict = lambda states: -states
+    assert policy.support(np.array([[3.0, 0.0]])) < 1e-3
+    assert len(uc.rollout(policy, [3.0, 0.0], 300, 0.02)) == 300
+
+
+@pytest.mark.parametrize("features", [uc.Affine(), uc.Polynomial(3)])
+def test_what_has_no_support_is_followed_until_it_diverges_which_is_no_bad_row_of_features(features):
+    states = np.random.default_rng(0).uniform(-1, 1, (200, 2))
+    policy = uc.ParametricPolicy(features, learner="direct").fit(states, 5.0 * states + states**3)
+    with pytest.raises(uc.errors.DivergedError, match=r"after .* s, at \(.*\), the movement left the finite") as caught:
+        uc.rollout(policy, [0.5, 0.5], 400, 0.1, method="rk4")
+    part = caught.value.part
+    assert 1 < len(part) < 400
+    assert_array_equal(part.states, uc.rollout(policy, [0.5, 0.5], len(part), 0.1, method="rk4").states)

@@ -9,7 +9,10 @@ Examples
 True
 """
 
+from typing import Any
+
 __all__ = [
+    "DivergedError",
     "InvalidDataError",
     "MissingBeliefError",
     "MissingExtraError",
@@ -36,6 +39,18 @@ class UnconstrainError(Exception):
 
 class InvalidDataError(UnconstrainError, ValueError):
     """An array that cannot be learnt from: NaN, ragged, empty, of the wrong shape."""
+
+
+class DivergedError(InvalidDataError):
+    """A movement that left the finite numbers.
+
+    Attributes
+    ----------
+    part : Demonstration or list of Demonstration, or None
+        What :func:`unconstrain.rollout` would have returned, up to there; None where it did not get beyond the start.
+    """
+
+    part: Any = None
 
 
 class SettingError(UnconstrainError, ValueError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -14,7 +15,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.errors import NOTHING_LEFT, ReadError, SettingError, UnconstrainError
+from ..base.errors import NOTHING_LEFT, DivergedError, ReadError, SettingError, UnconstrainError
 from ..base.files import write
 from ..paper import experiments
 from .certifying import certify
@@ -243,6 +244,30 @@ def score(
 @click.option("--dt", type=float, default=0.02, show_default=True, help="Seconds between samples.")
 @options_for_held("to stay on")
 @click.option(
+    "--obstacle",
+    "obstacles",
+    type=numbers,
+    multiple=True,
+    help="Centre of a ball to go round, and its radius; or of an ellipsoid, and its radii. More than once for several.",
+)
+@click.option(
+    "--method", type=click.Choice(["euler", "rk4", "adaptive"]), default="euler", show_default=True, help="Of steps."
+)
+@click.option(
+    "--order",
+    type=click.IntRange(1, 2),
+    default=1,
+    show_default=True,
+    help="2 where states are positions, then velocities, and actions accelerations.",
+)
+@click.option(
+    "--least-support",
+    type=click.FloatRange(0.0, 1.0),
+    default=uc.models.SUPPORTED,
+    show_default=True,
+    help="Stop where demonstrations support less, 1 near and 0 far from them; 0 goes on.",
+)
+@click.option(
     "-o",
     "--output",
     type=click.Path(dir_okay=False, allow_dash=True),
@@ -255,25 +280,32 @@ def score(
 def rollout(
     policy: str,
     start: tuple[float, ...],
-    steps: int,
-    dt: float,
     plane: tuple[float, ...] | None,
     constraint: str | None,
+    obstacles: tuple[tuple[float, ...], ...],
     output: str,
     force: bool,
     as_json: bool,
+    **how: Any,
 ) -> None:
-    """Roll POLICY out, freely or under a constraint, to a CSV."""
+    """Roll POLICY out, freely or under a constraint, to a CSV.
+
+    It stops where demonstrations no longer support it, and says so.
+    """
     check_outputs(() if output == "-" else (output,), (policy, constraint), force)
     learnt, recipe = fitted_policy(policy), uc.Recipe.from_dict(uc.storage.load_notes(policy).get("recipe", {}))
     if len(start) != learnt.n_features_in_:
         raise SettingError(f"--start: got {len(start)} numbers, expected {learnt.n_features_in_}, one for each state.")
-    held = held_of(plane, constraint, recipe, len(start), learnt.n_outputs_, "one for each action")
+    places = learnt.n_outputs_ if how["order"] == 2 else len(start)  # what a constraint is a function of
+    at = replace(recipe, states=recipe.states and recipe.states[:places])
+    held = held_of(plane, constraint, at, places, learnt.n_outputs_, "one for each action")
     task = held.target if isinstance(held, uc.LearntConstraint) and held.task else None
-    path = uc.rollout(learnt, list(start), steps, dt, held, task=task)
+    round_ = [_obstacle(given, len(start)) for given in obstacles]
+    path, why, trouble = _as_far_as_it_goes(learnt, list(start), constraint=held, task=task, obstacles=round_, **how)
     named = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))
-    verdict = _supported(learnt, path)
-    columns = ["t", *(named.states or ()), *named.directions]
+    verdict = _supported(learnt, path, why)
+    accelerations = named.actions or tuple(f"a{name}" for name in (named.states or ())[:places])
+    columns = ["t", *(named.states or ()), *(accelerations if how["order"] == 2 else named.directions)]
     if output != "-":
         write(output, _csv(columns, path))
     elif not as_json:
@@ -287,6 +319,8 @@ def rollout(
         say_verdict(verdict, err=output == "-")
     if output != "-":
         say_written({"movement": output}, None)
+    if trouble is not None:
+        raise trouble
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain reproduce table1 --trials 100 --out results")
@@ -370,8 +404,33 @@ main.add_command(look)
 main.add_command(play)
 
 
-def _supported(policy: uc.Policy, path: uc.Demonstration) -> uc.evaluation.verdicts.Verdict | None:
+def _obstacle(given: tuple[float, ...], n: int) -> uc.motion.obstacles.Ellipsoid:
+    import numpy as np
+
+    if len(given) not in {n + 1, 2 * n}:
+        raise SettingError(
+            f"--obstacle: got {len(given)} numbers, expected {n} of a centre, then a radius or {n} radii."
+        )
+    return uc.motion.obstacles.Ellipsoid(np.array(given[:n]), given[n:] if len(given) > n + 1 else given[n])
+
+
+def _as_far_as_it_goes(policy: uc.Policy, start: list[float], **how: Any) -> tuple[Any, str, DivergedError | None]:
+    """A movement; why it stops early, or nothing; and what went wrong, where it is only the part before."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        try:
+            path = uc.rollout(policy, start, **how)
+        except DivergedError as error:
+            if error.part is None:
+                raise
+            return error.part, "", error
+    return path, " ".join(str(one.message) for one in said if one.category is UserWarning), None
+
+
+def _supported(policy: uc.Policy, path: Any, why: str) -> uc.evaluation.verdicts.Verdict | None:
     """How near data is along a movement; None of an affine or polynomial policy, which has no support."""
+    if why:
+        return uc.evaluation.verdicts.of_early_end(why, float(path.times[-1]))
     try:
         return uc.evaluation.verdicts.of_support(policy.support(path.states), path.times)
     except SettingError:

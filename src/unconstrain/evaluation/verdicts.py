@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..base.arrays import Array
+from ..models import SUPPORTED
 from .diagnosis import ENOUGH, SMALL, Diagnosis
 
 if TYPE_CHECKING:
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
 GOOD, FAIR = 0.9, 0.7
 """Explained share of motion. Along it a prediction misses √(1 − share) of a typical action: at the first a third, at
 the second more than half, beyond which little but the rough direction is left."""
-
-SUPPORTED = 1e-3
-"""Support below which no demonstration came near, and the policy extrapolates."""
 
 MOSTLY, PARTLY = 0.95, 0.7
 """Share of recorded states at which the policy is determined: of the rest, one in twenty is an edge."""
@@ -178,6 +176,12 @@ def of_support(support: Array, times: Array | None) -> Verdict:
         "What is far from data.",
         "Start nearer, or demonstrate there.",
     )
+
+
+def of_early_end(why: str, seconds: float) -> Verdict:
+    """Judge a movement that stops after so many seconds, for a reason in one sentence, and what to do in another."""
+    said, _, then = why.partition(". ")
+    return Verdict(Mark.DOUBTFUL, f"{said}.", f"These {seconds:.2f} s.", "What would have come after.", then)
 
 
 def of_surveys(surveys: Sequence[Any]) -> Verdict:

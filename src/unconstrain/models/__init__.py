@@ -9,11 +9,12 @@ array([[0.5, 0.5]])
 from . import spaces
 from .features import Affine, FeatureMap, KMeansRBF, NormalisedRBF, Placeable, Polynomial
 from .formula import ClosedForm, Correction
-from .model import Model
+from .model import SUPPORTED, Model
 from .receptive_fields import Everywhere, ReceptiveFields, choose_variance, cover
 from .scale import Scale
 
 __all__ = [
+    "SUPPORTED",
     "Affine",
     "ClosedForm",
     "Correction",

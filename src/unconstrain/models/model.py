@@ -17,6 +17,9 @@ from .spaces import Embedding
 MOST_WEIGHTS = 500
 """Models of more weights are not chosen from."""
 
+SUPPORTED = 1e-3
+"""Support below which no demonstration came near, and a policy extrapolates."""
+
 _ROWS = 4096
 """Rows that are predicted together, so that temporaries stay in cache."""
 

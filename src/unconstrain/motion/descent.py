@@ -42,7 +42,7 @@ class Descent(Shown):
         return (
             f"From every state, movements arrive: free at ({goal}), and under any flat constraint where V is least on "
             f"it. V falls with every Euler step of up to {self.dt:.3g} s, by ‖N ∇V‖ times {0.75 * self.pace:.3g} each "
-            "second, or by 3/16 of its square where that is less. A constraint that moves may lift V."
+            "second, or by 3/16 of its square where that is less. A constraint that moves, or an obstacle, may lift V."
         )
 
     def correction(self) -> Correction:

@@ -78,7 +78,7 @@ class Guided(Exportable, Shown):
     **On a cycle.** A closed convex surface attracts that the demonstrated cycle is on, and which every plane through
     its inside cuts in one closed curve; the pace along it is the demonstrated one (:class:`.Orbit`).
 
-    Both are continuous in the state. A constraint that moves, or a task with a drift, may lift V.
+    Both are continuous in the state. A constraint that moves, a task with a drift, or an obstacle may lift V.
 
     Parameters
     ----------

@@ -75,8 +75,8 @@ class Orbit(Shown):
             f"A closed convex surface attracts, of radius {self.radius:.4g} about ({middle}), from every state but its "
             f"middle, free and under any flat constraint: at {PULL * self.rate:.4g} to {RUSH * self.rate:.4g} per "
             "second. A plane through its inside cuts it in one cycle, on which the pace is within "
-            f"{STRAY:.0%} of the demonstrated one wherever the plane lets it turn. A constraint that moves may leave "
-            "it."
+            f"{STRAY:.0%} of the demonstrated one wherever the plane lets it turn. A constraint that moves, or "
+            "an obstacle, may lead off it."
         )
 
     def correction(self) -> Correction:

@@ -2,29 +2,19 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, overload
+from typing import Literal, Self, overload
+from warnings import warn
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import LARGEST, Array, as_table, check_at_least
-from ..base.errors import InvalidDataError, SettingError
-from ..constraints import Constraint, constraint_matrices
-from ..models import spaces
+from ..base.arrays import Array, as_table, check_at_least
+from ..base.errors import DivergedError, SettingError
+from ..constraints import Constraint
+from ..models import SUPPORTED, spaces
 from ..recordings import Demonstration, Truth
-from ..risks import null_space_projection, project
-
-Task = Callable[[Array, Array], Array]
-"""States (K, n) and times (K,) to the b of ``A u = b``, shape (K, k)."""
-
-Method: TypeAlias = Literal["euler", "rk4", "adaptive"]
-"""Of integration, see :func:`rollout`."""
-
-TOLERANCE = 1e-6
-"""Error of an adaptive step, as a share of the way that it goes."""
-
-HALVINGS = 12
-"""An adaptive step is halved no more often."""
+from .flow import FLOWS, STEPS, Flow, Method, Task
+from .obstacles import Obstacle
 
 
 @overload
@@ -39,6 +29,9 @@ def rollout(
     name: str = ...,
     space: spaces.Space | None = ...,
     method: Method = ...,
+    order: Literal[1, 2] = ...,
+    obstacles: Sequence[Obstacle] = ...,
+    least_support: float = ...,
 ) -> Demonstration: ...
 
 
@@ -54,6 +47,9 @@ def rollout(
     name: str = ...,
     space: spaces.Space | None = ...,
     method: Method = ...,
+    order: Literal[1, 2] = ...,
+    obstacles: Sequence[Obstacle] = ...,
+    least_support: float = ...,
 ) -> list[Demonstration]: ...
 
 
@@ -68,10 +64,11 @@ def rollout(
     name: str = "rollout",
     space: spaces.Space | None = None,
     method: Method = "euler",
+    order: Literal[1, 2] = 1,
+    obstacles: Sequence[Obstacle] = (),
+    least_support: float = SUPPORTED,
 ) -> Demonstration | list[Demonstration]:
     """Follow ``u = N(x, t) π(x)``, or ``u = A⁺b + N π`` under a task, by default with Euler steps ``x ← x + dt u``.
-
-    Steps are in the state space.
 
     Parameters
     ----------
@@ -94,9 +91,16 @@ def rollout(
     space : Space, optional
         Which states are angles or orientations (:mod:`unconstrain.spaces`); by default as a fitted policy knows.
     method : {"euler", "rk4", "adaptive"}
-        How a step from one sample to the next is made: Euler's, as a control loop does; Runge and Kutta's of fourth
-        order (on orientations of a lower one); or that, halved until halving it once more changes it by less than a
-        millionth of the way it goes.
+        Of steps between samples: Euler's, as a control loop does; Runge and Kutta's of fourth order (on orientations of
+        a lower one); or that, halved until that changes it by less than a millionth of the way it goes.
+    order : {1, 2}
+        2: states are positions and velocities, actions accelerations; constraint and task hold the velocities, and are
+        given the positions (:class:`.flow.SecondOrder`).
+    obstacles : sequence of callables
+        To go round, such as :class:`.obstacles.Ellipsoid`; actions are then not N π.
+    least_support : float
+        Stop before states with less, with a warning, once there was more; 0 goes on. As a fitted policy knows, see
+        :meth:`~unconstrain.Policy.support`.
 
     Returns
     -------
@@ -108,138 +112,109 @@ def rollout(
     SettingError
         If the policy's actions do not fit the states, or a setting is out of range.
     InvalidDataError
-        If the movement leaves the finite numbers.
+        If a start is in an obstacle; as DivergedError, if the movement leaves the finite numbers.
 
     Examples
     --------
     >>> plane = uc.constraints.Plane(normal=[0, 0, 1])
-    >>> movement = uc.rollout(lambda x: -x, start=[1.0, 1.0, 1.0], steps=3, dt=0.5, constraint=plane)
-    >>> movement.states
+    >>> uc.rollout(lambda x: -x, start=[1.0, 1.0, 1.0], steps=3, dt=0.5, constraint=plane).states
     array([[1.  , 1.  , 1.  ],
            [0.5 , 0.5 , 1.  ],
            [0.25, 0.25, 1.  ]])
     """
     check_at_least("steps", steps, 1, whole=True)
     check_at_least("dt", dt, 0.0, strict=True)
+    for given, known, value in (("method", STEPS, method), ("order", FLOWS, order)):
+        if value not in known:
+            raise SettingError(f"{given}: got {value!r}, expected one of {', '.join(map(str, known))}.")
     table, single = as_table(start, "start")
     state = table.reshape(1, -1) if single else table
-    runs, n = state.shape
     told: spaces.Space = space if space is not None else getattr(policy, "space_", spaces.Euclidean())
-    within = told.over(n)
-    d = within.sizes[2]
-    if constraint is not None and not callable(constraint) and len(constraint) != runs:
-        raise SettingError(f"constraint: got {len(constraint)} constraints for {runs} starts, expected one for each.")
-    if method not in _STEPS:
-        raise SettingError(f"method: got {method!r}, expected one of {', '.join(_STEPS)}.")
-    flow = _Flow(policy, constraint, task, within, dt)
-    shape = (runs, steps, d)
-    states, actions, wanted, projections = (np.empty(s) for s in ((runs, steps, n), shape, shape, (*shape, d)))
-    times = dt * np.arange(steps, dtype=np.float64)
-    for step in range(steps):
-        states[:, step] = state
-        actions[:, step], wanted[:, step], projections[:, step] = flow.at(state, times[step])
-        state = _STEPS[method](flow, state, times[step], dt, actions[:, step])
-    names = [name] if single else [f"{name} {k + 1}" for k in range(runs)]
-    demos = [
-        Demonstration(states[k], actions[k], times, Truth(wanted[k], projections[k]), names[k], within)
-        for k in range(runs)
-    ]
-    return demos[0] if single else demos
+    flow = FLOWS[order](policy, constraint, task, told.over(state.shape[1]), dt, tuple(obstacles))
+    flow.check(state)
+    tracks = _Tracks.empty(flow, state, steps)
+    names = [name] if single else [f"{name} {k + 1}" for k in range(len(state))]
+    try:
+        tracks.follow(state, method, _near(policy, state, least_support))
+    except DivergedError as error:
+        error.part = tracks.runs(names, single) if tracks.done > 1 else None
+        raise
+    tracks.warn(names, least_support)
+    return tracks.runs(names, single)
 
 
-@dataclass(frozen=True)
-class _Flow:
-    """What moves the states of K runs."""
+@dataclass
+class _Tracks:
+    """K runs of T samples, the first so many of which are done, each until its own end."""
 
-    policy: Callable[[Array], Array]
-    constraint: Constraint | Sequence[Constraint] | None
-    task: Task | None
-    space: spaces.Space
-    dt: float
+    flow: Flow
+    states: Array
+    actions: Array
+    wanted: Array
+    projections: Array
+    ends: NDArray[np.intp]
+    done: int = 0
 
-    def at(self, state: Array, time: float) -> tuple[Array, Array, Array]:
-        """``A⁺b + N π`` (K, d), π (K, d) and N (K, d, d)."""
-        matrices = _matrices(self.constraint, state, time, self.space.sizes[2])
-        projections = null_space_projection(matrices)
-        wanted = _action(self.policy, state, projections)
-        drift = 0.0 if self.task is None else _drift(matrices, self.task(state, np.full(len(state), time)))
-        return _without_rounding(project(projections, wanted), wanted) + drift, wanted, projections
+    @classmethod
+    def empty(cls, flow: Flow, state: Array, steps: int) -> Self:
+        """Nothing done."""
+        runs, n = state.shape
+        states, shape = np.empty((runs, steps, n)), (runs, steps, flow.d)
+        return cls(flow, states, np.empty(shape), np.empty(shape), np.empty((*shape, flow.d)), np.full(runs, steps))
 
-    def moved(self, states: Array, ways: Array, time: float) -> Array:
-        """States after ways (K, d)."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            moved = self.space.step(states, ways)
-        if not (np.abs(moved) <= LARGEST).all():
-            raise InvalidDataError(
-                f"the movement left the finite numbers at step {int(time / self.dt + 1e-6)}: start nearer to the data, "
-                "take a smaller dt, or guide the policy (uc.Guided)."
-            )
-        return moved
+    def follow(self, state: Array, method: Method, near: Callable[[Array], NDArray[np.bool_]]) -> None:
+        """Go on to all ends; a run that comes from near to far has ended, and stays at the last state near."""
+        steps, was_near = self.states.shape[1], np.zeros(len(state), np.bool_)
+        for step in range(steps):
+            time = self.flow.dt * step
+            state = self.flow.settled(state, time)
+            is_near = near(state)
+            left = was_near & ~is_near & (self.ends == steps)
+            self.ends[left], was_near = step, was_near | is_near
+            if (self.ends < steps).all():
+                return
+            state = np.where(left[:, None], self.states[:, step - 1], state)
+            found = self.flow.at(state, time)
+            self.states[:, step] = state
+            self.actions[:, step], self.wanted[:, step], self.projections[:, step] = found
+            moved = STEPS[method](self.flow, state, time, self.flow.dt, self.flow.slopes(state, found[0]))
+            state = np.where((self.ends == steps)[:, None], moved, state)
+            self.done = step + 1
 
+    def runs(self, names: Sequence[str], single: bool) -> Demonstration | list[Demonstration]:
+        """What is done."""
+        demos = [self._run(k, name) for k, name in enumerate(names)]
+        return demos[0] if single else demos
 
-def _euler(flow: _Flow, state: Array, time: float, dt: float, action: Array) -> Array:
-    return flow.moved(state, dt * action, time)
+    def _run(self, k: int, name: str) -> Demonstration:
+        rows = slice(min(int(self.ends[k]), self.done))
+        truth = Truth(self.wanted[k, rows], self.projections[k, rows])
+        times = self.flow.dt * np.arange(rows.stop, dtype=np.float64)
+        return Demonstration(self.states[k, rows], self.actions[k, rows], times, truth, name, self.flow.space)
 
-
-def _rk4(flow: _Flow, state: Array, time: float, dt: float, action: Array) -> Array:
-    slopes = [action]
-    for share in (0.5, 0.5, 1.0):
-        between = flow.moved(state, share * dt * slopes[-1], time)
-        slopes.append(flow.at(between, time + share * dt)[0])
-    return flow.moved(state, dt / 6.0 * (slopes[0] + 2.0 * slopes[1] + 2.0 * slopes[2] + slopes[3]), time)
-
-
-def _adaptive(flow: _Flow, state: Array, time: float, dt: float, action: Array, left: int = HALVINGS) -> Array:
-    half = 0.5 * dt
-    whole, middle = _rk4(flow, state, time, dt, action), _rk4(flow, state, time, half, action)
-    again = flow.at(middle, time + half)[0]
-    end = _rk4(flow, middle, time + half, half, again)
-    error, way = (np.abs(flow.space.difference(end, other)).max(axis=1) for other in (whole, state))
-    if left == 0 or (error <= TOLERANCE * way).all():
-        return end
-    middle = _adaptive(flow, state, time, half, action, left - 1)
-    return _adaptive(flow, middle, time + half, half, flow.at(middle, time + half)[0], left - 1)
-
-
-_STEPS = {"euler": _euler, "rk4": _rk4, "adaptive": _adaptive}
-
-
-def _matrices(constraint: Constraint | Sequence[Constraint] | None, states: Array, time: float, d: int) -> Array:
-    """A of the constraint, or of that of each run, shape (K, k, d); no row where nothing holds."""
-    runs = len(states)
-    if constraint is None:
-        return np.zeros((runs, 0, d))
-    now = np.full(runs, time)
-    if callable(constraint):
-        return constraint_matrices(constraint, states, now, d)
-    rows = [constraint_matrices(one, states[k : k + 1], now[k : k + 1], d) for k, one in enumerate(constraint)]
-    return np.concatenate(rows)
-
-
-def _drift(matrices: Array, target: Array) -> Array:
-    """``A⁺ b``, shape (K, n)."""
-    wanted = np.asarray(target, np.float64)
-    if wanted.shape != matrices.shape[:2]:
-        raise SettingError(
-            f"task: got b of shape {wanted.shape} for A of shape {matrices.shape}, expected {matrices.shape[:2]}, one "
-            "value for each row of the constraint."
+    def warn(self, names: Sequence[str], least: float) -> None:
+        """Say which runs have ended early, when, where and why."""
+        early = np.flatnonzero(self.ends < self.states.shape[1])
+        if not len(early):
+            return
+        k = int(early[self.ends[early].argmin()])
+        last = int(self.ends[k]) - 1
+        where = ", ".join(f"{each:.4g}" for each in self.states[k, last])
+        many = f"{len(early)} of {len(names)} roll-outs stop, the first, " if len(names) > 1 else ""
+        warn(
+            f"{many}{names[k]}{',' if many else ' stops'} after {last * self.flow.dt:.4g} s at ({where}): a step on "
+            f"nothing was demonstrated (support below {least:g}). Demonstrate there, guide the policy (uc.Guided), or "
+            "go on with a least support of 0.",
+            stacklevel=3,
         )
-    return np.einsum("knr,kr->kn", np.linalg.pinv(matrices, rcond=1e-9), wanted)
 
 
-def _without_rounding(actions: Array, wanted: Array) -> Array:
-    """Exactly no motion where the constraint takes all of it: rounding has a direction, rest has none."""
-    rounding = np.abs(actions).max(axis=1, keepdims=True) <= 1e-12 * np.abs(wanted).max(axis=1, keepdims=True)
-    return np.where(rounding, 0.0, actions)
-
-
-def _action(policy: Callable[[Array], Array], state: Array, projections: Array) -> Array:
-    """What the policy wants, (K, d); one that can, is told what the constraint leaves."""
-    under, d = getattr(policy, "under", None), projections.shape[2]
-    action = np.asarray(policy(state) if under is None else under(state, projections))
-    if action.shape != (len(state), d):
-        raise SettingError(
-            f"policy: got actions of shape {action.shape} for states of shape {state.shape}; a rollout expects "
-            f"actions that are velocities of the state{'' if d == state.shape[1] else f', {d} in their space'}."
-        )
-    return action
+def _near(policy: Callable[[Array], Array], state: Array, least: float) -> Callable[[Array], NDArray[np.bool_]]:
+    """Whether states (K, n) are where something was demonstrated; all are, of policies that do not know."""
+    support: Callable[[Array], Array] | None = getattr(policy, "support", None)
+    try:
+        if least > 0.0 and support is not None and support(state) is not None:
+            return lambda states: support(states) >= least
+    except SettingError:  # affine and polynomial policies
+        pass
+    return lambda states: np.ones(len(states), np.bool_)

@@ -113,7 +113,8 @@ def _followed(
     fine, steps = settings.substeps, settings.steps
     while True:
         try:
-            path = uc.rollout(policy, start, fine * steps, 1 / (fine * settings.rate), plane, name=name)
+            dt = 1 / (fine * settings.rate)
+            path = uc.rollout(policy, start, fine * steps, dt, plane, name=name, least_support=0.0)
         except InvalidDataError:  # it runs away; show how it begins to
             steps = max(1, steps // 2)
         else:
