@@ -19,6 +19,7 @@ from .evaluation import npoe as npoe
 from .evaluation import nppe as nppe
 from .evaluation import nupe as nupe
 from .evaluation import upe as upe
+from .learners import Contracting as Contracting
 from .learners import Direct as Direct
 from .learners import Hybrid as Hybrid
 from .learners import Inconsistency as Inconsistency

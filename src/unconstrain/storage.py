@@ -37,6 +37,7 @@ from .base.foreign import check_size, ours_alone
 from .constraints import STORED, LearntConstraint
 from .learners import (
     Belief,
+    Contracting,
     Direct,
     Hybrid,
     Inconsistency,
@@ -70,7 +71,8 @@ _KNOWN: dict[str, type] = {
     for kind in (
         *(Affine, Everywhere, KMeansRBF, Model, NormalisedRBF, Polynomial, ReceptiveFields, Scale),
         *(spaces.Circle, spaces.Embedding, spaces.Euclidean, spaces.Product, spaces.Sphere),
-        *(Belief, Direct, Hybrid, Inconsistency, Judged, Likelihood, NoiseCorrected, Robust, Segments, Solution),
+        *(Belief, Contracting, Direct, Hybrid, Inconsistency, Judged),
+        *(Likelihood, NoiseCorrected, Robust, Segments, Solution),
         *(FoldedMoments, Folds, HeldOut, Moments, Split, Training),
         *(LocallyLinearPolicy, ParametricPolicy),
         *GUIDED,

@@ -314,10 +314,9 @@ def rollout(
         rows = None if output != "-" else _rows(path).tolist()
         told = None if verdict is None else verdict.to_json()
         click.echo(json.dumps({"columns": columns, "rows": rows, "output": output, "verdict": told}))
-        return
-    if verdict is not None and (output != "-" or verdict.doubt):
+    elif verdict is not None and (output != "-" or verdict.doubt):
         say_verdict(verdict, err=output == "-")
-    if output != "-":
+    if output != "-" and not as_json:
         say_written({"movement": output}, None)
     if trouble is not None:
         raise trouble

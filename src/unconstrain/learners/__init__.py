@@ -7,6 +7,7 @@ Examples
 """
 
 from . import robust, secondary
+from .contracting import Contracting
 from .direct import Direct
 from .hybrid import Hybrid
 from .inconsistency import Inconsistency
@@ -17,6 +18,7 @@ from .solution import Belief, Judged, Solution, Uncertainty
 
 __all__ = [
     "Belief",
+    "Contracting",
     "Direct",
     "Hybrid",
     "Inconsistency",

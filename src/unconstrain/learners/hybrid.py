@@ -53,7 +53,7 @@ class Hybrid(Learner):
         compromise of both objectives.
     secondary : callable or Secondary, optional
         What is minimised in the directions left undetermined, in place of the standard risk: ``towards(goal, gain)``,
-        ``like(policy)``, ``damped(gain)`` of :mod:`unconstrain.learners.secondary`, sums of them and of
+        ``like(policy)``, ``damped(gain)``, ``smooth()`` of :mod:`unconstrain.learners.secondary`, sums of them and of
         :func:`~unconstrain.learners.secondary.standard_risk`, or a function of your own from moments to a quadratic.
 
     Examples

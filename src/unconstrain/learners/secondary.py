@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, TypeAlias
 
 import numpy as np
@@ -73,6 +73,30 @@ class Like(Secondary):
         return lambda moments: (share * moments.weight) * whole
 
 
+@dataclass(frozen=True)
+class Smooth(Secondary):
+    """``weight · Σ w (‖Δπ̃‖² / ‖Δx‖²) s²`` over neighbours in time, with the mean squared distance s² of states.
+
+    The slope along what was shown, as if it went on over all of it: no unit and no rate of sampling matters. Constant
+    policies have none, so a millionth of ``‖π̃‖²`` is beside it.
+    """
+
+    weight: float = 1.0
+
+    def on(self, training: Training) -> Objective:
+        """The slope at all samples, in proportion to the part's."""
+        samples = training.samples.counted
+        places = training.model.embedding(samples.states)
+        ways, spread = np.linalg.norm(np.diff(places, axis=0), axis=1), np.sqrt(places.var(axis=0).sum())
+        moved = np.flatnonzero((np.diff(samples.groups) == 0) & (ways > 0.0))
+        slopes = (spread / ways[moved])[:, None] * (samples.features[moved + 1] - samples.features[moved])
+        steps = replace(samples[moved + 1], features=slopes)
+        slope = steps.risk(0.0 * steps.actions, np.ones(len(steps)))
+        share = self.weight / np.where(samples.sizes > 0.0, samples.sizes, 1.0)
+        little = Damped(1e-6 * self.weight)
+        return lambda moments: (share * moments.weight) * slope + little(moments)
+
+
 @dataclass(frozen=True, eq=False)
 class Towards:
     """``v(x) = −gain (x − x*)``."""
@@ -95,6 +119,12 @@ def towards(goal: ArrayLike, gain: float, weight: float = 1.0) -> Secondary:
     """Move to a goal (n,) with ``−gain (x − x*)``, gain in 1/s, where actions are velocities of the state."""
     check_at_least("gain", gain, 0.0)
     return like(Towards(as_vector(goal, "goal"), float(gain)), weight)
+
+
+def smooth(weight: float = 1.0) -> Secondary:
+    """Change as little as can be along the demonstrated movements; see :class:`Smooth`."""
+    check_at_least("weight", weight, 0.0, strict=True)
+    return Smooth(weight)
 
 
 def damped(gain: float) -> Objective:
@@ -122,5 +152,5 @@ def on(secondary: Secondary | Objective | None, training: Training) -> Objective
     return standard_risk if secondary is None else secondary
 
 
-STORED = (Damped, Like, Sum, Towards)
+STORED = (Damped, Like, Smooth, Sum, Towards)
 """What secondary objectives are made of, for the file of a policy."""

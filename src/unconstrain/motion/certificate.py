@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ..base.arrays import Array
+from ..base.errors import SettingError
+from ..models import ClosedForm, spaces
 from ..risks import null_space_projection
 from .guided import Guided
 from .rollouts import rollout
@@ -44,8 +47,8 @@ def certify(policy: Callable[[Array], Array], states: Array, seed: int = 0) -> C
     Parameters
     ----------
     policy : callable
-        States (N, n) to velocities (N, n); :class:`Guided` has a guarantee by construction, an affine policy one by
-        its eigenvalues, and any other none.
+        States (N, n) to velocities (N, n); :class:`Guided` has a guarantee by construction, affine models one by their
+        eigenvalues (:class:`~unconstrain.Contracting` learns such ones), and any other policy none.
     states : ndarray, shape (N, n)
         Where it was learnt; starts are drawn around them.
     seed : int
@@ -66,7 +69,7 @@ def certify(policy: Callable[[Array], Array], states: Array, seed: int = 0) -> C
     if isinstance(policy, Guided):
         far = middle + (starts - middle) * 10.0 ** rng.uniform(-3.0, 2.0, (TRIES, 1))
         return _guided(policy, far, normals)
-    return _affine(policy, starts) or _refuted(policy, starts, normals, NEAR * size)
+    return _affine(policy, starts) or _blended(policy) or _refuted(policy, starts, normals, NEAR * size)
 
 
 def _guided(policy: Guided, states: Array, normals: Array) -> Certificate:
@@ -114,6 +117,44 @@ def _affine(policy: Callable[[Array], Array], states: Array) -> Certificate | No
     normal = np.linalg.svd(way[None])[2][-1]
     said = f"not guaranteed: the policy is affine and moves apart along ({_listed(way)}), at {rates[-1]:.4g} per second"
     return _against(said, states[0], normal)
+
+
+def _blended(policy: Any) -> Certificate | None:
+    """Of affine models that contract and rest in one place, however they are blended; None of any other policy.
+
+    With z = x − x* and ``‖J_m‖ ≤ L`` a step changes ``‖z‖²`` by ``−2 Δt c ‖z‖² + Δt² L² ‖z‖²`` at most. On a surface
+    whose nearest point is h from the goal, ``zᵀ N J_m h ≤ K ‖z‖ ‖h‖``, where a multiple of I in J_m does not count.
+    """
+    form = _formula(policy)
+    if form is None or form.monomials is not None or form.maps.shape[1:] != (len(form.origin), len(form.origin) + 1):
+        return None
+    jacobians, offsets = form.maps[..., :-1], form.maps[..., -1]
+    rate = -float(np.linalg.eigvalsh(0.5 * (jacobians + jacobians.mT))[:, -1].max())
+    if rate <= 0.0 or not isinstance(form.embedding.space, spaces.Euclidean):
+        return None
+    rests = -np.linalg.solve(jacobians, offsets[..., None])[..., 0]
+    goal = rests.mean(axis=0)
+    if np.abs(jacobians @ goal + offsets).max() > 1e-9 * np.abs(offsets).max():
+        return None
+    goal = np.where(np.abs(form.origin + goal) > 1e-12 * np.abs(form.origin).max(), form.origin + goal, 0.0)
+    uneven = jacobians - np.trace(jacobians, axis1=1, axis2=2)[:, None, None] / len(goal) * np.eye(len(goal))
+    most, skew = (float(np.linalg.norm(each, 2, axis=(1, 2)).max()) for each in (jacobians, uneven))
+    return Certificate(
+        True,
+        f"From every state, movements arrive at ({_listed(goal)}), free and on every flat surface through it: the "
+        f"distance to it falls at {rate:.4g} per second or faster, with Euler steps of up to "
+        f"{2.0 * rate / most**2:.3g} s, since each of {len(rests)} affine models contracts and rests there. On a "
+        f"surface that misses it they end within {skew / rate:.3g} times the distance between it and the surface's "
+        "nearest point.",
+    )
+
+
+def _formula(policy: Any) -> ClosedForm | None:
+    """What a policy says of itself, if it does."""
+    try:
+        return policy.closed_form() if hasattr(policy, "closed_form") else None
+    except SettingError:
+        return None
 
 
 def _refuted(policy: Callable[[Array], Array], starts: Array, normals: Array, near: float) -> Certificate:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +13,7 @@ from scipy.special import ndtri, stdtrit
 from ...base.arrays import Array
 from ...base.display import counted_off
 from ...models import Model
-from ...risks import Quadratic, eigensystem, vec
+from ...risks import SECONDARY_NOISE, Quadratic, eigensystem, unvec, vec
 from ...training import Samples
 from ..solution import Belief, Solution
 from .candidate import Candidate
@@ -32,7 +33,9 @@ from .posterior import Posterior, unit_information
 from .smoothness import Smoothness
 
 
-def solution(chosen: Candidate, samples: Samples, everything: Samples, model: Model, **more: Any) -> Solution:
+def solution(
+    chosen: Candidate, samples: Samples, everything: Samples, model: Model, second: Quadratic | None = None, **more: Any
+) -> Solution:
     """The solution of a candidate, with a belief.
 
     Parameters
@@ -41,6 +44,8 @@ def solution(chosen: Candidate, samples: Samples, everything: Samples, model: Mo
     samples, everything : Samples
         Those of positive weight, and all.
     model : Model
+    second : Quadratic, optional
+        What is minimised in the directions that are not determined; by default weights are the candidate's.
     **more
         Further fields of the belief.
     """
@@ -62,7 +67,7 @@ def solution(chosen: Candidate, samples: Samples, everything: Samples, model: Mo
     )
     count, d, p = chosen.weights.shape
     return Solution(
-        chosen.weights,
+        chosen.weights if second is None else _followed(chosen.weights, second, [one.open for one in told]),
         np.array([one.determined for one in told], dtype=np.intp),
         d * p,
         np.zeros(count),
@@ -75,6 +80,19 @@ def weak_prior(samples: Samples) -> Quadratic:
     """Unit information of p samples, their residual along each coordinate as large as the whole action."""
     risk = samples.risk(samples.actions, np.full(len(samples), 1.0 / max(samples.energy, 1e-300)))
     return unit_information(samples.regressors, samples.sizes) * risk
+
+
+def _followed(weights: Array, second: Quadratic, open_: Sequence[Array]) -> Array:
+    """Weights (M, d, p) changed within the columns of M matrices (P, K) only, to where the second objective is least.
+
+    Minimised in coordinates of the open directions: the others are equal to rounding.
+    """
+    flat, left = vec(weights), second.linear - np.einsum("mij,mj->mi", second.hessian, vec(weights))
+    moved = [
+        basis @ np.linalg.pinv(basis.T @ hessian @ basis, SECONDARY_NOISE, hermitian=True) @ (basis.T @ rest)
+        for basis, hessian, rest in zip(open_, second.hessian, left, strict=True)
+    ]
+    return unvec(flat + np.stack(moved), weights.shape[1])
 
 
 class _Priors:
@@ -113,7 +131,9 @@ class _Told:
         parts = self._whitened(evidence.hessians[:, m])
         claimed = self._whitened(chosen.posterior.evidence.hessian[m])
         self._known = _restricted(claimed, parts.sum(axis=0), surely(parts, self._least))
-        self.determined = int((np.linalg.eigvalsh(self._known) > 1.0).sum())
+        shares, directions = np.linalg.eigh(self._known)
+        self.determined = int((shares > 1.0).sum())
+        self.open = self._axes @ directions[:, shares <= 1.0]
         values, vectors = np.linalg.eigh(self._known + priors.precision[m])
         self._both = (vectors / np.maximum(values, 1e-12 * values[-1])) @ vectors.T
         noise = self._both @ self._known @ self._both

@@ -15,6 +15,7 @@ from ...training import Batch, Samples, Training
 from ..direct import Direct
 from ..hybrid import Hybrid
 from ..learner import Learner
+from ..secondary import Objective, Secondary, on
 from ..solution import Belief, Solution
 from ..thresholds import judged
 from .belief import solution, weak_prior
@@ -40,9 +41,18 @@ THINNED = (
 )
 
 
+@dataclass(frozen=True)
 class SampleLearner(Learner):
-    """Learns from the samples, not only from their moments; its solution has a ``belief``."""
+    """Learns from the samples, not only from their moments; its solution has a ``belief``.
 
+    Parameters
+    ----------
+    secondary : callable or Secondary, optional
+        What is minimised in the directions that ``solution_.determined`` does not count, in place of what the learner
+        itself supposes there; see :class:`~unconstrain.Hybrid`.
+    """
+
+    secondary: Objective | Secondary | None = field(default=None, kw_only=True)
     needs_samples: ClassVar[bool] = True
 
     def learn(self, training: Training) -> Solution:
@@ -60,12 +70,32 @@ class SampleLearner(Learner):
     def _learnt(self, training: Training, everything: Samples) -> Solution:
         samples = held_out_together(everything.counted)
         if _trivial(samples):
-            found = _plain(training, samples, everything)
+            found = self._plain(training, samples, everything)
         else:
             chosen, more = self.candidate(samples, training)
             more["held_out_score"] = _explained(samples, chosen.held_out)
-            found = solution(chosen, samples, everything, training.model, **more)
+            second = None if self.secondary is None else on(self.secondary, training)(training.folds.whole)
+            found = solution(chosen, samples, everything, training.model, second, **more)
         return replace(found, notes=everything.notes)
+
+    def _plain(self, training: Training, samples: Samples, everything: Samples) -> Solution:
+        """The hybrid's solution, with a belief from its residuals."""
+        found, whole = Hybrid(secondary=self.secondary).learn(training), training.filled.whole
+        size, d = found.directions, samples.actions.shape[1]
+        residual = judged(inconsistency(whole), vec(found.weights)) / np.maximum(samples.sizes - size, 1.0)
+        evidence = (1.0 / np.maximum(residual, LEAST_MISFIT**2 * samples.energy + 1e-300)) * inconsistency(whole)
+        from_noise, undetermined = Posterior(evidence, weak_prior(samples)).covariances()
+        return replace(
+            found,
+            belief=Belief(
+                noise=float(np.sqrt(residual.mean())),
+                misfit=LEAST_MISFIT * float(np.sqrt(samples.energy / d)),
+                free_share=1.0,
+                free=np.ones(len(everything.places)),
+                from_noise=from_noise,
+                undetermined=undetermined,
+            ),
+        )
 
     @abstractmethod
     def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
@@ -104,6 +134,8 @@ class Likelihood(_Maximising):
         Most steps of expectation maximisation from each of two starts.
     most : int
         All steps but the last use at most so many samples, evenly thinned in time.
+    secondary : callable or Secondary, optional
+        Followed in directions that are not determined; see :class:`~unconstrain.Hybrid`.
 
     Examples
     --------
@@ -131,6 +163,8 @@ class NoiseCorrected(SampleLearner):
     ----------
     noise : float, optional
         Standard deviation of the noise on each action coordinate; estimated by default.
+    secondary : callable or Secondary, optional
+        Followed in directions that are not determined; see :class:`~unconstrain.Hybrid`.
 
     Examples
     --------
@@ -165,6 +199,8 @@ class Segments(SampleLearner):
         actions, which must then be in the order of time.
     noise : float, optional
         Standard deviation of the noise on each action coordinate; by default from differences in time.
+    secondary : callable or Secondary, optional
+        Followed in directions that are not determined; see :class:`~unconstrain.Hybrid`.
 
     Examples
     --------
@@ -223,6 +259,8 @@ class Robust(_Maximising):
         whatever the policy's scale. A candidate then is the policy
         of least constrained error under ``A = Λ J``, with Λ and its rank from the demonstrations; see
         :mod:`unconstrain.learners.robust.held_rows`. It is not stored with a policy.
+    secondary : callable or Secondary, optional
+        Followed in directions that are not determined; see :class:`~unconstrain.Hybrid`.
 
     Examples
     --------
@@ -249,7 +287,7 @@ class Robust(_Maximising):
     def learn(self, training: Training) -> Solution:
         """Learn from the samples where they were kept, and from the moments elsewhere."""
         if training.kept is None:
-            return replace(Hybrid(alpha="auto").learn(training), notes=(SUMS_ALONE,))
+            return replace(Hybrid(alpha="auto", secondary=self.secondary).learn(training), notes=(SUMS_ALONE,))
         return super().learn(training)
 
     def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
@@ -342,23 +380,3 @@ def _explained(samples: Samples, policy: Array) -> float:
 def _trivial(samples: Samples) -> bool:
     """Whether there is one action column only, no motion, or nothing to hold out."""
     return samples.actions.shape[1] == 1 or samples.energy == 0.0 or samples.folds.max() == 0
-
-
-def _plain(training: Training, samples: Samples, everything: Samples) -> Solution:
-    """The hybrid's solution, with a belief from its residuals."""
-    found, whole = Hybrid().learn(training), training.filled.whole
-    size, d = found.directions, samples.actions.shape[1]
-    residual = judged(inconsistency(whole), vec(found.weights)) / np.maximum(samples.sizes - size, 1.0)
-    evidence = (1.0 / np.maximum(residual, LEAST_MISFIT**2 * samples.energy + 1e-300)) * inconsistency(whole)
-    from_noise, undetermined = Posterior(evidence, weak_prior(samples)).covariances()
-    return replace(
-        found,
-        belief=Belief(
-            noise=float(np.sqrt(residual.mean())),
-            misfit=LEAST_MISFIT * float(np.sqrt(samples.energy / d)),
-            free_share=1.0,
-            free=np.ones(len(everything.places)),
-            from_noise=from_noise,
-            undetermined=undetermined,
-        ),
-    )

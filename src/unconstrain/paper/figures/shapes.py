@@ -10,7 +10,13 @@ import numpy as np
 from ...base.arrays import Array
 from ...pages.figures.style import COLOURS, figure
 
-WAYS = {"shown": ("training", 2.5), "unguided": ("inconsistency", 1.2), "random": ("", 0.5), "guided": ("hybrid", 1.2)}
+WAYS = {
+    "shown": ("training", 2.5),
+    "unguided": ("inconsistency", 1.2),
+    "contracting": ("robust", 0.9),
+    "random": ("", 0.5),
+    "guided": ("hybrid", 1.2),
+}
 """Way to the key of its colour and the width of its lines, in the order in which they are drawn."""
 
 PALE = "#9ccfbc"

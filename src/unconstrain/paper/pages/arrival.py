@@ -24,6 +24,7 @@ def page(result: Result) -> str:
         "movement, free or held by any plane. Here it is tried on thirty shapes that people drew, and on cycles.",
         html.section("In short", html.bullets(arrival.headlines(result))),
         *([html.section("All shapes", _pictures(result), _shapes(result.rows))] if result.rows else []),
+        *([html.section("Beside other ways", *_beside(tables["ways"]))] if result.rows else []),
         *([html.section("What it costs where it was shown", _prices(tables["prices"]))] if result.rows else []),
         *([html.section("On planes", _planes(tables["planes"]))] if result.rows else []),
         *([html.section("Cycles", _cycles(tables["cycles"]))] if tables["cycles"] else []),
@@ -34,7 +35,8 @@ def page(result: Result) -> str:
 def _pictures(result: Result) -> html.Markup:
     caption = (
         "Grey: the strokes. Green: guided, from where they begin, and thin from random starts. Orange: what the policy "
-        "does by itself from where they begin, until it leaves the picture. The dot is the goal. All in mm."
+        "does by itself from where they begin, until it leaves the picture. Violet: contracting. The dot is the goal. "
+        "All in mm."
     )
     return html.picture("shapes", shapes.small_multiples(result.details["drawn"]), caption, least=150)
 
@@ -64,6 +66,52 @@ def _shapes(rows: Sequence[Row]) -> html.Markup:
     return html.table(header, body, note=note)
 
 
+WAYS = {
+    "unguided": "policy by itself",
+    "guided": "guided",
+    "contracting": "contracting",
+    "stable": "LPV-DS (Figueroa and Billard 2018)",
+}
+
+
+def _beside(rows: Sequence[Row]) -> list[html.Markup]:
+    means = [
+        [
+            WAYS[way],
+            *(f"{mean[key]:.1%}" for key in ("shown", "random")),
+            *(html.number(mean[key]) for key in ("area", "dtw", "step_us")),
+        ]
+        for way, mean in arrival.by_way(rows).items()
+    ]
+    header = [
+        "means over the shapes",
+        "arrive,\nshown",
+        "arrive,\nrandom",
+        "area\n(mm²)",
+        "warping\n(mm)",
+        "one step\n(µs)",
+    ]
+    note = (
+        "Contracting: local models learnt under the condition that each contracts towards the goal. LPV-DS: a mixture "
+        "of linear systems with one quadratic Lyapunov function, which knows no constraints; for figures only. Areas "
+        "and warping are of movements that arrive: a policy by itself is judged by the few that do."
+    )
+    by_shape = {row["shape"]: dict[str, Row]() for row in rows}
+    for row in rows:
+        by_shape[row["shape"]][row["way"]] = row
+    body = [
+        [shape, *(html.number(ways[way]["area"]) for way in WAYS), *(html.number(ways[way]["dtw"]) for way in WAYS)]
+        for shape, ways in by_shape.items()
+    ]
+    short = ["by itself", "guided", "contracting", "LPV-DS"]
+    each = html.table(
+        ["shape", *(f"area,\n{way}" for way in short), *(f"warping,\n{way}" for way in short)],
+        body,
+        note="Area (mm²) between path and stroke, and distance after time warping (mm); “–” where none arrives.",
+    )
+    return [html.table(header, means, note=note), html.folded("Each shape", each)]
+
+
 def _prices(rows: Sequence[Row]) -> html.Markup:
     steps = [name for name in rows[0] if name != "shape"]
     body = [[row["shape"], *(html.number(row[step]) for step in steps)] for row in rows]
@@ -76,16 +124,17 @@ def _prices(rows: Sequence[Row]) -> html.Markup:
 
 
 def _planes(rows: Sequence[Row]) -> html.Markup:
-    keys = ("own_planes", "falls", "optimum")
+    keys = ("own_planes", "contracting", "falls", "optimum")
     body = [
         [row["shape"], *(f"{row[key]:.0%}" for key in keys), html.number(row["area"]), html.number(row["nupe_ratio"])]
         for row in rows
     ]
     note = (
         "Every stroke is turned onto a plane of its own, which nobody tells the learner. Strokes are followed on their "
-        "planes; from random starts, on planes of any tilt, movements should end where V is least on the plane."
+        "planes, guided and, in the next column, contracting; from random starts, on planes of any tilt, movements "
+        "should end where V is least on the plane."
     )
-    header = ["shape", "strokes\narrive", "V falls", "ends where V\nis least", "area\n(mm²)", "nUPE ×"]
+    header = ["shape", "strokes\narrive", "contracting", "V falls", "ends where V\nis least", "area\n(mm²)", "nUPE ×"]
     return html.table(header, body, note=note)
 
 

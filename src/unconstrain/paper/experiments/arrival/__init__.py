@@ -21,6 +21,9 @@ from . import cycles, strokes
 
 CYCLES = "cycles"
 
+OTHERS = {"contracting": "contracting", "stable": "LPV-DS"}
+"""What arrives by construction, too."""
+
 DRIFT_MM = 5.0
 """A cycle that drifts by more over a hundred turns leaves its place."""
 
@@ -40,7 +43,7 @@ class Settings:
     turns : int
         Of each cycle.
     dt : float
-        Of the Euler steps, s.
+        V is learnt for Euler steps of this length, s, or longer ones, with which movements are then followed.
     longest : float
         Movements take so many times as long as the longest demonstration.
     every : int
@@ -67,7 +70,8 @@ def run(
     -------
     Result
         A row for each shape; the table "planes" has one for each shape lifted onto planes, "prices" what guiding costs
-        with steps of several lengths, "cycles" a row for each cycle. ``details["drawn"]`` maps
+        with steps of several lengths, "ways" compares guided with unguided, contracting and another stable policy,
+        "cycles" has a row for each cycle. ``details["drawn"]`` maps
         shapes to paths: "shown", "unguided" and "guided", first those from where strokes began.
     """
     chosen = settings or Settings()
@@ -86,6 +90,7 @@ def run(
         {"drawn": {one["row"]["shape"]: one["drawn"] for one in free}},
         {
             "planes": lifted,
+            "ways": [way for one in free for way in one["ways"]],
             "prices": [one["prices"] for one in free],
             "cycles": [row for rows in turned for row in rows],
         },
@@ -127,6 +132,7 @@ def headlines(result: Result) -> list[str]:
     """What was found, in a sentence for each promise."""
     return [
         *(_of_shapes(result.rows, result.tables["prices"]) if result.rows else []),
+        *(_beside(result.tables["ways"]) if result.rows else []),
         *(_on_planes(result.tables["planes"]) if result.rows else []),
         *(_of_cycles(result.tables["cycles"]) if result.tables["cycles"] else []),
     ]
@@ -152,11 +158,37 @@ def _of_shapes(rows: Sequence[Row], prices: Sequence[Row]) -> list[str]:
     ]
 
 
+def by_way(rows: Sequence[Row]) -> dict[str, dict[str, float | None]]:
+    """Means over the shapes of each way; of an area over those where it arrives from where strokes began."""
+    found = {}
+    for way in dict.fromkeys(row["way"] for row in rows):
+        mine = [row for row in rows if row["way"] == way]
+        told = {
+            key: [row[key] for row in mine if row[key] is not None] for key in mine[0] if key not in ("shape", "way")
+        }
+        found[way] = {key: float(np.mean(values)) if values else None for key, values in told.items()}
+    return found
+
+
+def _beside(rows: Sequence[Row]) -> list[str]:
+    """Guided beside what else arrives."""
+    areas = {way: np.array([row["area"] for row in rows if row["way"] == way]) for way in ("guided", *OTHERS)}
+    said = []
+    for way, name in OTHERS.items():
+        ratios = areas["guided"] / areas[way]
+        said.append(
+            f"guided paths sweep {areas['guided'].mean() / areas[way].mean():.2f} times the area of {name} ones: more "
+            f"than 1.2 times in {(ratios > 1.2).sum()} of {len(ratios)} shapes, {np.median(ratios):.2f} in their median"
+        )
+    return said
+
+
 def _on_planes(rows: Sequence[Row]) -> list[str]:
-    falls, optimum, own = (float(np.mean([row[key] for row in rows])) for key in ("falls", "optimum", "own_planes"))
+    keys = ("falls", "optimum", "own_planes", "contracting")
+    falls, optimum, own, contracting = (float(np.mean([row[key] for row in rows])) for key in keys)
     return [
         f"on random planes V falls at every step in {falls:.1%}, and ends where it is least there in {optimum:.1%}",
-        f"strokes turned onto planes of their own: {own:.1%} arrive",
+        f"strokes turned onto planes of their own: {own:.1%} arrive guided, {contracting:.1%} contracting",
     ]
 
 

@@ -14,6 +14,7 @@ import unconstrain as uc
 from ....base.arrays import Array
 from ...datasets import load_handwriting
 from .paths import resampled, swept_area, warped
+from .stable import stable
 
 if TYPE_CHECKING:
     from . import Settings
@@ -30,18 +31,24 @@ DRAWN = 12
 AROUND = 1.5
 """Random starts are anywhere in a box so many times that of the demonstrations."""
 
-PLANE_DT = 0.02
-"""Of the Euler steps on planes, s."""
+LONGEST_STEP = 0.02
+"""Of Euler's, s: movements are followed with steps up to this with which V is sure to fall."""
 
 PATIENCE = 3.0
-"""On random planes movements may take so many times as long: V falls slowly where a plane leaves little of a policy."""
+"""Of what comes nearer slowly at worst: so many times as long."""
 
 PIECE_S = 0.5
 """What has not moved for so long, by more than STILL of the largest distance, has come to rest."""
 
 STILL = 1e-4
 
-PACES = (0.02, 0.01, 0.005, 0.002, 0.001)
+RATE = 0.3
+"""At which contracting and stable policies come nearer at least, over the duration of the longest stroke."""
+
+FREE = 1e3
+"""Softness of the contracting policy of free strokes: those of the standard risk alone, as of the policy guided."""
+
+PACES = (0.02, 0.005, 0.001)
 """Steps for which V is learnt and the price is told, s."""
 
 STEEPEST = np.pi / 4
@@ -54,32 +61,62 @@ def free(shape: str, settings: Settings) -> dict[str, Any]:
     policy = uc.LocallyLinearPolicy(learner="direct").fit_demonstrations(demos)
     guided = uc.Guided(policy, demonstrations=demos, dt=settings.dt)
     strokes = [demo.states for demo in demos]
-    starts = [*(stroke[0] for stroke in strokes), *anywhere(demos, settings)]
-    ways: Ways = {"unguided": stopped_outside(policy, demos), "guided": guided}
-    runs = {name: _paths(way, starts, demos, settings) for name, way in ways.items()}
+    contracting = _contracting(demos, guided.goal_, FREE)
+    runs = _runs(policy, guided, contracting, demos, settings)
     ends = {name: arrived(paths, guided.goal_, demos) for name, paths in runs.items()}
-    shown = slice(len(demos))
+    timed = {"unguided": policy, "guided": guided, "contracting": contracting}
+    steps = {name: 1e6 * per_step(one, demos) for name, one in timed.items()}
+    likeness = {name: _likeness(runs[name], ends[name], strokes) for name in runs}
+    shares = {name: _shares(there, len(demos)) for name, there in ends.items()}
     row = {
         "shape": shape,
-        **{f"shown_{name}": float(there[shown].mean()) for name, there in ends.items()},
-        **{f"random_{name}": float(there[len(demos) :].mean()) for name, there in ends.items()},
-        **_likeness(runs, ends["unguided"][shown], strokes),
+        **{f"{key}_{name}": shares[name][key] for key in ("shown", "random") for name in ("unguided", "guided")},
+        "area": likeness["guided"]["area"],
+        "area_ratio": _ratio(runs, ends["unguided"], strokes),
+        "dtw": likeness["guided"]["dtw"],
         **_price(policy, guided, demos),
-        "step": per_step(guided, demos) / per_step(policy, demos),
+        "step": steps["guided"] / steps["unguided"],
         "dt": guided.dt_,
-    }
-    count = len(demos)
-    drawn = {
-        "shown": strokes,
-        "unguided": runs["unguided"][:count],
-        "guided": runs["guided"][:count],
-        "random": runs["guided"][count : count + DRAWN],
     }
     return {
         "row": row,
+        "ways": [
+            {"shape": shape, "way": name, **shares[name], **likeness[name], "step_us": steps.get(name)} for name in runs
+        ],
         "prices": {"shape": shape} | _prices(policy, demos),
-        "drawn": {name: [resampled(path, 60).round(2).tolist() for path in paths] for name, paths in drawn.items()},
+        "drawn": _drawn(runs, strokes),
     }
+
+
+def _runs(
+    policy: uc.Policy, guided: uc.Guided, contracting: uc.Policy, demos: Demos, settings: Settings
+) -> dict[str, list[Array]]:
+    """Paths of every way, from where strokes began and from anywhere."""
+    ways: Ways = {
+        "unguided": stopped_outside(flow(policy), demos),
+        "guided": flow(policy, guided.aim_),
+        "contracting": flow(contracting),
+        "stable": stable(demos, guided.goal_, RATE / _longest(demos)),
+    }
+    starts = [*(demo.states[0] for demo in demos), *anywhere(demos, settings)]
+    patience = {"contracting": PATIENCE, "stable": PATIENCE}
+    return {
+        name: followed(way, starts, demos, settings, _step(guided), patience.get(name, 1.0))
+        for name, way in ways.items()
+    }
+
+
+def _shares(there: NDArray[np.bool_], count: int) -> dict[str, float]:
+    """Of movements that arrive, of which so many began where strokes did."""
+    return {"shown": float(there[:count].mean()), "random": float(there[count:].mean())}
+
+
+def _drawn(runs: dict[str, list[Array]], strokes: Sequence[Array]) -> dict[str, Any]:
+    """Paths to draw, in short."""
+    count = len(strokes)
+    drawn = {name: runs[name][:count] for name in ("contracting", "unguided", "guided")}
+    drawn |= {"shown": list(strokes), "random": runs["guided"][count : count + DRAWN]}
+    return {name: [resampled(path, 60).round(2).tolist() for path in paths] for name, paths in drawn.items()}
 
 
 def lifted(shape: str, settings: Settings) -> dict[str, Any]:
@@ -93,16 +130,20 @@ def lifted(shape: str, settings: Settings) -> dict[str, Any]:
     ]
     policy = uc.LocallyLinearPolicy(learner=uc.Hybrid(threshold=0.0, softness=0.1)).fit_demonstrations(demos)
     guided = uc.Guided(policy, demonstrations=demos, dt=settings.dt)
-    own = [uc.constraints.Plane(np.cross(*turn.T)) for turn in turns]
-    paths = _paths(guided, [demo.states[0] for demo in demos], demos, settings, own)
+    own = np.stack([turn @ turn.T for turn in turns])
+    starts = [demo.states[0] for demo in demos]
+    paths = followed(flow(policy, guided.aim_, own), starts, demos, settings, _step(guided))
     there = arrived(paths, guided.goal_, demos)
+    contracting = flow(_contracting(demos, guided.goal_, 0.1), None, own)
+    others = followed(contracting, starts, demos, settings, _step(guided), PATIENCE)
     inside = [path @ turn for path, turn in zip(paths, turns, strict=True)]
     return {
         "shape": shape,
         "own_planes": float(there.mean()),
+        "contracting": float(arrived(others, guided.goal_, demos).mean()),
         "area": float(np.mean([swept_area(a, b.states) for a, b in zip(inside, flat, strict=True)])),
         **_price(policy, guided, demos),
-        **_on_random_planes(guided, demos, rng, settings),
+        **_on_random_planes(policy, guided, demos, rng, settings),
     }
 
 
@@ -114,7 +155,7 @@ def anywhere(demos: Demos, settings: Settings) -> Array:
     return (low + high) / 2 + AROUND * (drawn - 0.5) * (high - low)
 
 
-def stopped_outside(policy: uc.Policy, demos: Demos) -> Callable[[Array], Array]:
+def stopped_outside(policy: Callable[[Array], Array], demos: Demos) -> Callable[[Array], Array]:
     """A policy that stands still far from anything that was shown: what leaves has left."""
     far = 10.0 * _reach(demos)
     return lambda states: np.where(np.linalg.norm(states, axis=1, keepdims=True) < far, policy(states), 0.0)
@@ -140,34 +181,60 @@ def _reach(demos: Demos) -> float:
     return float(np.linalg.norm(uc.stack(demos).states, axis=1).max())
 
 
-def _paths(
-    policy: Callable[[Array], Array], starts: Sequence[Array], demos: Demos, settings: Settings, held: Any = None,
+def _step(guided: uc.Guided) -> float:
+    return min(guided.dt_, LONGEST_STEP)
+
+
+def _longest(demos: Demos) -> float:
+    """Duration of the longest demonstration, s."""
+    return max(float(demo.times[-1]) for demo in demos if demo.times is not None)
+
+
+def flow(policy: uc.Policy, aim: Any = None, projections: Array | None = None) -> Callable[[Array], Array]:
+    """Velocities (N, n) of a policy, guided by an aim, under projections (N, n, n): as ``rollout`` has them, unchecked.
+
+    Nothing is checked at each of some ten thousand steps, nor is the projection found anew.
+    """
+    predict, weights = policy.training_.model.predict, policy.solution_.weights
+
+    def velocities(states: Array) -> Array:
+        wanted = predict(weights, states)
+        held = wanted if projections is None else uc.project(projections, wanted)
+        return held if aim is None else np.asarray(aim.guided(states, held, projections))
+
+    return velocities
+
+
+def followed(
+    velocities: Callable[[Array], Array], starts: Sequence[Array], demos: Demos, settings: Settings, dt: float,
     patience: float = 1.0,
 ) -> list[Array]:  # fmt: skip
-    """Followed until all have come to rest, or for as long as there is patience."""
-    longest = max(float(demo.times[-1]) for demo in demos if demo.times is not None)
-    steps = round(PIECE_S / settings.dt)
-    pieces, places = list[Array](), np.stack(starts)
-    for _ in range(int(patience * settings.longest * longest / PIECE_S)):
-        pieces.append(np.stack([run.states for run in uc.rollout(policy, places, steps + 1, settings.dt, held)]))
-        moved, places = np.abs(pieces[-1][:, -1] - places).max(), pieces[-1][:, -1]
-        if moved < STILL * _reach(demos):
+    """Followed by Euler's steps until all have come to rest, or for as long as there is patience."""
+    path, steps = [np.stack(starts)], round(PIECE_S / dt)
+    for _ in range(int(patience * settings.longest * _longest(demos) / PIECE_S)):
+        for _ in range(steps):
+            path.append(path[-1] + dt * velocities(path[-1]))
+        if np.abs(path[-1] - path[-1 - steps]).max() < STILL * _reach(demos):
             break
-    return list(np.concatenate([pieces[0][:, :1], *(piece[:, 1:] for piece in pieces)], axis=1))
+    return list(np.stack(path, axis=1))
 
 
-def _likeness(
-    runs: dict[str, list[Array]], there: NDArray[np.bool_], strokes: Sequence[Array]
-) -> dict[str, float | None]:
-    """Means over the strokes; the guided paths beside those unguided ones that arrive, where any does."""
-    areas = {name: np.array([swept_area(*pair) for pair in zip(paths, strokes, strict=False)])
-             for name, paths in runs.items()}  # fmt: skip
-    beside = float(areas["guided"][there].sum() / areas["unguided"][there].sum()) if there.any() else None
-    return {
-        "area": float(areas["guided"].mean()),
-        "area_ratio": beside,
-        "dtw": float(np.mean([warped(*pair) for pair in zip(runs["guided"], strokes, strict=False)])),
-    }
+def _contracting(demos: Demos, goal: Array, softness: float) -> uc.Policy:
+    learner = uc.Contracting(RATE / _longest(demos), goal, softness)
+    return uc.LocallyLinearPolicy(learner=learner).fit_demonstrations(demos)
+
+
+def _likeness(paths: Sequence[Array], there: NDArray[np.bool_], strokes: Sequence[Array]) -> dict[str, float | None]:
+    """Mean area and distance of the paths that arrive from where strokes began; None where none does."""
+    pairs = [(path, stroke) for path, stroke, arrives in zip(paths, strokes, there, strict=False) if arrives]
+    measures = {"area": swept_area, "dtw": warped}
+    return {name: float(np.mean([of(*pair) for pair in pairs])) if pairs else None for name, of in measures.items()}
+
+
+def _ratio(runs: dict[str, list[Array]], there: NDArray[np.bool_], strokes: Sequence[Array]) -> float | None:
+    """Area of guided paths over that of unguided ones, of those starts from where unguided ones arrive."""
+    guided, unguided = (_likeness(runs[name], there, strokes)["area"] for name in ("guided", "unguided"))
+    return None if guided is None or unguided is None else guided / unguided
 
 
 def _price(policy: uc.Policy, guided: uc.Guided, demos: Demos) -> dict[str, float]:
@@ -198,13 +265,13 @@ def _turn(rng: np.random.Generator) -> Array:
 
 
 def _on_random_planes(
-    guided: uc.Guided, demos: Demos, rng: np.random.Generator, settings: Settings
+    policy: uc.Policy, guided: uc.Guided, demos: Demos, rng: np.random.Generator, settings: Settings
 ) -> dict[str, float]:
     """Whether V falls at every step on planes of any tilt, and ends where it is least on them."""
     normals = rng.standard_normal((settings.trials, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    planes = [uc.constraints.Plane(normal) for normal in normals]
-    paths = _paths(guided, list(anywhere(demos, settings)), demos, settings, planes, PATIENCE)
+    velocities = flow(policy, guided.aim_, np.eye(3) - normals[:, :, None] * normals[:, None])
+    paths = followed(velocities, list(anywhere(demos, settings)), demos, settings, _step(guided), PATIENCE)
     falls, ends = [], []
     for path, normal in zip(paths, normals, strict=True):
         level = guided.potential_(path)
