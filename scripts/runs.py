@@ -126,6 +126,17 @@ def washing(found: list[Data]) -> Figures:
     return figures
 
 
+def arrival(found: list[Data]) -> Figures:
+    """Areas and distances after time warping in the mean over the shapes, and what guiding costs for each of them."""
+    figures: Figures = {}
+    for way in ("guided", "contracting", "stable"):
+        mine = [one for one in found[0]["ways"] if one["way"] == way]
+        figures |= {f"{way}: {what}": float(np.mean([one[what] for one in mine])) for what in ("area", "dtw")}
+    for one in found[0]["prices"]:
+        figures |= {f"{one['shape']}: price, {step}": one[step] for step in one if step != "shape"}
+    return figures
+
+
 def regimes(found: list[Data]) -> Figures:
     """Each learner against the paper's hybrid and the oracle; coverage; the limit cycle, half free, and the arm."""
     figures = {} if found[0]["settings"]["only"] else _over_regimes(found[0])
@@ -271,6 +282,7 @@ RUNS = {
     "table2": Run("unconstrain reproduce table2 --out results", "table2.json", table2),
     "demo": Run("unconstrain demo --out results/demo", "demo/washing.json", washing),
     "demo_real": Run("unconstrain demo --real --out results/real", "real/washing.json", washing),
+    "arrival": Run("unconstrain reproduce arrival --out results", "arrival.json", arrival),
     "regimes": Run("unconstrain reproduce regimes --out results", "regimes.json", regimes),
     "recorded": Run("unconstrain reproduce recorded --trials 8 --out results", "recorded.json", recorded),
     "constraints": Run("unconstrain reproduce constraints --out results", "constraints.json", constraints),
@@ -290,7 +302,7 @@ RUNS = {
         recordings,
     ),
     "faults": Run("python tests/faults.py 200 > results/faults.txt", "faults.txt", faults),
-    "fuzz": Run("python tests/fuzz.py > results/fuzz.txt", "fuzz.txt", fuzz),
+    "fuzz": Run("make fuzz FUZZ='--long --seconds 0' > results/fuzz.txt", "fuzz.txt", fuzz),
 }
 """By the name of the file in ``docs/results``; files are looked for in the folder that is taken in."""
 

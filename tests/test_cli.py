@@ -9,7 +9,6 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 
@@ -1114,7 +1113,7 @@ def demonstrated_with(result, *options):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(washing, "run", known)
-        patch.setattr(washing_arm, "film", partial(washing_arm.film, seconds=0.5))
+        patch.setattr(washing_arm, "film", lambda wipe, _, film=washing_arm.film: film(wipe, 0.5))
         return run("demo", *options)
 
 

@@ -17,8 +17,7 @@ from unconstrain.pages import figures
 from unconstrain.pages.figures.compact import compact
 from unconstrain.pages.figures.planes import arrow_lines, broken, clipped
 from unconstrain.pages.figures.style import INK, MARKERS, RULE, described, power, readable, svg
-from unconstrain.paper.figures import charts, overview, plates
-from unconstrain.recordings.demonstration import Demonstration
+from unconstrain.paper.figures import charts, plates
 
 rng = np.random.default_rng(0)
 NORMALS = [np.array(normal, float) for normal in ([0, 0, 1], [0, 0.3, 1], [1, 0, 0], [-0.95, 0.1, 0.1], [0, -1, 0])]
@@ -228,20 +227,6 @@ class TestRatioTable:
         assert [text.get_text() for text in axes.texts] == ["1", "0.01", "", "1584", "4e6", "20"]
         found = np.ma.filled(axes.collections[0].get_array(), np.nan).reshape(2, 3)
         np.testing.assert_allclose(found, [[0, -1, np.nan], [1, 1, 1]])
-
-
-class TestOverview:
-    states = rng.uniform(-1, 1, (30, 2))
-
-    def test_it_draws_a_file(self, tmp_path):
-        demo = Demonstration(self.states, self.states)
-        overview.overview(tmp_path / "a.png", [demo], np.tanh, {"learnt": np.negative}, arrows=5)
-        assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
-
-    def test_without_matplotlib_it_says_what_to_install(self, tmp_path, monkeypatch):
-        monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-        with pytest.raises(MissingExtraError, match=r"'matplotlib', which is not installed.*unconstrain\[viz\]"):
-            overview.overview(tmp_path / "a.png", [], np.tanh, {})
 
 
 def test_without_matplotlib_pictures_say_what_to_install(monkeypatch):

@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import sys
+from contextlib import contextmanager
 from types import SimpleNamespace
 
 import numpy as np
@@ -217,10 +218,25 @@ def test_what_held_the_hand_of_an_arm_is_drawn_along_its_joints(folder, tmp_path
         assert_allclose(rows[0] @ np.transpose(patch["free"]), 0.0, atol=1e-6)
 
 
+def heard():
+    """Ctrl-C is heard, though the tests themselves may run where it is not, in the background."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@contextmanager
+def ended(command):
+    """A command that is running, and is no more in the end, whatever happens."""
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment(), preexec_fn=heard) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
 @pytest.mark.slow
 def test_a_browser_sees_it_live(folder, browser):
     command = [sys.executable, "-m", "unconstrain", "look", folder / "wipe 0.csv", folder / "policy.npz", "--live"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment()) as process:
+    with ended(command) as process:
         address = next(found[0] for line in process.stdout if (found := re.search(r"http://\S+\d", line)))
         browser.get_log("browser")
         with on_a_phone(browser, 320, 240):  # few pixels, drawn without a graphics card

@@ -14,7 +14,9 @@ from unconstrain.base.threads import WORTH_A_THREAD, workers
 
 
 def blas_threads():
-    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+    """Of the BLAS of NumPy and SciPy; other packages may have loaded their own, of one thread."""
+    ours = [one for one in threadpool_info() if one["user_api"] == "blas" and "scs.libs" not in one["filepath"]]
+    return {library["num_threads"] for library in ours}
 
 
 def side_by_side(calls, multiplications):

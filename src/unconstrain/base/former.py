@@ -21,8 +21,13 @@ _MOVED = {
 }
 _NOW = {name: f"{room}.{name}" for room, names in _MOVED.items() for name in names.split()}
 _NOW |= {f"report.{name}": f"pages.{name}" for name in ("diagnosis", "fit", "html")}
-_NOW |= {f"figures.{name}": f"paper.figures.{name}" for name in ("arms", "overview")}
-_NOW |= {"batches": "training", "closed_form": "models.formula", "report": "paper.pages", "validation": "training"}
+_NOW |= {
+    "batches": "training",
+    "closed_form": "models.formula",
+    "figures.arms": "paper.figures.arms",
+    "report": "paper.pages",
+    "validation": "training",
+}
 _NOW |= {"robust.samples": "training.samples", "robust.uncertainty": "learners.solution"}
 
 

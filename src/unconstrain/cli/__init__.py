@@ -263,8 +263,8 @@ def score(
 @click.option(
     "--least-support",
     type=click.FloatRange(0.0, 1.0),
-    default=uc.models.SUPPORTED,
-    show_default=True,
+    default=lambda: uc.models.SUPPORTED,
+    show_default="0.001",
     help="Stop where demonstrations support less, 1 near and 0 far from them; 0 goes on.",
 )
 @click.option(
@@ -316,10 +316,10 @@ def rollout(
         click.echo(json.dumps({"columns": columns, "rows": rows, "output": output, "verdict": told}))
     elif verdict is not None and (output != "-" or verdict.doubt):
         say_verdict(verdict, err=output == "-")
-    if output != "-" and not as_json:
-        say_written({"movement": output}, None)
     if trouble is not None:
         raise trouble
+    if output != "-" and not as_json:
+        say_written({"movement": output}, None)
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain reproduce table1 --trials 100 --out results")

@@ -138,7 +138,7 @@ def recipe_of(
     return recipe if window is None else replace(recipe, window_s=window)
 
 
-def fitted_policy(path: str, kind: Any = uc.Policy) -> Any:
+def fitted_policy(path: str, kind: Any = None) -> Any:
     """The policy in a file, or another that ``kind`` asks for.
 
     Raises
@@ -146,7 +146,7 @@ def fitted_policy(path: str, kind: Any = uc.Policy) -> Any:
     ModelFileError
         Also if it is not fitted.
     """
-    policy = uc.load(path, kind)
+    policy = uc.load(path, kind or uc.Policy)
     if not hasattr(innermost(policy), "solution_"):
         raise ModelFileError(f"{path}: holds a policy that is not fitted. Fit it before saving.")
     return policy

@@ -16,6 +16,7 @@ from ..base.arrays import Array, require_extra
 from ..base.errors import InvalidDataError
 from ..constraints import Plane
 from ..evaluation import verdicts
+from ..models import SUPPORTED
 from ..recordings import Demonstration
 from .scene import LIGHT, PATCH, Scene, rgb_of, step_of
 
@@ -122,7 +123,7 @@ class Live:
             self._says.content = str(error)
             return start[None]
         self._says.content = "" if near is None else verdicts.of_support(near, track.times).said
-        far = np.zeros(len(track), bool) if near is None else near < verdicts.SUPPORTED
+        far = np.zeros(len(track), bool) if near is None else near < SUPPORTED
         self._draw("/movement", self._scene.places(track.states), np.where(far[:, None], GREY, INK), 0.008)
         return track.states
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import SettingError
-from ..evaluation import verdicts
+from ..models import SUPPORTED
 from ..motion import rollout
 from ..recordings import Demonstration
 
@@ -102,13 +102,13 @@ class Scene(NamedTuple):
             If the movement leaves the finite numbers.
         """
         policy: Any = self.policy
-        track = rollout(policy, start, steps, dt, held)
+        track = rollout(policy, start, steps, dt, held, least_support=0.0)
         try:
             support = policy.support(track.states)
         except SettingError:  # of a policy that has none
             return Movement(track, None)
         ways = np.linalg.norm(np.diff(track.states, axis=0, prepend=track.states[:1]), axis=1)
-        beyond = np.cumsum(ways * (support < verdicts.SUPPORTED))
+        beyond = np.cumsum(ways * (support < SUPPORTED))
         extent = np.ptp(np.vstack([demo.states for demo in self.demonstrations]), axis=0).max()
         near = beyond <= BEYOND * extent
         return Movement(track[near], support[near])
