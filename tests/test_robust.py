@@ -498,3 +498,11 @@ def test_a_learner_may_look_at_states_times_and_groups(tmp_path):
     assert samples[samples.groups == 1].times.shape == (30,)
     uc.LocallyLinearPolicy(learner=Looks()).fit(*uc.stack(demos)[:2])
     assert Looks.seen[-1].times is None
+
+
+def test_what_takes_minutes_is_said_with_what_takes_seconds(monkeypatch):
+    states, actions, groups, *_ = draw()
+    uc.LocallyLinearPolicy().fit(states, actions, groups=groups)
+    monkeypatch.setattr("unconstrain.learners.robust.learner.LONG", 1e3)
+    with pytest.warns(UserWarning, match=r"learners of \d+ models with \d+ weights takes minutes\. An affine policy"):
+        uc.LocallyLinearPolicy().fit(states, actions, groups=groups)

@@ -226,3 +226,9 @@ FREE_OF_KINDS = 3.0
 
 ROUNDS_OF_KINDS = 3
 """Rounds of policy and free demonstrations, each from the other."""
+
+LONG = 3e8
+"""A fit is said to be long from so many steps on, of the solves of all local models, weights cubed.
+
+Beyond it, with 12 states and actions or so, a fit of 2,000 samples took half a minute and more; with 20, ten and more.
+"""

@@ -1,5 +1,6 @@
 """Learners that use the samples themselves: they estimate the noise and need no α."""
 
+import warnings
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -8,6 +9,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 
 from ...base.arrays import Array, check_at_least
+from ...base.display import counted
 from ...base.errors import SettingError
 from ...models import Scale
 from ...risks import inconsistency, unit_actions, vec
@@ -22,7 +24,7 @@ from .belief import solution, weak_prior
 from .candidate import Candidate
 from .choice import Comparison
 from .consistent import by_segments, noise_corrected
-from .constants import LEAST_INFORMATIVE, LEAST_MISFIT
+from .constants import LEAST_INFORMATIVE, LEAST_MISFIT, LONG
 from .held_out import held_out_together
 from .kinematics import Jacobian, with_jacobian
 from .likelihood import maximise
@@ -297,6 +299,7 @@ class Robust(_Maximising):
 
     def compared(self, samples: Samples, training: Training) -> Comparison:
         """All candidates; those that use the Jacobian if they are as consistent as the best that does not, or more."""
+        _say_if_long(samples)
         corrected, most = noise_corrected(samples), _most_noise(samples)
         noise = noise_of_each(samples.actions, samples.groups, most, samples.noise)
         learnt = [*softened(samples), corrected]
@@ -363,6 +366,19 @@ def _first(batches: Iterable[Batch]) -> Iterator[Batch]:
 def _thinned(training: Training) -> tuple[str, ...]:
     kept = training.kept
     return () if kept is None or kept.stride == 1 else (THINNED.format(kept.stride, kept.size),)
+
+
+def _say_if_long(samples: Samples) -> None:
+    """Warn before solves that take minutes, of what takes seconds."""
+    models, size = len(samples.sizes), samples.features.shape[1] * samples.actions.shape[1]
+    if models * float(size) ** 3 > LONG:
+        warnings.warn(
+            f"to compare learners of {counted(models, 'model')} with {size} weights takes minutes. An affine policy "
+            "(ParametricPolicy(Affine()), --model affine) or the hybrid alone (learner=Hybrid(), --learner hybrid) "
+            "take a fraction of it.",
+            UserWarning,
+            stacklevel=2,
+        )
 
 
 def _most_noise(samples: Samples) -> float:
