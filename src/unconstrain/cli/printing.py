@@ -205,8 +205,8 @@ def _said_of_samples(solution: uc.Solution, demonstrations: int) -> str:
     risks = {name: one.risk for name, one in solution.candidates.items()}
     said = (
         f"{uc.evaluation.diagnosis.about_choice(solution.method, risks)} Noise and misfit are about "
-        f"{solution.noise:.3g} on each action, and {solution.free_share:.0%} of the samples were free"
-        f"{_said_of_undecided(solution)}."
+        f"{solution.noise:.3g} on each action, and {solution.free_share:.0%} of the samples were free, or "
+        f"held by less than that{_said_of_undecided(solution)}."
     )
     if demonstrations < uc.evaluation.diagnosis.ENOUGH:
         return said

@@ -464,7 +464,7 @@ def _least_shown(region: Region, states: Sequence[str], actions: Sequence[str]) 
 
 
 def _about_freedom(found: Diagnosis) -> str:
-    said = f"Free: about {found.free_share:.0%} of the samples"
+    said = f"Free, or held by less than the noise: about {found.free_share:.0%} of the samples"
     if found.undecided_share >= LITTLE:
         said += (
             f"; {found.undecided_share:.0%} were free or always held in the same way, which looks alike. "
