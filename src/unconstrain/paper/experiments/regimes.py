@@ -118,8 +118,9 @@ def run(
 
 def _regimes(only: Sequence[str]) -> list[tuple[str, str]]:
     every = [(system, constraint) for system in _SYSTEMS for constraint in PLANAR]
-    every += [("arm", constraint) for constraint in (*ARM, *ARM_IF_ASKED)]
+    every += [("arm", constraint) for constraint in ARM]
     names = {regime: {*regime, ", ".join(regime)} for regime in every}
+    names |= {("arm", constraint): {constraint, f"arm, {constraint}"} for constraint in ARM_IF_ASKED}
     for name in only:
         if not any(name in called for called in names.values()):
             systems, constraints = (list(dict.fromkeys(column)) for column in zip(*every, strict=True))
@@ -127,11 +128,7 @@ def _regimes(only: Sequence[str]) -> list[tuple[str, str]]:
                 f"only: got {name!r}, expected a system ({', '.join(systems)}), a constraint "
                 f"({', '.join(constraints)}), or both, such as {', '.join(every[0])!r}."
             )
-    return [
-        regime
-        for regime, called in names.items()
-        if (called.intersection(only) if only else regime[1] not in ARM_IF_ASKED)
-    ]
+    return [regime for regime, called in names.items() if called.intersection(only)] if only else every
 
 
 def trial(
