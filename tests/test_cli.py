@@ -293,6 +293,13 @@ def test_fit_says_what_it_did(files, tmp_path):
     assert lines[4] == f"policy: {tmp_path / 'p.npz'}"
 
 
+@pytest.mark.parametrize("command", ["fit", "constraint"])
+def test_what_is_learnt_goes_to_a_file_that_is_called_so(files, tmp_path, command):
+    said = refused(command, *files, "-o", tmp_path / "p.csv")
+    assert said == f"{tmp_path / 'p.csv'}: what is learnt is written as .npz; name it {tmp_path / 'p.npz'}."
+    assert not (tmp_path / "p.csv").exists()
+
+
 def test_fit_says_how_the_default_learner_went(files, tmp_path):
     said = below(run("fit", *files, "--model", "linear", "-o", tmp_path / "p.npz")).splitlines()[2]
     assert re.fullmatch(

@@ -49,6 +49,12 @@ class TestMarks:
             assert found.lines()[0].startswith(found.mark.value)
 
     @given(shares, shares)
+    def test_a_score_is_as_good_as_the_worse_of_what_is_known(self, share, under):
+        found, alone = verdicts.of_score(share, 9, under), verdicts.of_score(min(share, under), 9)
+        assert (found.mark, found.said.split(": ")[-1]) == (alone.mark, alone.said.split(": ")[-1])
+        assert "--plane" not in found.doubt
+
+    @given(shares, shares)
     def test_who_explains_more_is_not_judged_worse(self, one, other):
         order = [Mark.BAD, Mark.DOUBTFUL, Mark.GOOD]
         less, more = (order.index(verdicts.of_explained(share, 5).mark) for share in sorted((one, other)))

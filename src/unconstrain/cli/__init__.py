@@ -48,7 +48,7 @@ from .printing import (
 )
 from .progress import shown
 from .reading import fitted_policy, left_in, numbers, options_for_reading, reading_of, recipe_of, said_recipe, stream_of
-from .writing import check_outputs, option_for_force
+from .writing import check_name, check_outputs, option_for_force
 
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
 
@@ -171,6 +171,7 @@ def fit(
     """
     paths = uc.readers.expand(files)
     check_outputs((output, report), paths, force)
+    check_name(output)
     learner = learner or default_learner(scheduler, alpha, softness, speed_power)
     chosen = {"learner": learner_of(learner, alpha, softness, speed_power), "validation": uc.Folds(folds, hold_out)}
     fitted = policy_of(model, variance, centres, scale, **chosen)
@@ -227,7 +228,8 @@ def score(
     with shown("scoring"):
         rows = [scores(demo, demo.name, len(demo)) for demo in demonstrations]
         whole = scores(demonstrations, "all", sum(map(len, demonstrations)))
-    verdict = uc.evaluation.verdicts.of_score(1.0 - whole["ninc"], len(demonstrations))
+    under = None if held is None else 1.0 - whole["ncpe"]
+    verdict = uc.evaluation.verdicts.of_score(1.0 - whole["ninc"], len(demonstrations), under)
     if as_json:
         click.echo(json.dumps({"policy": policy, "rows": rows, "all": whole, "verdict": verdict.to_json()}, indent=2))
         return

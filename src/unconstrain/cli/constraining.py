@@ -16,7 +16,7 @@ from .informing import provenance
 from .printing import option_for_json, print_table, refuse_warnings, say_verdict, say_written
 from .progress import shown
 from .reading import numbers, options_for_reading, prepared, said_recipe
-from .writing import check_outputs, option_for_force
+from .writing import check_name, check_outputs, option_for_force
 
 MOST_POSITIONS = 4000
 """Positions, at most, by which a mechanism is named; more are thinned evenly."""
@@ -54,6 +54,7 @@ def constraint(
     """
     paths = uc.readers.expand(files)
     check_outputs((output, report), (*paths, jacobian), force)
+    check_name(output)
     _check_asked(jacobian, tip, surface, with_task)
     with shown("reading, learning"):
         demonstrations, recipe, first = prepared(paths, reading)

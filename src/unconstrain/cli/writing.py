@@ -67,6 +67,12 @@ def _check_extra(path: Path) -> None:
             require_extra(module, extra)
 
 
+def check_name(output: str) -> None:
+    """Refuse to write an archive of arrays under a name that says something else."""
+    if Path(output).suffix.lower() not in ("", ".npz"):
+        raise SettingError(f"{output}: what is learnt is written as .npz; name it {Path(output).with_suffix('.npz')}.")
+
+
 def _overlap(output: Path, read: Path) -> bool:
     """Whether writing one changes the other: one file under two names, or one in the folder that the other is."""
     if not (output.exists() and read.exists()):

@@ -108,15 +108,21 @@ def of_explained(
     return Verdict(mark, f"Explains {share:.0%} of {what}: {word}.", trust, across, advice)
 
 
-def of_score(share: float, demonstrations: int) -> Verdict:
-    """Judge how much of recordings that were not learnt from a policy explains; one is enough to see it fail."""
-    mark, word = _graded(share)
+def of_score(share: float, demonstrations: int, under: float | None = None) -> Verdict:
+    """Judge how much of recordings that were not learnt from a policy explains; one is enough to see it fail.
+
+    ``under`` is the same under their constraint, 1 − nCPE, where that is known: then the smaller one is judged.
+    """
+    mark, word = _graded(share if under is None else min(share, under))
     few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
+    known = "" if under is None else f", and {under:.0%} under the constraint given (1 − nCPE)"
     return Verdict(
         mark,
-        f"Explains {share:.0%} of held-out motion, if none of it was learnt from: {word}.",
+        f"Explains {share:.0%} of held-out motion{known}, if none of it was learnt from: {word}.",
         "" if mark is Mark.BAD else "Movement like this, along the directions that were recorded.",
-        "What constraints hid in these recordings, too: --plane or --constraint tells it.",
+        "What constraints hid in these recordings, too: --plane or --constraint tells it."
+        if under is None
+        else "Movement under other constraints.",
         f"Score it under other constraints.{few}"
         if mark is Mark.GOOD
         else "'unconstrain diagnose' says what to record.",
