@@ -27,7 +27,7 @@ MIDDLE = 0.2
 """Where V is as level as nearer to the middle than this share of the radius, motion is slower in proportion."""
 
 STRAY = 0.02
-"""The pace is that of the demonstrations to within this share."""
+"""The pace is the one learnt from the demonstrations to within this share."""
 
 WELL_SHOWN = 0.15
 """Of the turning, what demonstrations say at least at this share of what they say best."""
@@ -75,8 +75,8 @@ class Orbit(Shown):
             f"A closed convex surface attracts, of radius {self.radius:.4g} about ({middle}), from every state but its "
             f"middle, free and under any flat constraint: at {PULL * self.rate:.4g} to {RUSH * self.rate:.4g} per "
             "second. A plane through its inside cuts it in one cycle, on which the pace is within "
-            f"{STRAY:.0%} of the demonstrated one wherever the plane lets it turn. A constraint that moves, or "
-            "an obstacle, may lead off it."
+            f"{STRAY:.0%} of the one learnt wherever the plane lets it turn. A constraint that moves, or an obstacle, "
+            "may lead off it."
         )
 
     def correction(self) -> Correction:

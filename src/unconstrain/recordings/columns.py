@@ -2,9 +2,8 @@
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
-from functools import lru_cache
 
 from ..base.display import bare
 
@@ -19,12 +18,14 @@ def resolve(asked: Sequence[str], columns: Sequence[str]) -> tuple[str, ...]:
     (``q1..q7``), the stem of numbered columns (``observation.state``), or the last part of one column (``X`` of
     ``hand.X``).
     """
-    found = (name for each in asked for name in _meant(each, columns) or (each,))
+    if set(columns).issuperset(asked):
+        return tuple(dict.fromkeys(asked))
+    named = _named(columns)
+    found = (name for each in asked for name in _meant(each, columns, named) or (each,))
     return tuple(dict.fromkeys(found))
 
 
-def _meant(name: str, columns: Sequence[str]) -> tuple[str, ...]:
-    named = _named(tuple(columns))
+def _meant(name: str, columns: Sequence[str], named: Mapping[str, str]) -> tuple[str, ...]:
     if name in named:
         return (named[name],)
     if found := _RANGE.fullmatch(name):
@@ -41,14 +42,12 @@ def _meant(name: str, columns: Sequence[str]) -> tuple[str, ...]:
     return of_stem or _only([column for column in columns if re.search(rf"[._/ ]{re.escape(name)}$", column)])
 
 
-@lru_cache(maxsize=8)
-def _named(columns: tuple[str, ...]) -> dict[str, str]:
+def _named(columns: Sequence[str]) -> dict[str, str]:
     """Columns by their names, and by those without their unit where no other has it."""
     plain = [*map(bare, columns)]
-    once = {name for name, count in Counter(plain).items() if count == 1}
-    return {name: column for name, column in zip(plain, columns, strict=True) if name in once} | {
-        column: column for column in columns
-    }
+    count = Counter(plain)
+    alone = {name: column for name, column in zip(plain, columns, strict=True) if count[name] == 1}
+    return alone | {column: column for column in columns}
 
 
 def _only(names: Sequence[str]) -> tuple[str, ...]:
