@@ -356,6 +356,9 @@ def _unpack(value: Any, arrays: Mapping[str, np.ndarray[Any, Any]]) -> Any:
     kind = _KNOWN[value["class"]]
     parts = {name: _unpack(part, arrays) for name, part in value["parts"].items()}
     if is_dataclass(kind):
+        texts = [one.name for one in fields(kind) if one.type in ("str", str) and one.name in parts]
+        if not all(isinstance(parts[name], str) for name in texts):
+            raise TypeError(f"{', '.join(texts)} of a {kind.__name__} should be text")
         return kind(**parts)
     made: Any = object.__new__(kind)
     vars(made).update(parts)

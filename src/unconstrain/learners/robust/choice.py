@@ -18,7 +18,9 @@ their softness s; s is infinite for direct regression, and zero for learners
 that minimise an error of consistency alone. Whoever knows the Jacobian of the
 constraints has less bias than all, and a softness of −1. A candidate j that is less
 consistent than k where held out, beyond chance, shows no bias of k; nor does
-one that is so by the residuals weighted by ‖u‖², as under noise alone.
+one that is so by the residuals weighted by ‖u‖², as under noise alone. Whoever
+knows the Jacobian is a candidate only if it is as consistent as the best of
+the others, and is compared no more.
 
 Residuals have the variance ``‖π‖² (σ² / ‖u‖² + κ²)`` under any constraint:
 noise of variance σ² turns the direction of a slow action, and people vary by
@@ -102,9 +104,14 @@ class Comparison:
 
     @property
     def as_consistent(self) -> list[Candidate]:
-        """The candidates after the first that are not less consistent than it, beyond chance, where held out."""
-        gap, error = (each[1:, 0] for each in _gaps(self._losses))
-        return [self._candidates[1 + k] for k in np.flatnonzero(gap <= REFUTED * error).tolist()]
+        """The candidates after the first that are not less consistent than it, beyond chance, where held out.
+
+        By the loss, or by the noise-corrected inconsistency: noise adds to the former where a policy is long across
+        the actions, as the right one is where much is held.
+        """
+        gaps = [_gaps(losses) for losses in (self._losses, self._corrected_losses)]
+        kept = np.any([gap[1:, 0] <= REFUTED * error[1:, 0] for gap, error in gaps], axis=0)
+        return [self._candidates[1 + k] for k in np.flatnonzero(kept).tolist()]
 
     @cached_property
     def risks(self) -> Array:
@@ -128,6 +135,12 @@ class Comparison:
         squares = self._lengths**2
         weights = self._samples.counts * squares
         return self._by_demonstration(weights, self._residuals**2) / (weights @ squares)
+
+    @cached_property
+    def _corrected_losses(self) -> Array:
+        """Sums of ``ρ² − σ²‖2u − π‖²``, of noise about none for the true policy, see :mod:`.noise`: (K, G)."""
+        products, aside = self._lengths * self._residuals, 2.0 * self._samples.actions - self._held_out
+        return self._by_demonstration(self._samples.counts, products**2 - self.noise * np.vecdot(aside, aside))
 
     def _by_demonstration(self, weights: Array, values: Array) -> Array:
         """Weighted sums of values (K, N) over each demonstration, or each fold where there are few, (K, G)."""
@@ -179,9 +192,12 @@ class Comparison:
         return bias
 
     def _may_show(self, one: int, other: int) -> bool:
-        """Whether the first has less bias than the second, or as little as any, and is not refuted by it."""
+        """Whether the first has less bias than the second, or as little as any, and is not refuted by it.
+
+        Whoever knows more of the constraints than the second was compared before, see :attr:`as_consistent`.
+        """
         mine, its = self._candidates[one].softness, self._candidates[other].softness
-        return (mine < its or mine == its <= 0.0) and not self._refuted[one, other]
+        return mine < 0.0 <= its or ((mine < its or mine == its <= 0.0) and not self._refuted[one, other])
 
     @cached_property
     def _refuted(self) -> NDArray[np.bool_]:
