@@ -146,6 +146,10 @@ def regimes(found: list[Data]) -> Figures:
         figures[f"{name}: nUPE, geometric mean"], figures[f"{name}: nUPE"] = one["nupe_geometric"], one["nupe_mean"]
         figures[f"{name}: nUPE, standard error"] = one["nupe_sd"] / trials**0.5
         figures[f"{name}: coverage, %"] = 100 * (one["coverage_mean"] or 0.0)
+    known = found[0]["jacobian_known"]
+    for noise in found[0]["settings"]["noise"]:
+        means = [100 * one["nupe_mean"] for one in known if one["noise"] == noise]
+        figures[f"Jacobian known, {noise:.0%}: 100 nUPE"] = means
     return figures
 
 
@@ -293,6 +297,12 @@ RUNS = {
     "limit_cycle": Run(
         "unconstrain reproduce regimes --only 'limit cycle, half' --trials 100 --out results/cycle",
         "cycle/regimes.json",
+        regimes,
+    ),
+    "regimes_known": Run(
+        "unconstrain reproduce regimes --only 'arm, 1' --only 'arm, 1-2-3' --only 'arm, 1-...-4' --only 'arm, 1-...-5' "
+        "--trials 3 --out results/known",
+        "known/regimes.json",
         regimes,
     ),
     "recordings": Run("python benchmarks/recordings.py --rows results/recordings.json", "recordings.json", recordings),

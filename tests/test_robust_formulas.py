@@ -1,6 +1,7 @@
 """The formulas that learners which look at samples are made of, each against its naive twin."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from unconstrain.learners.hybrid import SOFTNESSES, chosen_softness
 from unconstrain.learners.robust.consistent import _nearest
 from unconstrain.learners.robust.constants import ANGULAR_SPREADS
 from unconstrain.learners.robust.likelihood import exceeds_error
-from unconstrain.learners.robust.noise import corrected, correlation_time, noise_by_differences
+from unconstrain.learners.robust.noise import corrected, corrected_squares, correlation_time, noise_by_differences
 from unconstrain.learners.robust.posterior import Posterior
 from unconstrain.learners.robust.segments import change_points, found_segments, projection_of, projections_of
 from unconstrain.learners.robust.smoothness import Smoothness
@@ -108,6 +109,17 @@ def test_residuals_of_the_true_policy_have_one_variance_whatever_the_constraint(
         residual = (u**2).sum(axis=1) - u @ policy - 3 * sigma**2
         assert abs(residual.mean()) < 1e-3
         assert_allclose(residual.var(), sigma**2 * policy @ policy + 6 * sigma**4, rtol=0.02)
+
+
+def test_corrected_squares_are_those_without_noise_but_for_what_all_predictions_share():
+    rng, d, sigma, draws = np.random.default_rng(5), 3, 0.4, 400_000
+    policy, normal = np.array([1.0, -2.0, 0.5]), np.array([0.6, 0.0, 0.8])
+    action = policy - normal * (normal @ policy)
+    noisy = SimpleNamespace(actions=action + sigma * rng.standard_normal((draws, d)))
+    for prediction in (policy, action, np.zeros(d), 2.0 * policy):
+        found = corrected_squares(noisy, np.broadcast_to(prediction, (draws, d)), sigma**2)
+        expected = (action @ (action - prediction)) ** 2 - 2 * d * sigma**4
+        assert abs(found.mean() - expected) < 4.0 * found.std() / np.sqrt(draws)
 
 
 def test_noise_shows_in_differences_and_a_switch_does_not():

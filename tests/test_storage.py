@@ -322,6 +322,7 @@ def test_a_class_that_is_not_known_is_refused_by_name(parts, tmp_path, name):
         ({"class": "Solution", "parts": {}}, r"is not complete \(TypeError"),
         ({"class": ["Hybrid"], "parts": {}}, r"is not complete \(TypeError"),
         ({"class": "Hybrid"}, r"is not complete \(KeyError"),
+        ({"class": "Solution", "parts": {"method": {"array": "array0"}}}, r"method of a Solution should be text"),
         ({"array": "array999"}, r"is not complete \(KeyError"),
         ({"range": [0, 1, 0]}, r"is not complete \(ValueError"),
         ({}, r"is not complete \(KeyError"),

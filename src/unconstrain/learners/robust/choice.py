@@ -55,6 +55,7 @@ from .constants import (
     TIED,
     VARIANCE_ROUNDS,
 )
+from .noise import corrected_squares
 
 TINY = 1e-12
 """Shares of the mean squared action below this are rounding."""
@@ -138,9 +139,9 @@ class Comparison:
 
     @cached_property
     def _corrected_losses(self) -> Array:
-        """Sums of ``ρ² − σ²‖2u − π‖²``, of noise about none for the true policy, see :mod:`.noise`: (K, G)."""
-        products, aside = self._lengths * self._residuals, 2.0 * self._samples.actions - self._held_out
-        return self._by_demonstration(self._samples.counts, products**2 - self.noise * np.vecdot(aside, aside))
+        """Noise-corrected inconsistency of the held-out predictions, by demonstration: (K, G)."""
+        values = [corrected_squares(self._samples, policy, self.noise) for policy in self._held_out]
+        return self._by_demonstration(self._samples.counts, np.stack(values))
 
     def _by_demonstration(self, weights: Array, values: Array) -> Array:
         """Weighted sums of values (K, N) over each demonstration, or each fold where there are few, (K, G)."""

@@ -113,10 +113,20 @@ def correlation_time(residuals: Array, groups: NDArray[np.intp]) -> float:
     return time
 
 
-def consistency_residuals(samples: Samples, policy: Array, variance: float) -> Array:
-    """ρ of each sample at predictions (N, d), under noise of some variance; see above."""
+def consistency_residuals(samples: Samples, policy: Array, variance: float | Array) -> Array:
+    """ρ of each sample at predictions (N, d), under noise of a variance, one or each sample's; see above."""
     along = np.vecdot(samples.actions, samples.actions - policy)
     return np.asarray(along - samples.actions.shape[1] * variance)
+
+
+def corrected_squares(samples: Samples, policy: Array, variance: float | Array) -> Array:
+    """``ρ² − σ²‖2u − π‖²`` of each sample at predictions (N, d).
+
+    Noise adds ``σ²‖2Nπ' − π‖² + 2 d σ⁴`` to the expectation of ρ² for any prediction π under the true policy π', and
+    ``−2 d σ⁴``, which is the same for all predictions, to this.
+    """
+    aside = 2.0 * samples.actions - policy
+    return np.asarray(consistency_residuals(samples, policy, variance) ** 2 - variance * np.vecdot(aside, aside))
 
 
 def hides_sphere(variance: float, samples: Samples) -> bool:
