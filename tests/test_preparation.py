@@ -277,7 +277,9 @@ def test_preparation_trims() -> None:
 
 
 def test_irregular_stamps_are_resampled_and_announced() -> None:
-    with pytest.warns(PreparationWarning, match=r"^'wipe': time stamps are irregular, so it was resampled to its med"):
+    with pytest.warns(
+        PreparationWarning, match=r"^irregular: 'wipe': time stamps are irregular, so it is resampled to its med"
+    ):
         demonstration = only(prepare(wiping(JITTERED)))
     assert demonstration.times is not None
     assert np.ptp(np.diff(demonstration.times)) < 1e-9
@@ -357,7 +359,7 @@ def test_rows_that_repeat_a_stamp_are_left_out_and_announced() -> None:
     times = np.insert(STEADY, 100, STEADY[99])
     states = np.insert(circle(STEADY), 100, 77, axis=0)
     recording = Recording(("x", "y", "vx", "vy"), np.hstack([states, states[:, ::-1]]), times, "wipe")
-    sentence = "'wipe': 1 rows repeat the time stamp of the row before and were left out."
+    sentence = "repeated: 'wipe': 1 rows repeat the time stamp of the row before and were left out."
     for recipe in (Recipe(), Recipe(states=("x", "y"), differentiate="savgol")):
         with pytest.warns(PreparationWarning) as caught:
             demonstration = only(prepare(recording, recipe))

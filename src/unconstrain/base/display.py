@@ -1,9 +1,10 @@
 """How objects that hold arrays show themselves, in a terminal and in a notebook; and how far long work has come."""
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from difflib import get_close_matches
 from html import escape
 from typing import Any, TypeVar
 
@@ -73,6 +74,14 @@ def listed(names: Sequence[str], most: int = 30) -> str:
     """Names with commas between, the first of many."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
+
+
+def meant(asked: Iterable[str], known: Iterable[str]) -> str:
+    """A question after what somebody may have meant by names that are none of the known; empty where none is near."""
+    plain = {name.casefold(): name for name in reversed(list(known))}
+    close = (get_close_matches(name.casefold(), plain, n=2, cutoff=0.7) for name in asked)
+    near = dict.fromkeys(plain[found] for each in close for found in each)
+    return f" Did you mean {' or '.join(map(repr, near))}?" if near else ""
 
 
 @contextmanager

@@ -19,6 +19,7 @@ __all__ = [
     "ModelFileError",
     "ReadError",
     "SettingError",
+    "SupportEndsWarning",
     "UnconstrainError",
     "WriteError",
 ]
@@ -75,6 +76,10 @@ class WriteError(UnconstrainError, OSError):
 
 class MissingExtraError(UnconstrainError, ImportError):
     """A feature whose optional dependency is not installed."""
+
+
+class SupportEndsWarning(UserWarning):
+    """A movement that stops before it comes to where nothing was demonstrated."""
 
 
 NOTHING_LEFT = (

@@ -58,7 +58,8 @@ def check(path: str | os.PathLike[str]) -> None:
     with _told(path, WriteError):
         target = Path(os.path.realpath(path))
         _mode(target)
-        target.parent.stat()
+        if not target.parent.is_dir():
+            raise OSError(f"there is no folder {target.parent}")
         if not os.access(target.parent, os.W_OK | os.X_OK):
             raise OSError("its folder may not be written to")
 

@@ -7,6 +7,7 @@ import io
 import json
 import warnings
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -15,7 +16,16 @@ import click
 
 import unconstrain as uc
 
-from ..base.errors import NOTHING_LEFT, DivergedError, ReadError, SettingError, UnconstrainError
+from ..base.display import counted
+from ..base.errors import (
+    NOTHING_LEFT,
+    DivergedError,
+    InvalidDataError,
+    ReadError,
+    SettingError,
+    SupportEndsWarning,
+    UnconstrainError,
+)
 from ..base.files import write
 from ..paper import experiments
 from .certifying import certify
@@ -31,12 +41,13 @@ from .fitting import (
     options_for_model,
     policy_of,
 )
-from .informing import info, provenance
+from .informing import info, learnt_from, provenance
 from .looking import look, play
 from .printing import (
     Group,
     judge_fit,
     keep_codes,
+    of_option,
     option_for_json,
     print_table,
     refuse_warnings,
@@ -45,9 +56,20 @@ from .printing import (
     say_surveys,
     say_verdict,
     say_written,
+    show_warning,
 )
 from .progress import shown
-from .reading import fitted_policy, left_in, numbers, options_for_reading, reading_of, recipe_of, said_recipe, stream_of
+from .reading import (
+    fitted_policy,
+    left_in,
+    numbers,
+    options_for_reading,
+    prepared,
+    reading_of,
+    recipe_of,
+    said_recipe,
+    stream_of,
+)
 from .writing import check_name, check_outputs, option_for_force
 
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
@@ -203,20 +225,24 @@ def _reported(policy: uc.Policy, stream: uc.Stream, report: str | None, title: s
 
 @main.command(epilog="\b\nExample:\n  unconstrain score wipe.npz other.csv --plane 0,0.3,1 --json")
 @click.argument("policy", type=click.Path())
-@click.argument("files", nargs=-1, required=True, metavar="FILE...")
+@options_for_reading
 @options_for_held("that was held, for the errors that need one")
 @option_for_json
 def score(
-    policy: str, files: Sequence[str], plane: tuple[float, ...] | None, constraint: str | None, as_json: bool
+    policy: str,
+    files: Sequence[str],
+    plane: tuple[float, ...] | None,
+    constraint: str | None,
+    as_json: bool,
+    **reading: Any,
 ) -> None:
     """Score how well POLICY explains the demonstrations in each FILE.
 
-    They are prepared as the training data of the policy was.
+    They are read and prepared as the training data of the policy was, but for what options say.
     """
     learnt, notes = fitted_policy(policy), uc.storage.load_notes(policy)
-    recipe = uc.Recipe.from_dict(notes.get("recipe", {}))
-    recordings = uc.read(files, **reading_of(**notes).roles)
-    demonstrations = uc.prepare(recordings, recipe)
+    demonstrations, recipe, recordings = prepared(files, reading, notes)
+    refuse_warnings(reading["strict"])
     held = held_of(plane, constraint, recipe, learnt.n_features_in_, learnt.n_outputs_, "one for each action")
 
     def scores(of: uc.Demonstration | Sequence[uc.Demonstration], name: str, samples: int) -> dict[str, Any]:
@@ -229,9 +255,13 @@ def score(
         rows = [scores(demo, demo.name, len(demo)) for demo in demonstrations]
         whole = scores(demonstrations, "all", sum(map(len, demonstrations)))
     under = None if held is None else 1.0 - whole["ncpe"]
-    verdict = uc.evaluation.verdicts.of_score(1.0 - whole["ninc"], len(demonstrations), under)
+    known = learnt_from(learnt, notes, recordings)
+    verdict = uc.evaluation.verdicts.of_score(
+        1.0 - whole["ninc"], len(demonstrations), under, None if known is None else len(known)
+    )
     if as_json:
-        click.echo(json.dumps({"policy": policy, "rows": rows, "all": whole, "verdict": verdict.to_json()}, indent=2))
+        told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known, "verdict": verdict.to_json()}
+        click.echo(json.dumps(told, indent=2))
         return
     say_verdict(verdict)
     rows.append(whole)
@@ -292,12 +322,13 @@ def rollout(
 ) -> None:
     """Roll POLICY out, freely or under a constraint, to a CSV.
 
-    It stops where demonstrations no longer support it, and says so.
+    It stops where demonstrations no longer support it, and says so; where they do not support the start, it is refused.
     """
     check_outputs(() if output == "-" else (output,), (policy, constraint), force)
     learnt, recipe = fitted_policy(policy), uc.Recipe.from_dict(uc.storage.load_notes(policy).get("recipe", {}))
     if len(start) != learnt.n_features_in_:
         raise SettingError(f"--start: got {len(start)} numbers, expected {learnt.n_features_in_}, one for each state.")
+    _check_start(learnt, start, how["least_support"])
     places = learnt.n_outputs_ if how["order"] == 2 else len(start)  # what a constraint is a function of
     at = replace(recipe, states=recipe.states and recipe.states[:places])
     held = held_of(plane, constraint, at, places, learnt.n_outputs_, "one for each action")
@@ -305,7 +336,7 @@ def rollout(
     round_ = [_obstacle(given, len(start)) for given in obstacles]
     path, why, trouble = _as_far_as_it_goes(learnt, list(start), constraint=held, task=task, obstacles=round_, **how)
     named = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))
-    verdict = _supported(learnt, path, why)
+    verdict = _supported(learnt, path, why, round_)
     accelerations = named.actions or tuple(f"a{name}" for name in (named.states or ())[:places])
     columns = ["t", *(named.states or ()), *(accelerations if how["order"] == 2 else named.directions)]
     if output != "-":
@@ -412,7 +443,19 @@ def _obstacle(given: tuple[float, ...], n: int) -> uc.motion.obstacles.Ellipsoid
         raise SettingError(
             f"--obstacle: got {len(given)} numbers, expected {n} of a centre, then a radius or {n} radii."
         )
-    return uc.motion.obstacles.Ellipsoid(np.array(given[:n]), given[n:] if len(given) > n + 1 else given[n])
+    with of_option("--obstacle"):
+        return uc.motion.obstacles.Ellipsoid(np.array(given[:n]), given[n:] if len(given) > n + 1 else given[n])
+
+
+def _check_start(policy: uc.Policy, start: tuple[float, ...], least: float) -> None:
+    """Refuse to begin where nothing was demonstrated; policies without support begin anywhere."""
+    with suppress(SettingError):
+        support = float(policy.support([start])[0])
+        if support < least:
+            raise InvalidDataError(
+                f"--start: nothing was demonstrated near {', '.join(f'{one:.4g}' for one in start)} (support "
+                f"{support:.2g}). Start nearer, demonstrate there, or go on in spite of it with --least-support 0."
+            )
 
 
 def _as_far_as_it_goes(policy: uc.Policy, start: list[float], **how: Any) -> tuple[Any, str, DivergedError | None]:
@@ -425,17 +468,30 @@ def _as_far_as_it_goes(policy: uc.Policy, start: list[float], **how: Any) -> tup
             if error.part is None:
                 raise
             return error.part, "", error
-    return path, " ".join(str(one.message) for one in said if one.category is UserWarning), None
+    for one in said:
+        if one.category is not SupportEndsWarning:
+            show_warning(one.message)
+    return path, " ".join(str(one.message) for one in said if one.category is SupportEndsWarning), None
 
 
-def _supported(policy: uc.Policy, path: Any, why: str) -> uc.evaluation.verdicts.Verdict | None:
+def _supported(
+    policy: uc.Policy, path: Any, why: str, obstacles: Sequence[uc.motion.obstacles.Ellipsoid]
+) -> uc.evaluation.verdicts.Verdict | None:
     """How near data is along a movement; None of an affine or polynomial policy, which has no support."""
-    if why:
-        return uc.evaluation.verdicts.of_early_end(why, float(path.times[-1]))
+    verdicts = uc.evaluation.verdicts
     try:
-        return uc.evaluation.verdicts.of_support(policy.support(path.states), path.times)
+        ended = verdicts.of_early_end(why, float(path.times[-1])) if why else None
+        untold = uc.evaluation.diagnosis.untold(policy, path)
+        found = ended or verdicts.of_support(policy.support(path.states), path.times, untold)
     except SettingError:
         return None
+    if not obstacles:
+        return found
+    nearest = min((float(one(path.states)[0].min()), number) for number, one in enumerate(obstacles, start=1))
+    return found._replace(
+        said=f"{found.said} It keeps clear of {counted(len(obstacles), 'obstacle')}, at the nearest of number "
+        f"{nearest[1]} by {nearest[0]:.0%} of its radius."
+    )
 
 
 def _csv(header: Sequence[str], path: uc.Demonstration) -> str:

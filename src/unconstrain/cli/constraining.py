@@ -13,7 +13,7 @@ import unconstrain as uc
 from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
 from .informing import provenance
-from .printing import option_for_json, print_table, refuse_warnings, say_verdict, say_written
+from .printing import of_option, option_for_json, print_table, refuse_warnings, say_verdict, say_written
 from .progress import shown
 from .reading import numbers, options_for_reading, prepared, said_recipe
 from .writing import check_name, check_outputs, option_for_force
@@ -57,7 +57,7 @@ def constraint(
     check_name(output)
     _check_asked(jacobian, tip, surface, with_task)
     with shown("reading, learning"):
-        demonstrations, recipe, first = prepared(paths, reading)
+        demonstrations, recipe, (first, *_) = prepared(paths, reading)
         states, actions, groups = uc.stack(demonstrations)
         arm = None if jacobian is None else arm_of(jacobian, tip).jacobian
         learnt = uc.LearntConstraint(features, arm, task=with_task)
@@ -121,7 +121,8 @@ def held_of(
     if plane is not None:
         if len(plane) != actions:
             raise SettingError(f"--plane: got {len(plane)} numbers, expected {actions}, {meaning}.")
-        return uc.constraints.Plane(np.array(plane))
+        with of_option("--plane"):
+            return uc.constraints.Plane(np.array(plane))
     if path is None:
         return None
     known_arms()

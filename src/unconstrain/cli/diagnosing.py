@@ -48,7 +48,7 @@ def diagnose(
     check_outputs((report,), paths, force)
     with shown("reading, placing, learning"):
         policy = policy_of(model, variance, centres, scale, learner=uc.Robust())
-        demonstrations, recipe, first = prepared(paths, reading)
+        demonstrations, recipe, (first, *_) = prepared(paths, reading)
         policy.fit_demonstrations(demonstrations)
         found = uc.evaluation.diagnose(policy, demonstrations)
     missed = 1.0 - policy.score(*uc.stack(demonstrations)[:2])

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
+from hashlib import blake2b
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -17,17 +18,43 @@ from ..base.errors import ModelFileError
 from .printing import print_table, say_verdict
 from .reading import innermost, reading_of
 
+ENDS = 2**16
+"""Bytes at either end of a file by which it is known again."""
+
 
 def provenance(paths: Iterable[str | Path], recipe: uc.Recipe, first: uc.Recording, **reading: Any) -> dict[str, Any]:
     """What goes into the file of a policy or constraint beside it: recipe, roles, units, sources, date."""
+    sources = [*map(Path, paths)]
     return {
         "recipe": recipe.to_dict(),
         **reading_of(**reading).roles,
         "units": dict(first.units),
-        "sources": [Path(path).name for path in paths],
+        "sources": [Path(path).name for path in sources],
+        "digests": [*map(digest_of, sources)],
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "made with": f"unconstrain {version('unconstrain')}",
     }
+
+
+def digest_of(path: Path) -> str:
+    """By what a file is known again under another name: its size and its ends; empty for a folder."""
+    if not path.is_file():
+        return ""
+    with path.open("rb") as file:
+        size, head = path.stat().st_size, file.read(ENDS)
+        file.seek(max(size - ENDS, 0))
+        return f"{size}-{blake2b(head + file.read(ENDS), digest_size=8).hexdigest()}"
+
+
+def learnt_from(policy: uc.Policy, notes: Mapping[str, Any], recordings: Sequence[uc.Recording]) -> list[str] | None:
+    """Which recordings a policy learnt from, by their files and names; None where it does not say from what it did."""
+    sources = notes.get("digests")
+    learnt = [str(name).partition("/") for name in policy.training_.split.fold_of]
+    if not sources or not learnt:
+        return None
+    known = {(sources[int(number)], name) for number, _, name in learnt if number.isdecimal()}
+    digests = {file: digest_of(Path(file)) for file in {one.file for one in recordings}}
+    return [one.name for one in recordings if (digests[one.file], one.name) in known]
 
 
 @click.command(epilog="\b\nExample:\n  unconstrain info wipe.npz --json")
@@ -89,7 +116,7 @@ def _of(held: Any) -> dict[str, Any]:
 
 
 def _rest(notes: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in notes.items() if name not in ("recipe", "units")}
+    return {name: value for name, value in notes.items() if name not in ("recipe", "units", "digests")}
 
 
 def verdict_of(held: Any) -> uc.evaluation.verdicts.Verdict:

@@ -16,8 +16,8 @@ from ..base.display import counted
 from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainError
 from ..base.files import write
 from .constraining import arm_of, known_arms
-from .printing import refuse_warnings
-from .reading import left_in, options_for_reading, reading_of, recipe_of
+from .printing import refuse_warnings, say_verdict
+from .reading import options_for_reading, prepared
 from .writing import check_outputs, option_for_force
 
 MOST_QUICK = 20_000
@@ -38,6 +38,8 @@ def play(output: str, force: bool) -> None:
 
     check_outputs((output,), (), force)
     write(output, play_page())
+    verdicts = uc.evaluation.verdicts
+    say_verdict(verdicts.Verdict(verdicts.Mark.GOOD, "A page to draw on, by itself.", next="Open it in a browser."))
     click.echo(f"page: {output}")
 
 
@@ -48,6 +50,7 @@ def play(output: str, force: bool) -> None:
 )
 @click.option("--rrd", type=click.Path(dir_okay=False), help="Also write a recording for the viewer rerun there.")
 @click.option("--live", is_flag=True, help="In place of a page, show all in the browser until Ctrl-C.")
+@click.option("--port", type=click.IntRange(0, 65535), help="With --live: where to listen, or the next that is free.")
 @click.option("--robot", metavar="URDF", help="States are joint angles of this robot: show it (--live), and its hand.")
 @click.option("--tip", help="With --robot: the link that is its hand.")
 @option_for_force
@@ -56,6 +59,7 @@ def look(
     output: str,
     rrd: str | None,
     live: bool,
+    port: int | None,
     robot: str | None,
     tip: str | None,
     force: bool,
@@ -68,25 +72,30 @@ def look(
     """
     paths = uc.readers.expand(files)
     _check_asked(live, rrd, robot, tip)
+    if port is not None and not live:
+        raise SettingError("--port: belongs to --live; a page needs none.")
     check_outputs((None if live else output, rrd), (*paths, robot), force)
     seen = _seen(paths, reading)
     scene = None if rrd is None and not live else _scene(seen, robot, tip)
+    surveys = uc.preparation.survey_set(seen.recordings, seen.recipe)
+    then = "Look at what the page marks: each says what cures it." if any(one.warnings for one in surveys) else ""
+    say_verdict(uc.evaluation.verdicts.of_surveys(surveys)._replace(next=then or "Open the page; then unconstrain fit"))
     samples = sum(map(len, seen.demonstrations))
     click.echo(f"{counted(len(seen.demonstrations), 'demonstration')}, {counted(samples, 'sample')}")
     if not live:
-        write(output, _page(seen))
+        write(output, _page(seen, surveys))
         click.echo(f"page: {output}")
     if scene is not None:
-        _show(scene, rrd, live, robot)
+        _show(scene, rrd, live, robot, port)
 
 
 class Seen(NamedTuple):
     """What there is to look at, and what it was read from."""
 
     paths: Sequence[str | Path]
-    recordings: Sequence[uc.Recording]
     demonstrations: Sequence[uc.Demonstration]
     recipe: uc.Recipe
+    recordings: Sequence[uc.Recording]
     policy: uc.Policy | None
     constraint: uc.LearntConstraint | None
 
@@ -95,21 +104,18 @@ def _seen(paths: Sequence[str | Path], reading: dict[str, Any]) -> Seen:
     models = {path: found for path in paths if (found := _model(path)) is not None}
     recorded = [path for path in paths if path not in models]
     if not recorded:
-        raise ReadError(f"{', '.join(map(str, paths))}: holds no recording to look at.")
+        found = ", ".join(map(str, paths))
+        raise ReadError(f"{found}: holds no recording to look at; add some: unconstrain look {found} wipe_*.csv")
     policies = [one for one in models.values() if isinstance(one, uc.Policy)]
     constraints = [one for one in models.values() if isinstance(one, uc.LearntConstraint)]
-    asked, how = _as_learnt(next(iter(models), None), reading)
-    recordings = list(left_in(uc.read(recorded, **how), reading["leave_out"]))
-    demonstrations = uc.prepare(recordings, asked)
-    recipe, _ = uc.preparation.decide(asked, recordings[0])
+    found = prepared(recorded, reading, *(uc.storage.load_notes(path) for path in [*models][:1]))
     refuse_warnings(reading["strict"])
-    return Seen(recorded, recordings, demonstrations, recipe, next(iter(policies), None), next(iter(constraints), None))
+    return Seen(recorded, *found, next(iter(policies), None), next(iter(constraints), None))
 
 
-def _page(seen: Seen) -> str:
+def _page(seen: Seen, surveys: Sequence[Any]) -> str:
     from ..pages.look import look_page, marks_of
 
-    surveys = uc.preparation.survey_set(seen.recordings, seen.recipe)
     return look_page(
         seen.demonstrations,
         seen.recipe.states or (),
@@ -159,14 +165,14 @@ def _scene(seen: Seen, robot: str | None, tip: str | None) -> Any:
     return Scene(seen.demonstrations, states, directions, seen.policy, seen.constraint, arm)
 
 
-def _show(scene: Any, rrd: str | None, live: bool, robot: str | None) -> None:
+def _show(scene: Any, rrd: str | None, live: bool, robot: str | None, port: int | None) -> None:
     from ..pages.look import recorded, serve
 
     if rrd is not None:
         write(rrd, recorded(scene))
         click.echo(f"rerun: {rrd}")
     if live:
-        serve(scene, robot, lambda address: click.echo(f"live: {address} (Ctrl-C ends it)"))
+        serve(scene, robot, lambda address: click.echo(f"live: {address} (Ctrl-C ends it)"), port)
 
 
 def _title(paths: Sequence[str | Path]) -> str:
@@ -184,14 +190,6 @@ def _model(path: str | Path) -> Any:
         except ModelFileError:
             continue
     return None
-
-
-def _as_learnt(model: str | Path | None, reading: dict[str, Any]) -> tuple[uc.Recipe, dict[str, Any]]:
-    """The recipe and the way of reading: of the options, or of what the model was learnt from."""
-    notes = {} if model is None else uc.storage.load_notes(model)
-    if "recipe" not in notes:
-        return recipe_of(**reading), reading_of(**reading).arguments
-    return uc.Recipe.from_dict(notes["recipe"]), reading_of(**notes).roles
 
 
 def _to_fit(paths: Sequence[str | Path], recipe: uc.Recipe) -> tuple[str, str]:

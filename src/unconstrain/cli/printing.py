@@ -6,7 +6,8 @@ import errno
 import json
 import sys
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,8 +15,8 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import counted
-from ..base.errors import InvalidDataError
+from ..base.display import counted, listed
+from ..base.errors import InvalidDataError, SettingError
 from .endings import REFUSED, ending
 from .terminal import plain_output
 
@@ -25,6 +26,16 @@ if TYPE_CHECKING:
 
 CODES = "unconstrain.codes"
 """Where the codes of warnings are kept in the context of a command."""
+
+MEANINGS = {
+    "nUPE": "squared error of the whole policy, over the variance of the actions",
+    "nCPE": "squared error along what the constraint leaves free, over the variance of the actions",
+    "nPOE": "recorded motion that the constraint would forbid, over the variance of the actions",
+}
+"""What the heads of tables stand for."""
+
+TITLES = "unconstrain.titles"
+"""Where it is kept which recordings each code was said of."""
 
 
 class Group(click.Group):
@@ -48,13 +59,32 @@ class Group(click.Group):
             with warnings.catch_warnings():
                 warnings.simplefilter("default", UserWarning)
                 warnings.showwarning = show_warning  # type: ignore[assignment]
-                return super().invoke(ctx)
+                try:
+                    return super().invoke(ctx)
+                finally:
+                    say_others()
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
         except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - the last clause
             said, code = ending(error)
-            click.echo(f"Error: {said}", err=True)
+            click.echo(f"Error: {self._as_option(ctx, said)}", err=True)
             ctx.exit(code)
+
+    def _as_option(self, ctx: click.Context, said: str) -> str:
+        """A sentence that begins with the name of a setting, with that of its option."""
+        command = self.commands.get(ctx.invoked_subcommand or "")
+        name, _, rest = said.partition(": ")
+        options = {one.name: one.opts[-1] for one in command.params if one.opts[-1].startswith("--")} if command else {}
+        return f"{options[name]}: {rest}" if name in options else said
+
+
+@contextmanager
+def of_option(name: str) -> Iterator[None]:
+    """Let settings that cannot be begin with the option that they came from."""
+    try:
+        yield
+    except SettingError as error:
+        raise SettingError(f"{name}: {error}") from None
 
 
 def say_surveys(surveys: Sequence[Any]) -> None:
@@ -78,13 +108,18 @@ def say_surveys(surveys: Sequence[Any]) -> None:
     print_table(["demonstration", "samples", "length", "rate", "jitter", "gaps", "missing", "zero actions"], rows)
     for columns in dict.fromkeys(found.columns for found in surveys):
         click.echo(f"columns: {', '.join(columns)}")
+    for words in dict.fromkeys(found.words for found in surveys if found.words):
+        click.echo(f"columns of words, which --group can take demonstrations apart by: {', '.join(words)}")
     for found in surveys:
         if found.non_increasing:
             click.echo(f"{found.title}: time does not increase at row {found.non_increasing[0]}.")
-        for remark in found.warnings:
-            click.echo(remark.about(found.title))
-        for note in found.notes:
-            click.echo(f"{found.title}: {note.message}")
+    each = [(found.title, remark) for found in surveys for remark in (*found.warnings, *found.notes)]
+    for code in dict.fromkeys(remark.code for _, remark in sorted(each, key=lambda one: not one[1].warns)):
+        titles = {title: remark for title, remark in reversed(each) if remark.code == code}
+        *others, first = titles
+        click.echo(titles[first].about(first))
+        if others:
+            click.echo(f"  the same of {listed(others[::-1], 8)}, {len(titles)} in all")
 
 
 option_for_json = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
@@ -169,7 +204,8 @@ def _say_determined(solution: uc.Solution, learner: str) -> None:
 
 def _say_doubts(judged: Judged, learner: str) -> None:
     say(uc.preparation.doubts(judged.demonstrations, 1.0 - judged.training))
-    if 1.0 - judged.held_out > 0.05 + 2.0 * (1.0 - judged.training):
+    poor = judged.held_out < uc.evaluation.verdicts.GOOD
+    if poor and 1.0 - judged.held_out > 0.05 + 2.0 * (1.0 - judged.training):
         faster = "" if learner == "robust" else "--speed-power 2 or "
         click.echo(
             "Note: much of the held-out motion is unexplained. If the noise at low speed is large, try a wider "
@@ -251,18 +287,37 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     # Piped output is for programs and files: no wrapping there.
     width = None if sys.stdout.isatty() else 10_000
     Console(width=width, markup=False, emoji=False, highlight=False, color_system=None).print(table)
+    for name, meaning in MEANINGS.items():
+        if any(name in title for title in head):
+            click.echo(f"{name}: {meaning}; 0 is perfect.")
 
 
 def show_warning(message: Warning | str, *_: Any) -> None:
-    """Print a warning as a note, without where it came from, and keep its code for :func:`refuse_warnings`."""
-    click.echo(f"Note: {message}", err=True)
+    """Print a warning as a note, without where it came from, and keep its code for :func:`refuse_warnings`.
+
+    Of what is said of several recordings the first is printed, and the others are counted (:func:`say_others`).
+    """
     keep_codes([getattr(message, "code", "")])
+    remark, context = getattr(message, "remark", None), click.get_current_context(silent=True)
+    if remark is not None and context is not None:
+        titles = context.meta.setdefault(TITLES, {}).setdefault(remark.code, {})
+        titles[message.title] = None  # type: ignore[union-attr]
+        if len(titles) > 1:
+            return
+    click.echo(f"Note: {message}", err=True)
+
+
+def say_others() -> None:
+    """Say of which other recordings the notes hold too."""
+    for code, (_, *others) in click.get_current_context().meta.pop(TITLES, {}).items():
+        if others:
+            click.echo(f"Note: {code}: the same of {listed(others, 8)}, {len(others) + 1} in all.", err=True)
 
 
 def say(remarks: Iterable[Any]) -> None:
     """Print remarks about all demonstrations together as notes."""
     for remark in remarks:
-        show_warning(uc.preparation.PreparationWarning(remark.about(), remark.code))
+        show_warning(uc.preparation.PreparationWarning(remark))
 
 
 def keep_codes(codes: Iterable[str]) -> None:

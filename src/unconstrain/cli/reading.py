@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import fields, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 
 import unconstrain as uc
 
-from ..base.errors import ModelFileError, SettingError
+from ..base.errors import NOTHING_LEFT, ModelFileError, ReadError, SettingError
 from .progress import Progress
 
 
@@ -87,7 +87,7 @@ def options_for_reading(command: Callable[..., Any]) -> Callable[..., Any]:
             click.option("--rate", type=float, help="Resample to this many samples a second."),
             click.option("--centre", is_flag=True, help="States relative to the mean of each demonstration."),
             *CURES,
-            click.option("--group", help="Column that names the demonstration."),
+            click.option("--group", help="Column that names the demonstration; or none."),
             click.option("--time", help="Column with the time stamps."),
             click.option("--time-unit", type=click.Choice(["s", "ms", "us", "ns"]), help="What the time stamps count."),
             click.option("--columns", type=names, help="Names of the columns, in order, for files without a header."),
@@ -190,20 +190,37 @@ def stream_of(
     )
 
 
-def prepared(paths: Sequence[Any], reading: dict[str, Any]) -> tuple[list[uc.Demonstration], uc.Recipe, uc.Recording]:
-    """Demonstrations, the recipe that made them, and the first recording."""
-    every = uc.read(paths, **reading_of(**reading).arguments)
-    recordings = list(left_in(every, reading["leave_out"]))
-    asked = recipe_of(**reading)
+class Prepared(NamedTuple):
+    """Demonstrations, the recipe that made them, and the recordings that they were."""
+
+    demonstrations: list[uc.Demonstration]
+    recipe: uc.Recipe
+    recordings: list[uc.Recording]
+
+
+def prepared(paths: Sequence[Any], reading: dict[str, Any], notes: Mapping[str, Any] | None = None) -> Prepared:
+    """Read and prepare files as what a model with such notes was learnt from, but for what the options say."""
+    known = notes or {}
+    asked = _but(uc.Recipe.from_dict(known.get("recipe", {})), recipe_of(**reading))
+    how = _but(uc.readers.Reading(**reading_of(**known).roles), reading_of(**reading))
+    recordings = list(left_in(uc.read(paths, **how.arguments), reading["leave_out"]))
+    if not recordings:
+        raise ReadError(NOTHING_LEFT)
     demonstrations = uc.prepare(recordings, asked)
-    return demonstrations, uc.preparation.decide(asked, recordings[0])[0], recordings[0]
+    return Prepared(demonstrations, uc.preparation.decide(asked, recordings[0])[0], recordings)
+
+
+def _but(kept: Any, asked: Any) -> Any:
+    """Settings, but for those that are asked for, which are not as they are by themselves."""
+    plain = asdict(type(asked)())
+    return replace(kept, **{name: value for name, value in vars(asked).items() if value != plain[name]})
 
 
 def left_in(recordings: Iterable[uc.Recording], names: Sequence[str]) -> Iterator[uc.Recording]:
-    """Recordings but those that are left out by name, with a word where a name is of none."""
-    absent = set(names)
+    """Recordings but those that are left out by name; a SettingError where a name is of none."""
+    came: dict[str, None] = {}
     for recording in recordings:
-        absent.discard(recording.name)
+        came[recording.name] = None
         if recording.name not in names:
             yield recording
-    uc.readers.warn_of_absent(absent)
+    uc.readers.check_left_out(names, came)

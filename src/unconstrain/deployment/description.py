@@ -38,7 +38,7 @@ class Description:
     def of(cls, form: ClosedForm, learnt: str = "", notes: Mapping[str, Any] | None = None) -> Self:
         """Describe a closed form by the notes that were saved beside the policy."""
         notes = dict(notes or {})
-        recipe, units = notes.pop("recipe", {}), notes.pop("units", {})
+        recipe, units, _ = notes.pop("recipe", {}), notes.pop("units", {}), notes.pop("digests", None)
         states = _named(recipe.get("states"), form.columns, "x")
         given = recipe.get("actions") or [*map(speed_of, recipe.get("states") or ())]
         lines = {"learnt by": learnt, "relative to": ", ".join(f"{value:.6g}" for value in form.origin)}

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
-from ..base.errors import InvalidDataError
+from ..base.errors import InvalidDataError, MissingBeliefError
 from ..learners import Solution, robust
 from ..models import Scale, choose_variance, cover
 from ..recordings import Demonstration, readers, stack
@@ -260,6 +260,25 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
         from_noise=from_noise,
         free=free,
     )
+
+
+def untold(policy: Policy, movement: Demonstration) -> Array | None:
+    """What no recording tells of each action of a roll-out, in the directions that its constraint left, shape (T,).
+
+    A standard deviation, as a share of the typical action there; nothing where noise is more. None where the policy
+    does not know.
+    """
+    if movement.truth is None or not movement.truth.policy.any():
+        return None
+    free, typical = movement.truth.projections, float(np.sqrt((movement.truth.policy**2).sum(axis=1).mean()))
+    try:
+        variances = np.trace(free @ policy.covariances(movement.states) @ free, axis1=1, axis2=2)
+    except MissingBeliefError:
+        return None
+    noise = np.linalg.norm(policy.uncertainty(movement.states).from_noise, axis=1)
+    spread = np.sqrt(np.maximum(variances, 0.0))
+    told: Array = np.where(spread < noise, 0.0, spread) / typical
+    return told
 
 
 def _typical(actions: Array, solution: Solution) -> float:

@@ -11,6 +11,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..models import SUPPORTED
@@ -26,6 +27,8 @@ the second more than half, beyond which little but the rough direction is left."
 MOSTLY, PARTLY = 0.95, 0.7
 """Share of recorded states at which the policy is determined: of the rest, one in twenty is an edge."""
 
+MORE = "Record the task again, held in other ways; or tell demonstrations in one file apart with --group."
+"""What helps against too few demonstrations."""
 
 WIDTH = 80
 """Columns of a terminal that sentences are broken for."""
@@ -96,7 +99,7 @@ def of_explained(
     if demonstrations < ENOUGH or not np.isfinite(share):
         seen = f"explains {share:.0%} of {what}, but " if np.isfinite(share) else ""
         few = f"{seen}no verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
-        return Verdict(Mark.DOUBTFUL, few[0].upper() + few[1:], doubt=across, next="Record the task on other surfaces.")
+        return Verdict(Mark.DOUBTFUL, few[0].upper() + few[1:], doubt=across, next=MORE)
     mark, word = _graded(share)
     missed = f"where the policy predicts, it misses about {np.sqrt(max(1 - share, 0)):.0%} of a typical action"
     advice = {
@@ -108,17 +111,23 @@ def of_explained(
     return Verdict(mark, f"Explains {share:.0%} of {what}: {word}.", trust, across, advice)
 
 
-def of_score(share: float, demonstrations: int, under: float | None = None) -> Verdict:
+def of_score(share: float, demonstrations: int, under: float | None = None, learnt: int | None = None) -> Verdict:
     """Judge how much of recordings that were not learnt from a policy explains; one is enough to see it fail.
 
-    ``under`` is the same under their constraint, 1 − nCPE, where that is known: then the smaller one is judged.
+    ``under`` is the same under their constraint, 1 − nCPE, where that is known: then the smaller one is judged. Of
+    ``learnt`` of them, where that is known, the policy learnt.
     """
     mark, word = _graded(share if under is None else min(share, under))
     few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
     known = "" if under is None else f", and {under:.0%} under the constraint given (1 − nCPE)"
+    if learnt:
+        said = f"Explains {share:.0%} of the motion{known}, but it learnt from {learnt} of {_count(demonstrations)}: "
+        then = "Hold some out of the fit (--leave-out, --episodes), and score these."
+        return Verdict(Mark.DOUBTFUL, f"{said}a score on what was learnt from is too good.", next=then)
+    unknown = ", if none of it was learnt from" if learnt is None else ""
     return Verdict(
         mark,
-        f"Explains {share:.0%} of held-out motion{known}, if none of it was learnt from: {word}.",
+        f"Explains {share:.0%} of held-out motion{known}{unknown}: {word}.",
         "" if mark is Mark.BAD else "Movement like this, along the directions that were recorded.",
         "What constraints hid in these recordings, too: --plane or --constraint tells it."
         if under is None
@@ -138,7 +147,7 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
     doubt = doubt if alone else "States that nobody came near."
     if count < ENOUGH:
         said = f"No verdict: {_count(count)}; whether they were free cannot be told from fewer than {ENOUGH}."
-        return Verdict(Mark.DOUBTFUL, said, doubt=doubt, next="Record the task again, held in other ways.")
+        return Verdict(Mark.DOUBTFUL, said, doubt=doubt, next=MORE)
     mark, word = _graded(share, MOSTLY, PARTLY)
     words = {"good": "enough", "fair": "enough in most places", "poor": "not enough"}
     said = f"At {share:.0%} of the recorded states three demonstrations or more tell the policy: {words[word]}."
@@ -166,10 +175,16 @@ def of_constraint(learnt: LearntConstraint) -> Verdict:
     return Verdict(mark, said, "What was held, near recorded states.", f"{doubt}. {still}" if doubt else still, then)
 
 
-def of_support(support: Array, times: Array | None) -> Verdict:
-    """Judge a movement of a policy by how near data is along it, (T,) each; times are steps where not known."""
+def of_support(support: Array, times: Array | None, unknown: Array | None = None) -> Verdict:
+    """Judge a movement of a policy by how near data is along it, (T,) each; times are steps where not known.
+
+    ``unknown`` is how much of each action no recording tells, as a standard deviation, as a share of a typical one.
+    """
     seconds = np.arange(len(support)) if times is None else times
     far = support < SUPPORTED
+    open_ = np.zeros(len(far), np.bool_) if unknown is None else unknown > SMALL
+    if unknown is not None and not far.any() and open_.any():
+        return _of_open(open_, float(unknown.max()), np.asarray(seconds, np.float64))
     if not far.any():
         return Verdict(Mark.GOOD, f"Near demonstrations for all {seconds[-1]:.2f} s: supported.")
     since = seconds[int(far.argmax())]
@@ -182,6 +197,15 @@ def of_support(support: Array, times: Array | None) -> Verdict:
         "What is far from data.",
         "Start nearer, or demonstrate there.",
     )
+
+
+def _of_open(open_: NDArray[np.bool_], most: float, seconds: Array) -> Verdict:
+    """Judge a movement that is near demonstrations, but goes where they do not tell the policy."""
+    since, then = seconds[int(open_.argmax())], "'unconstrain diagnose' says what to record."
+    said = f"Near demonstrations, but {open_.mean():.0%} of the time, first at {since:.2f} s, no recording tells the "
+    said += f"policy in a direction that it takes: undetermined, by up to {most:.0%} of a typical action."
+    trust = f"The first {since:.2f} s." if open_.argmax() else ""
+    return Verdict(Mark.DOUBTFUL, said, trust, "Directions that are not determined there.", then)
 
 
 def of_early_end(why: str, seconds: float) -> Verdict:

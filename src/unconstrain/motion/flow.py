@@ -60,7 +60,8 @@ class Flow:
             inside = obstacle(state)[0] < 0.0
             if inside.any():
                 raise InvalidDataError(
-                    f"start: row {int(inside.argmax())} is in obstacle {k}; expected one outside of all."
+                    f"start: {'' if len(state) == 1 else f'row {int(inside.argmax())} '}is inside obstacle {k + 1} of "
+                    f"{len(self.obstacles)}; expected a start outside of all."
                 )
 
     def at(self, state: Array, time: float) -> tuple[Array, Array, Array]:

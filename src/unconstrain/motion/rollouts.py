@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import Array, as_table, check_at_least
-from ..base.errors import DivergedError, SettingError
+from ..base.errors import DivergedError, SettingError, SupportEndsWarning
 from ..constraints import Constraint
 from ..models import SUPPORTED, spaces
 from ..recordings import Demonstration, Truth
@@ -99,13 +99,18 @@ def rollout(
     obstacles : sequence of callables
         To go round, such as :class:`.obstacles.Ellipsoid`; actions are then not N π.
     least_support : float
-        Stop before states with less, with a warning, once there was more; 0 goes on. As a fitted policy knows, see
+        Stop before states with less, once there was more; 0 goes on. As a fitted policy knows, see
         :meth:`~unconstrain.Policy.support`.
 
     Returns
     -------
     Demonstration or list of Demonstration
         With their truth: the policy and the projections that were applied.
+
+    Warns
+    -----
+    SupportEndsWarning
+        Where it stops for want of support.
 
     Raises
     ------
@@ -205,6 +210,7 @@ class _Tracks:
             f"{many}{names[k]}{',' if many else ' stops'} after {last * self.flow.dt:.4g} s at ({where}): a step on "
             f"nothing was demonstrated (support below {least:g}). Demonstrate there, guide the policy (uc.Guided), or "
             "go on with a least support of 0.",
+            SupportEndsWarning,
             stacklevel=3,
         )
 

@@ -26,7 +26,7 @@ STEPS, FRAME_S = 400, 1 / 30
 INK, GREY = (29, 33, 38), (150, 155, 162)
 
 
-def serve(scene: Scene, robot: str | None, told: Callable[[str], object]) -> None:
+def serve(scene: Scene, robot: str | None, told: Callable[[str], object], port: int | None = None) -> None:
     """Show a scene to browsers on this machine until Ctrl-C.
 
     Parameters
@@ -36,6 +36,8 @@ def serve(scene: Scene, robot: str | None, told: Callable[[str], object]) -> Non
         URDF of the scene's arm, to be drawn.
     told : callable
         Gets the address.
+    port : int, optional
+        Where to listen, or at the first above it that is free.
 
     Raises
     ------
@@ -44,7 +46,8 @@ def serve(scene: Scene, robot: str | None, told: Callable[[str], object]) -> Non
     """
     viser = require_extra("viser", "live")
     with redirect_stdout(StringIO()):
-        server = viser.ViserServer(host="127.0.0.1", label="unconstrain", verbose=False)
+        at = {} if port is None else {"port": port}
+        server = viser.ViserServer(host="127.0.0.1", label="unconstrain", verbose=False, **at)
     try:
         shown = Live(server, scene, robot)
         with suppress(KeyboardInterrupt):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array, as_matrix, as_vector
-from ..base.display import Shown, counted, listed, shortened
+from ..base.display import Shown, counted, listed, meant, shortened
 from ..base.errors import InvalidDataError
 from ..models import spaces
 from .columns import resolve
@@ -41,6 +40,8 @@ class Recording(Shown):
         What the file says of the whole recording: its task, the version of its environment, its rate.
     file : str
         Path of the file, for messages; empty where it came from none.
+    words : tuple of str
+        Columns of the file that hold no numbers, by which it may be taken apart.
 
     Examples
     --------
@@ -58,6 +59,7 @@ class Recording(Shown):
     units: Mapping[str, str] = field(default_factory=dict)
     attributes: Mapping[str, Any] = field(default_factory=dict)
     file: str = ""
+    words: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.values)
@@ -77,10 +79,9 @@ class Recording(Shown):
         """
         missing = [name for name in names if name not in self._places]
         if missing:
-            near = dict.fromkeys(column for name in missing for column in _near(name, self.columns))
-            meant = f" Did you mean {' or '.join(map(repr, near))}?" if near else ""
-            has_not = f"'{self.name}' has no column {listed([*map(repr, missing)])}; it has {listed(self.columns)}."
-            raise InvalidDataError(has_not + meant)
+            has_not = f"'{self.name}' has no column {listed([*map(repr, missing)])}; it has {listed(self.columns)}"
+            words = f", and of words, for --group, {listed(self.words)}" if self.words else ""
+            raise InvalidDataError(f"{has_not}{words}.{meant(missing, self.columns)}")
         return self.values[:, [self._places[name] for name in names]]
 
     def resolve(self, names: Sequence[str]) -> tuple[str, ...]:
@@ -289,9 +290,3 @@ def noise_of(demonstrations: Sequence[Demonstration]) -> Array | None:
 def _time(times: Array | None) -> tuple[str, ...]:
     """How long a movement takes."""
     return () if times is None or not len(times) else (f"{float(times[-1] - times[0]):.4g} s",)
-
-
-def _near(name: str, columns: Sequence[str]) -> list[str]:
-    """Columns that somebody may have meant by a name, the nearest first."""
-    plain = {column.casefold(): column for column in reversed(columns)}
-    return [plain[found] for found in get_close_matches(name.casefold(), plain, n=2, cutoff=0.7)]

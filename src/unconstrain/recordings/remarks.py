@@ -19,6 +19,7 @@ WARNINGS = (
     "at-rest",
     "all-zero",
     "few-demonstrations",
+    "several-in-one",
     "row-order",
     "explains-nothing",
     "other-topic",

@@ -24,7 +24,7 @@ from .preparation.movements import prepare_one, warn
 from .preparation.plausibility.outlines import Outline
 from .preparation.plausibility.sets import compare, outline
 from .preparation.surveys import subject_of
-from .readers import Reading, expand, read_blocks, warn_of_absent
+from .readers import Reading, check_left_out, expand, read_blocks
 
 HELD_BYTES = 2**25
 """Demonstrations that take no more than this in all are kept after the first walk, so files are walked through once."""
@@ -102,7 +102,7 @@ class Stream:
         self._held: list[tuple[str, Demonstration]] | None = None
         self._rows: int | None = None
         self._walked = False
-        self._absent = set(self.leave_out)
+        self._came: dict[str, None] = {}
         self._stamps: dict[Path, Stamp] = {}
         self._outlines: list[tuple[str, Outline | None]] = []
 
@@ -162,7 +162,7 @@ class Stream:
             yield named
         if not self._walked:
             self._say_what_differs()
-            warn_of_absent(self._absent)
+            check_left_out(sorted(self.leave_out), self._came)
         self._walked = True
         if size <= HELD_BYTES:
             self._held = held
@@ -187,7 +187,7 @@ class Stream:
             )
             part.__dict__ |= {"recipe": self.recipe, "unit": self.unit}
             part._first_file = self._first_file + number
-            part._absent.clear()  # another file may have it
+            part._came |= dict.fromkeys(self.leave_out)  # another file may have it
             streams.append(part)
         return streams
 
@@ -211,7 +211,7 @@ class Stream:
     def _blocks(self, path: Path, whole: bool = False) -> Iterator[Recording]:
         with unchanged(path, self._stamps.setdefault(path, Stamp.of(path))):
             for recording in read_blocks(path, self.reading, whole=whole):
-                self._absent.discard(recording.name)
+                self._came[recording.name] = None
                 if recording.name not in self.leave_out:
                     yield recording
 

@@ -25,7 +25,7 @@ from ..signals.smoothing import LEAST, kalman_velocities
 from ..signals.stillness import pauses
 from .continuity import continuous
 from .decisions import decide
-from .plausibility.checks import examine
+from .plausibility.checks import examine, is_irregular
 from .plausibility.sets import PUSHED, compare, outline
 from .plausibility.subject import Subject
 from .recipes import Recipe, select, stamps
@@ -33,22 +33,21 @@ from .recipes import Recipe, select, stamps
 GAP_INTERVALS = 5.0
 """An interval of this many median ones is a gap, where nothing else is said."""
 
-IRREGULAR = 0.01
-"""Intervals that differ from the median by more than this share are no uniform sampling."""
-
 MOST_SAMPLES = 1e8
 """More than this is no rate but a mistake, and would fill the memory."""
 
 
 class PreparationWarning(UserWarning):
-    """Something about a recording that its owner should know: not what it seems, or repaired on the way.
+    """Something about a recording, or all, that its owner should know: not what it seems, or repaired on the way.
 
-    ``code`` names the kind of what is not as it seems, and is empty for what was repaired.
+    ``remark`` says what, ``title`` of which; ``code`` names the kind of what is not as it seems, and is empty for what
+    was repaired.
     """
 
-    def __init__(self, message: str, code: str = "") -> None:
-        super().__init__(message)
-        self.code = code
+    def __init__(self, remark: Remark, title: str = "") -> None:
+        super().__init__(remark.about(title))
+        self.remark, self.title = remark, title
+        self.code = remark.code if remark.warns else ""
 
 
 class Gap(NamedTuple):
@@ -124,16 +123,14 @@ def prepare_one(subject: Subject, stacklevel: int = 2) -> Demonstration:
     title = subject.recording.title
     warn(title, examine(subject), stacklevel + 1)
     demonstration, notes = _prepare(subject.recording, subject.recipe)
-    for note in notes:
-        warnings.warn(PreparationWarning(f"{title}: {note}"), stacklevel=stacklevel)
+    warn(title, notes, stacklevel + 1)
     return demonstration
 
 
 def warn(title: str, remarks: Sequence[Remark], stacklevel: int = 2) -> None:
     """Say what there is to say about a recording of some title."""
     for remark in remarks:
-        code = remark.code if remark.warns else ""
-        warnings.warn(PreparationWarning(remark.about(title), code), stacklevel=stacklevel)
+        warnings.warn(PreparationWarning(remark, title), stacklevel=stacklevel)
 
 
 def differentiate(
@@ -181,7 +178,7 @@ def differentiate(
         raise InvalidDataError(
             f"positions: got {len(times)} samples, expected at least {needed} to differentiate them."
         )
-    if method == "savgol" and _is_irregular(intervals):
+    if method == "savgol" and is_irregular(intervals):
         raise InvalidDataError(
             "times: got irregular stamps, expected uniform ones. Use resample() before, or 'kalman', or 'central'."
         )
@@ -280,13 +277,13 @@ def find_gaps(times: Array, max_gap_s: float | None = None) -> tuple[Gap, ...]:
     return tuple(Gap(float(times[row]), float(intervals[row])) for row in rows)
 
 
-def _prepare(recording: Recording, recipe: Recipe) -> tuple[Demonstration, list[str]]:
+def _prepare(recording: Recording, recipe: Recipe) -> tuple[Demonstration, list[Remark]]:
     if not len(recording):
         raise InvalidDataError(f"'{recording.name}' has no samples, expected at least one.")
     states = _finite(recording, recipe.states or (), recipe)
     actions = None if recipe.actions is None else _finite(recording, recipe.actions, recipe)
     times = stamps(recording, recipe)
-    notes: list[str] = []
+    notes: list[Remark] = []
     noise = None
     if times is None:
         at, states, actions = _in_rows(states, actions, recipe)
@@ -313,12 +310,13 @@ def _prepare(recording: Recording, recipe: Recipe) -> tuple[Demonstration, list[
     return demonstration, notes
 
 
-def _about_centre(states: Array) -> list[str]:
+def _about_centre(states: Array) -> list[Remark]:
     """A word where a mean is no place: on a movement that goes on, it depends on when the recording began and ended."""
     on = float(np.linalg.norm(states[-1] - states[0]))
     if on <= PUSHED * float(np.linalg.norm(np.ptp(states, axis=0))):
         return []
-    return ["is centred by the mean of a movement from end to end, which hides a constant push; leave --centre off."]
+    said = "is centred by the mean of a movement from end to end, which hides a constant push; leave --centre off."
+    return [Remark("centred", said)]
 
 
 def _finite(recording: Recording, names: Sequence[str], recipe: Recipe) -> Array:
@@ -334,7 +332,7 @@ def _finite(recording: Recording, names: Sequence[str], recipe: Recipe) -> Array
     return values
 
 
-def _without_repeats(piece: _Piece, name: str) -> tuple[_Piece, list[str]]:
+def _without_repeats(piece: _Piece, name: str) -> tuple[_Piece, list[Remark]]:
     times = as_vector(piece.times, f"times of '{name}'", len(piece.states))
     piece = piece._replace(times=times)
     intervals = np.diff(times)
@@ -347,7 +345,8 @@ def _without_repeats(piece: _Piece, name: str) -> tuple[_Piece, list[str]]:
     fresh = np.append(True, intervals > 0)
     if fresh.all():
         return piece, []
-    return piece.at(fresh), [f"{(~fresh).sum()} rows repeat the time stamp of the row before and were left out."]
+    said = f"{(~fresh).sum()} rows repeat the time stamp of the row before and were left out."
+    return piece.at(fresh), [Remark("repeated", said)]
 
 
 def _sorted(times: Array, states: Array, actions: Array | None, recipe: Recipe) -> tuple[Array, Array, Array | None]:
@@ -385,16 +384,12 @@ def _without_glitches(piece: _Piece, recipe: Recipe) -> _Piece:
     return piece.at(keep)
 
 
-def _repair(pieces: list[_Piece], recipe: Recipe, name: str) -> tuple[_Piece, list[str]]:
+def _repair(pieces: list[_Piece], recipe: Recipe, name: str) -> tuple[_Piece, list[Remark]]:
     """Differentiate and resample the pieces, and join them."""
-    notes: list[str] = []
+    notes: list[Remark] = []
     if recipe.differentiate is not None:
         interval = _typical(np.concatenate([piece.times for piece in pieces]))
-        if recipe.differentiate == "savgol" and any(_is_irregular(np.diff(piece.times), interval) for piece in pieces):
-            if recipe.rate is None or abs(recipe.rate * interval - 1.0) > 0.01:  # else it is what was asked for
-                notes.append(
-                    f"time stamps are irregular, so it was resampled to its median rate of {1 / interval:.4g} Hz."
-                )
+        if recipe.differentiate == "savgol" and any(is_irregular(np.diff(piece.times), interval) for piece in pieces):
             pieces = [_resampled(piece, 1 / interval) for piece in pieces]
         needed = _samples_needed(recipe, interval)
         notes += _about_window(recipe, needed, interval)
@@ -418,16 +413,15 @@ def _per_second(piece: _Piece) -> _Piece:
     return piece._replace(actions=None if piece.actions is None else piece.actions / _typical(piece.times))
 
 
-def _about_window(recipe: Recipe, needed: int, interval: float) -> list[str]:
+def _about_window(recipe: Recipe, needed: int, interval: float) -> list[Remark]:
     used = needed * interval
     if recipe.differentiate != "savgol" or not used > 1.5 * recipe.window_s:
         return []
-    return [
-        f"the smoothing window of {recipe.window_s:g} s was widened to {used:.3g} s, the {needed} samples it needs."
-    ]
+    said = f"the smoothing window of {recipe.window_s:g} s was widened to {used:.3g} s, the {needed} samples it needs."
+    return [Remark("window", said)]
 
 
-def _long_enough(pieces: list[_Piece], needed: int, name: str) -> tuple[list[_Piece], list[str]]:
+def _long_enough(pieces: list[_Piece], needed: int, name: str) -> tuple[list[_Piece], list[Remark]]:
     kept = [piece for piece in pieces if len(piece.times) >= needed]
     if not kept:
         raise InvalidDataError(
@@ -435,8 +429,8 @@ def _long_enough(pieces: list[_Piece], needed: int, name: str) -> tuple[list[_Pi
             f"{needed} to differentiate them. Record longer, or give a shorter smoothing window."
         )
     lost = len(pieces) - len(kept)
-    note = f"{lost} of {len(pieces)} pieces between gaps have fewer than {needed} samples and were left out."
-    return kept, [note] if lost else []
+    said = f"{lost} of {len(pieces)} pieces between gaps have fewer than {needed} samples and were left out."
+    return kept, [Remark("short-pieces", said)] if lost else []
 
 
 def _split(piece: _Piece, recipe: Recipe) -> list[_Piece]:
@@ -497,13 +491,6 @@ def _typical(times: Array) -> float:
 
 def _longest(times: Array, max_gap_s: float | None) -> float:
     return GAP_INTERVALS * _typical(times) if max_gap_s is None else max_gap_s
-
-
-def _is_irregular(intervals: Array, typical: float | None = None) -> bool:
-    if not intervals.size:
-        return False
-    expected = float(np.median(intervals)) if typical is None else typical
-    return bool((np.abs(intervals - expected) > IRREGULAR * expected).any())
 
 
 def window_used(recipe: Recipe, recording: Recording) -> float:

@@ -43,9 +43,12 @@ class Survey:
     warnings : tuple of Remark
         What is not as it seems, at most one for each code.
     notes : tuple of Remark
-        How the file was read, where that is worth a word: columns without names, demonstrations taken apart.
+        How the file is read and prepared, where that is worth a word: columns without names, demonstrations taken
+        apart, stamps made uniform.
     file : str
         Path of the file; empty where it came from none.
+    words : tuple of str
+        Columns that hold no numbers.
     """
 
     name: str
@@ -61,6 +64,7 @@ class Survey:
     warnings: tuple[Remark, ...]
     notes: tuple[Remark, ...] = ()
     file: str = ""
+    words: tuple[str, ...] = ()
 
     @property
     def title(self) -> str:
@@ -118,7 +122,7 @@ def _survey(subject: Subject, asked: Recipe) -> Survey:
     recording = subject.recording
     times = stamps(recording, asked)
     known = np.empty(0) if times is None else times[np.isfinite(times)]
-    gaps = find_gaps(known, asked.max_gap_s)
+    gaps, remarks = find_gaps(known, asked.max_gap_s), examine(subject)
     steady = _steady_intervals(known, gaps)
     typical = float(np.median(steady)) if steady.size else None
     bad_cells = [int((~np.isfinite(column)).sum()) for column in recording.values.T]
@@ -133,9 +137,10 @@ def _survey(subject: Subject, asked: Recipe) -> Survey:
         non_increasing=() if times is None else tuple((np.flatnonzero(~(np.diff(times) > 0)) + 1).tolist()),
         missing={name: count for name, count in zip(recording.columns, bad_cells, strict=True) if count},
         zero_actions=_zero_actions(subject),
-        warnings=tuple(remark for remark in examine(subject) if remark.warns),
-        notes=tuple(remark for remark in recording.remarks if not remark.warns),
+        warnings=tuple(remark for remark in remarks if remark.warns),
+        notes=tuple(remark for remark in remarks if not remark.warns),
         file=recording.file,
+        words=recording.words,
     )
 
 

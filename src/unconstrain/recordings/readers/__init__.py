@@ -11,13 +11,12 @@ Examples
 """
 
 import os
-import warnings
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from glob import glob
 from pathlib import Path
 
-from ...base.display import listed
+from ...base.display import listed, meant
 from ...base.errors import NOTHING_LEFT, ReadError, SettingError
 from ...base.foreign import ours_alone, unchanged
 from ..demonstration import Recording
@@ -26,7 +25,7 @@ from .formats import format_of
 from .reading import Reading
 from .table import Assembly, unique_names
 
-__all__ = ["Reading", "expand", "read", "read_blocks", "unique_names", "warn_of_absent"]
+__all__ = ["Reading", "check_left_out", "expand", "read", "read_blocks", "unique_names"]
 
 PathLike = str | os.PathLike[str]
 
@@ -52,7 +51,7 @@ def read(
         ``wipe_*.csv`` for what it matches.
     group : str, optional
         Column that tells the demonstrations apart. Without it, and without a column that
-        is called like one (``demo``, ``trial``, ``bout``, ...), each file is one demonstration.
+        is called like one (``demo``, ``trial``, ``bout``, ...), or with ``"none"``, each file is one demonstration.
     time : str, optional
         Column of time stamps; by default one called like it (``t``, ``time``, ``timestamp``, ...).
     time_unit : {"s", "ms", "us", "ns"}, optional
@@ -104,17 +103,24 @@ def read_blocks(path: PathLike, reading: Reading | None = None, *, whole: bool =
         raise SettingError(f"columns (--columns): {file} says itself what its columns are called; leave them off.")
     if told.topic is not None and not known.has_topics:
         raise SettingError(f"topic (--topic): {file} has none; ROS recordings have topics, and workbooks sheets.")
-    assembly = Assembly(file, told)
+    blocks = None if whole else known.blocks
+    assembly = Assembly(file, told, blocks is not None)
     with ours_alone(file, known.expected), unchanged(file):
-        for table in (known.read if whole or known.blocks is None else known.blocks)(file, told):
+        for table in (blocks or known.read)(file, told):
             yield from assembly.recordings(table)
 
 
-def warn_of_absent(names: Collection[str]) -> None:
-    """Say which recordings should be left out and never came."""
-    if names:
-        said = listed([*map(repr, names)])
-        warnings.warn(f"leave_out (--leave-out): no demonstration is called {said}.", UserWarning, stacklevel=3)
+def check_left_out(names: Iterable[str], came: Collection[str]) -> None:
+    """Refuse to go on where recordings should be left out that never came.
+
+    Raises
+    ------
+    SettingError
+        With the names of those that came.
+    """
+    if absent := [name for name in names if name not in came]:
+        said = f"no demonstration is called {listed([*map(repr, absent)])}; there are {listed([*map(repr, came)])}."
+        raise SettingError(f"leave_out (--leave-out): {said}{meant(absent, came)}")
 
 
 def expand(paths: PathLike | Iterable[PathLike]) -> list[Path]:
@@ -130,9 +136,9 @@ def expand(paths: PathLike | Iterable[PathLike]) -> list[Path]:
     files = [file for path in matched for file in (files_in(path) if path.is_dir() else [path])]
     if not files:
         raise SettingError("got no file to read, expected at least one path.")
-    return files
+    return list(dict.fromkeys(files))
 
 
 def _matches(pattern: Path) -> list[Path]:
     # A pattern may be absolute, which Path.glob refuses.
-    return [Path(match) for match in sorted(glob(str(pattern)))]  # noqa: PTH207
+    return [Path(match) for match in sorted(glob(str(pattern), recursive=True))]  # noqa: PTH207

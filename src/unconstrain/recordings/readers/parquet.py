@@ -57,7 +57,8 @@ def _table(table: Any, path: Path, reading: Reading, whole: DataSet) -> Table:
     columns: list[Array] = []
     words: dict[str, list[Any]] = {}
     for at, title in enumerate(titles):
-        if title == roles.group or (title in roles.taken and _is_words(table.column(at).type)):
+        wanted = title in roles.taken or roles.group is None
+        if title == roles.group or (wanted and _is_words(table.column(at).type)):
             words[title] = table.column(at).to_pylist()
         else:
             for name, values in _numbers(table.column(at), title, path, whole.names):

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array
-from ...base.display import legible, listed
+from ...base.display import legible, listed, meant
 from ...base.errors import ReadError
 from ..demonstration import Recording
 from ..remarks import Remark
@@ -26,6 +26,12 @@ GROUP_NAMES = (
 )
 """A column of one of these names, in any case, tells the demonstrations apart."""
 
+NO_GROUP = "none"
+"""Told as the group, no column tells demonstrations apart."""
+
+NO_GROUP = "none"
+"""Told as the group, no column tells demonstrations apart."""
+
 EXPONENTIAL = re.compile(r"[+-]?\d\.\d+[eE][+-]?\d{1,3}")
 """A number as ``numpy.savetxt`` writes it; demonstrations are called by it in short."""
 
@@ -36,6 +42,9 @@ INDEX_NAME = re.compile(
 
 FEWEST_ROWS = 5
 """What is shorter is no demonstration of its own: its bounds are not taken for such."""
+
+JUMP = 5.0
+"""A change from a row to the next of so many times the mean one is a jump."""
 
 NEAR_START = 5.0
 """A clock that goes back begins anew where it is within so many intervals of where it began."""
@@ -144,9 +153,12 @@ def find_roles(names: Sequence[str], reading: Reading, path: Path) -> Roles:
         If a column that was told does not exist.
     """
     for name, role in ((reading.group, "group"), (reading.time, "time")):
-        if name is not None and name not in names:
-            raise ReadError(f"{path}: no column {name!r} for {role}; it has {listed(names)}.")
+        if name is not None and name not in names and (role, name) != ("group", NO_GROUP):
+            none = f" Give another, or --group {NO_GROUP} where each file is one." if role == "group" else ""
+            cure = meant([name], names) or none
+            raise ReadError(f"{path}: no column {name!r} for {role}; it has {listed(names)}.{cure}")
     group = reading.group or next((name for name in names if _names_group(name) and name != reading.time), None)
+    group = group if group in names else None
     others = [name for name in names if name != group]
     clock = find_clock(others) if reading.time is None else _told_clock(others, reading.time)
     index = next((name for name in others if INDEX_NAME.fullmatch(name)), None)
@@ -160,11 +172,14 @@ class Assembly:
     ----------
     path : Path
     reading : Reading
+    in_blocks : bool
+        Whether a table is only some rows of one.
     """
 
-    def __init__(self, path: Path, reading: Reading) -> None:
+    def __init__(self, path: Path, reading: Reading, in_blocks: bool = False) -> None:
         self.path = path
         self.reading = reading
+        self._in_blocks = in_blocks
         self._clocks: dict[str, Clock] = {}
         self._parts: dict[str, int] = {}
         self._starts: dict[str, Start] = {}
@@ -187,10 +202,11 @@ class Assembly:
             {name: unit for name, unit in table.units.items() if name in names},
             table.attributes,
             legible(str(self.path)),
+            tuple(name for name in table.words if name not in roles.taken),
         )
         groups = _groups(table, roles.group)
         tasks = table.words.get("task")
-        split = self._at_breaks(whole, table, roles) if groups is None else split_by_group(whole, groups, tasks)
+        split = self._taken_apart(whole, table, roles) if groups is None else split_by_group(whole, groups, tasks)
         return [each for each in split if self.reading.takes(each.name, table.labels, each.attributes.get("task"))]
 
     def _times(self, table: Table, roles: Roles) -> tuple[Array | None, tuple[Remark, ...]]:
@@ -223,9 +239,18 @@ class Assembly:
             return None
         return np.arange(len(table.values)) / table.rate
 
+    def _taken_apart(self, whole: Recording, table: Table, roles: Roles) -> list[Recording]:
+        """Recordings between breaks, the first with a remark where a column takes apart more."""
+        first, *others = self._at_breaks(whole, table, roles)
+        name, count = _labels(table, roles)
+        said = f"has {'several' if self._in_blocks else count} values, a stroke each by its jumps: give --group {name}."
+        hint = (Remark("several-in-one", said, name),) if count > 1 + len(others) else ()
+        return [replace(first, remarks=(*first.remarks, *hint)), *others]
+
     def _at_breaks(self, whole: Recording, table: Table, roles: Roles) -> list[Recording]:
         """Recordings between breaks: blank lines, and where the clock or the count of rows begins anew."""
-        counts = whole.times if roles.counter is None or whole.times is not None else _column(table, roles.counter)
+        counter = roles.counter if roles.counter in table.columns else None
+        counts = whole.times if counter is None or whole.times is not None else _column(table, counter)
         bounds, where = _continued(_long_enough(table.breaks, len(whole)), whole.times), "blank lines"
         start = self._starts.setdefault(whole.name, Start.of(counts))
         part = self._parts.get(whole.name, 0) + start.is_again(self._latest.get(whole.name), counts)
@@ -327,6 +352,34 @@ def _names_group(name: str) -> bool:
 def _told_clock(names: Sequence[str], time: str) -> ClockColumns:
     pair = find_pair([time, *names])
     return pair if pair is not None and pair.whole == time else ClockColumns(time)
+
+
+def _labels(table: Table, roles: Roles) -> tuple[str, int]:
+    """The column with the most values, one after the other, at whose changes other columns jump, and their number."""
+    most = ("", 0)
+    for name, cells in (*table.words.items(), *zip(table.columns, table.values.T, strict=True)):
+        bounds = [] if name in roles.taken or name == roles.counter else _stretches(cells)
+        if len(bounds) > max(1, most[1] - 1) and _jumps(table.values, np.array(bounds)):
+            most = name, len(bounds) + 1
+    return most
+
+
+def _stretches(cells: Sequence[Any] | Array) -> list[int]:
+    """Rows where the value changes; none where a value comes again, or stands in too few rows."""
+    values = cells if isinstance(cells, np.ndarray) else np.array([*map(str, cells)], dtype=object)
+    head, most = values[:1000], len(values) // FEWEST_ROWS
+    if np.count_nonzero(head[1:] != head[:-1]) > len(head) // FEWEST_ROWS:  # as in most columns
+        return []
+    bounds = (np.flatnonzero(values[1:] != values[:-1]) + 1).tolist()
+    each = [values[at] for at in (0, *bounds)] if len(bounds) < most else []
+    long = np.diff([0, *bounds, len(values)]).min(initial=len(values)) >= FEWEST_ROWS
+    return bounds if long and len(set(each)) == len(each) else []
+
+
+def _jumps(values: Array, bounds: NDArray[np.intp]) -> bool:
+    """Whether a column of which no value stays jumps at most of the bounds."""
+    changes = (np.abs(np.diff(column)) for column in values.T)
+    return any(np.median(each[bounds - 1]) > JUMP * each.mean() and np.median(each) > 0.0 for each in changes)
 
 
 def _column(table: Table, name: str) -> Array:

@@ -82,6 +82,8 @@ def tables_of_text(layout: Layout, blocks: Iterator[Lines], path: Path, reading:
     group = None if roles.group is None else names.index(roles.group)
     clock = None if roles.clock is None else names.index(roles.clock.whole)
     words = [at for at in (group, clock) if at is not None and (at == group or layout.kinds[at] == "w")]
+    if group is None:  # one of them may tell demonstrations apart
+        words += [at for at, kind in enumerate(layout.kinds) if kind == "w" and at not in (clock, *layout.various)]
     parser = Parser(layout, names, words, group, path)
     kept: list[int] = []
     rows = 0

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ....base.arrays import Array
 from ...remarks import Remark
 from ...signals.stillness import is_noise, noise_share, pauses
 from ..meaning import are_backwards, are_targets
@@ -19,6 +20,9 @@ UNITS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 SHORTEST_GAP_S = 0.1
 """Shorter gaps are the jitter of a computer."""
+
+IRREGULAR = 0.01
+"""Intervals that differ from the median by more than this share are no uniform sampling."""
 
 SHORTEST_PIECE = 5
 """Rows before and after a gap; fewer are a stray row at an end."""
@@ -71,6 +75,29 @@ def clock_gap(subject: Subject) -> Remark | None:
         f"{stamps[worst - 1] - stamps[0]:.6g} s; nothing is smoothed or interpolated across (--max-gap).",
         row=subject.row(int(rows[0])),
     )
+
+
+def irregular(subject: Subject) -> Remark | None:
+    """Stamps that have to be made uniform before they are differentiated."""
+    recipe, stamps = subject.recipe, subject.stamps
+    if subject.times is None or stamps is None or not np.isfinite(subject.times).all():
+        return None
+    intervals = np.diff(np.sort(stamps) if recipe.sort else stamps)
+    typical = float(np.median(intervals)) if recipe.differentiate == "savgol" and intervals.size else 0.0
+    steady = intervals[intervals <= (recipe.max_gap_s or GAP_INTERVALS * typical)]
+    asked = recipe.rate is not None and abs(recipe.rate * typical - 1.0) <= IRREGULAR
+    if typical <= 0.0 or asked or (intervals < 0.0).any() or not is_irregular(steady, typical):
+        return None
+    said = f"time stamps are irregular, so it is resampled to its median rate of {1 / typical:.4g} Hz."
+    return Remark("irregular", said)
+
+
+def is_irregular(intervals: Array, typical: float | None = None) -> bool:
+    """Whether intervals differ from a typical one, by default the median."""
+    if not intervals.size:
+        return False
+    expected = float(np.median(intervals)) if typical is None else typical
+    return bool((np.abs(intervals - expected) > IRREGULAR * expected).any())
 
 
 def row_order(subject: Subject) -> Remark | None:
@@ -215,6 +242,7 @@ def all_zero(subject: Subject) -> Remark | None:
 CHECKS = (
     clock_unit,
     clock_gap,
+    irregular,
     row_order,
     reversed_in_time,
     other_topic,

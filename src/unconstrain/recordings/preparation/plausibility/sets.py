@@ -83,7 +83,8 @@ def compare(outlines: Sequence[Outline | None]) -> list[tuple[Remark, ...]]:
 def too_few(demonstrations: int) -> tuple[Remark, ...]:
     """The remark on fewer demonstrations than can be learnt from and checked; none where there are enough."""
     found = f"{demonstrations} demonstration{'s' * (demonstrations != 1)}"
-    message = f"{found}, where {FEWEST} or more under different constraints are needed; record more."
+    message = f"{found}, where {FEWEST} or more under different constraints are needed: record more, or tell those in "
+    message += "one file apart with --group."
     return (Remark("few-demonstrations", message),) if demonstrations < FEWEST else ()
 
 
