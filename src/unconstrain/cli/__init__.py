@@ -129,11 +129,13 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
         ]
         click.echo(json.dumps(plain, indent=2))
     else:
-        say_surveys(surveys)
+        used, needed = "", ""
         try:
-            click.echo(f"fit uses {said_recipe(uc.preparation.decide(recipe, first[0])[0], first[0])}.")
+            used = f"fit uses {said_recipe(uc.preparation.decide(recipe, first[0])[0], first[0])}.\n"
         except UnconstrainError as error:
-            click.echo(f"fit needs to know more: {error}")
+            needed = str(error)
+        say_surveys(surveys, needed)
+        click.echo(used, nl=False)
     refuse_warnings(reading["strict"])
 
 
@@ -256,9 +258,8 @@ def score(
         whole = scores(demonstrations, "all", sum(map(len, demonstrations)))
     under = None if held is None else 1.0 - whole["ncpe"]
     known = learnt_from(learnt, notes, recordings)
-    verdict = uc.evaluation.verdicts.of_score(
-        1.0 - whole["ninc"], len(demonstrations), under, None if known is None else len(known)
-    )
+    count = None if known is None else len(known)
+    verdict = uc.evaluation.verdicts.of_score(1.0 - whole["ninc"], len(demonstrations), under, count)
     if as_json:
         told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known, "verdict": verdict.to_json()}
         click.echo(json.dumps(told, indent=2))

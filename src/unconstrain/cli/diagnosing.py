@@ -11,6 +11,7 @@ import click
 
 import unconstrain as uc
 
+from ..base.display import counted
 from ..base.files import write
 from .fitting import options_for_model, policy_of
 from .printing import option_for_json, print_table, refuse_warnings, say, say_scale, say_verdict
@@ -63,7 +64,8 @@ def diagnose(
     else:
         say_verdict(verdict)
         used = said_recipe(recipe, first)
-        click.echo(f"{len(demonstrations)} demonstrations, {len(found.undetermined)} samples; {used}.")
+        counts = counted(len(demonstrations), "demonstration"), counted(len(found.undetermined), "sample")
+        click.echo(f"{', '.join(counts)}; {used}.")
         say_scale(policy, recipe)
         _say(found, states, actions, len(found.regions) if verbose else MOST_ROWS)
     if report is not None:

@@ -87,9 +87,9 @@ def of_option(name: str) -> Iterator[None]:
         raise SettingError(f"{name}: {error}") from None
 
 
-def say_surveys(surveys: Sequence[Any]) -> None:
-    """Print what was found in recordings: a line for each, their columns, and what is not as it seems."""
-    say_verdict(uc.evaluation.verdicts.of_surveys(surveys))
+def say_surveys(surveys: Sequence[Any], needed: str = "") -> None:
+    """Print what was found in recordings: a line for each, columns, what is not as it seems, what fit has to know."""
+    say_verdict(uc.evaluation.verdicts.of_surveys(surveys, needed))
     rows = [
         [
             found.name,

@@ -214,17 +214,21 @@ def of_early_end(why: str, seconds: float) -> Verdict:
     return Verdict(Mark.DOUBTFUL, f"{said}.", f"These {seconds:.2f} s.", "What would have come after.", then)
 
 
-def of_surveys(surveys: Sequence[Any]) -> Verdict:
-    """Judge recordings by what is not as it seems in them."""
+def of_surveys(surveys: Sequence[Any], needed: str = "") -> Verdict:
+    """Judge recordings by what is not as it seems in them, and by what their columns do not tell, a sentence."""
     warned = [found for found in surveys if found.warnings]
     codes = ", ".join(dict.fromkeys(one.code for found in warned for one in found.warnings))
     few = len(surveys) < ENOUGH
     fewer = f"{_count(len(surveys))}: 'fit' tells what was free from {ENOUGH} or more, held in different ways."
+    if not warned and needed:
+        said = f"{_count(len(surveys))}, nothing odd, but fit needs to know more."
+        return Verdict(Mark.DOUBTFUL, said, doubt=fewer if few else "", next=needed)
     if not warned:
         said = f"{_count(len(surveys))}, nothing odd: ready to learn from."
         return Verdict(Mark.DOUBTFUL if few else Mark.GOOD, said, doubt=fewer if few else "", next="unconstrain fit")
     said = f"{len(warned)} of {_count(len(surveys))} not as it should be: {codes}."
-    return Verdict(Mark.DOUBTFUL, said, doubt=fewer if few else "", next="Read the notes below; each names its cure.")
+    then = f"Read the notes below; each names its cure. {needed}".rstrip()
+    return Verdict(Mark.DOUBTFUL, said, doubt=fewer if few else "", next=then)
 
 
 def _count(demonstrations: int) -> str:

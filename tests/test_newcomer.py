@@ -1,0 +1,338 @@
+"""What somebody meets who has only the README and files of their own: each message leads on."""
+
+import json
+import re
+import shutil
+import warnings
+
+import click
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import unconstrain as uc
+from test_cli import call, refused, run, write
+from test_formats import workbook
+from unconstrain.cli import looking
+
+HEAD = "Zeit [s],X [mm],Y [mm]"
+LINEAR = ("--model", "linear", "--learner", "direct")
+
+
+def stroke(number, samples=40, jitter=0.0):
+    """Times and positions on a line of its own, mm, towards the middle and round it."""
+    rng = np.random.default_rng(number)
+    along, at = rng.standard_normal(2), rng.uniform(-100, 100, 2)
+    along /= np.linalg.norm(along)
+    times = 0.05 * (np.arange(samples) + jitter * rng.uniform(-1, 1, samples))
+    rows = []
+    for step in np.diff(times, append=times[-1]):
+        rows.append(at.copy())
+        at += step * along * (along @ np.array([-at[0] - 2 * at[1], 2 * at[0] - at[1]]))
+    return np.column_stack([times, rows])
+
+
+def strokes(name, count=4):
+    """Rows of several strokes on one clock that goes on, each with its name before it."""
+    return [[name(k), row[0] + 10 * k, *row[1:]] for k in range(count) for row in stroke(k)]
+
+
+def text(ran):
+    """What was printed, without the ends of lines."""
+    return " ".join((ran.out + ran.err).split())
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Six strokes in a folder, and in a folder in it two to be tested on; a policy learnt from the six."""
+    place = tmp_path_factory.mktemp("newcomer") / "wischen"
+    (place / "unseen").mkdir(parents=True)
+    for k in range(8):
+        write(place / ("unseen" if k > 5 else "") / f"w{k}.csv", HEAD, stroke(k))
+    run("fit", place, "-o", place.parent / "p.npz")
+    return place
+
+
+@pytest.fixture(scope="module")
+def policy(folder):
+    return folder.parent / "p.npz"
+
+
+# One file with many strokes
+
+
+def words(k):
+    return f"Strich {k}"
+
+
+@pytest.fixture(params=["words", "numbers", "Excel", "archive"])
+def one_file(request, tmp_path):
+    """Four strokes in one file, told apart by the column ``Strich`` alone."""
+    rows = strokes(words if request.param in ("words", "Excel") else int)
+    if request.param == "Excel":
+        return workbook(tmp_path / "alle.xlsx", Messung=[["Strich", *HEAD.split(",")], *rows])
+    if request.param == "archive":
+        columns = dict(zip(("Strich", "t", "x", "y"), np.array(rows).T, strict=True))
+        np.savez(tmp_path / "alle.npz", **columns)
+        return tmp_path / "alle.npz"
+    return write(tmp_path / "alle.csv", f"Strich,{HEAD}", rows)
+
+
+@pytest.mark.parametrize("command", ["diagnose", "fit", "constraint", "look"])
+def test_every_command_that_reads_names_the_column_that_tells_strokes_apart(tmp_path, command):
+    one_file = write(tmp_path / "alle.csv", f"Strich,{HEAD}", strokes(words))
+    states = ("--state", "X,Y", "--differentiate")
+    output = {"fit": (*LINEAR, "-o", "p.npz"), "constraint": ("-o", "c.npz"), "look": ("-o", "look.html")}
+    given = [tmp_path / one if str(one).partition(".")[2] else one for one in output.get(command, ())]
+    said = text(call(command, one_file, *states, *given))
+    assert "column 'Strich': has 4 values" in said
+    assert "give --group Strich" in said
+
+
+def test_so_does_every_kind_of_file_and_with_that_column_they_are_the_strokes(one_file):
+    states = "x,y" if one_file.suffix == ".npz" else "X,Y"
+    shown = run("inspect", one_file, "--state", states, "--differentiate")
+    assert "column 'Strich': has 4 values, a stroke each by its jumps: give --group Strich." in shown
+    assert shown.startswith("! 1 of 1 demonstration not as it should be: several-in-one")
+    found = json.loads(run("inspect", one_file, "--group", "Strich", "--json"))
+    assert [one["samples"] for one in found] == [40] * 4
+    assert not any(one["code"] == "several-in-one" for each in found for one in each["warnings"])
+
+
+def test_a_column_of_words_is_listed_and_is_no_state(tmp_path):
+    file = write(tmp_path / "a.csv", f"Person,{HEAD}", [["Anna", *row] for row in stroke(0)])
+    assert "--group can take demonstrations apart by: Person" in run("inspect", file)
+    said = refused("fit", file, "--state", "Person", "-o", tmp_path / "p.npz")
+    assert "it has X [mm], Y [mm], and of words, for --group, Person." in said
+    assert said.endswith("Did you mean 'Person'?") is False
+    assert "Did you mean 'Person'?" in refused("inspect", file, "--group", "Persn")
+
+
+@pytest.mark.parametrize("name", [lambda row: f"phase {row // 10}", lambda row: row // 10, lambda row: row % 2])
+def test_phases_of_one_movement_are_not_taken_for_strokes(tmp_path, name):
+    file = write(tmp_path / "a.csv", f"Phase,{HEAD}", [[name(k), *row] for k, row in enumerate(stroke(0))])
+    assert "several-in-one" not in run("inspect", file, "--state", "X,Y", "--differentiate")
+
+
+def test_a_block_of_rows_does_not_claim_to_know_how_many_there_are(tmp_path):
+    file = write(tmp_path / "a.csv", f"Strich,{HEAD},vX,vY", [[*row, 1.0, row[2]] for row in strokes(words)])
+    columns = ("--state", "X,Y", "--action", "vX,vY", *LINEAR)
+    said = call("fit", file, *columns, "-o", tmp_path / "p.npz").err
+    assert "column 'Strich': has several values" in said
+
+
+def test_what_fit_has_to_be_told_is_the_verdict_of_inspect(tmp_path):
+    for k in range(3):
+        write(tmp_path / f"{k}.csv", "t,links,rechts", stroke(k))
+    lines = " ".join(run("inspect", tmp_path).split())
+    assert lines.startswith(
+        "! 3 demonstrations, nothing odd, but fit needs to know more. Next: '0': cannot tell states"
+    )
+
+
+# Names that are none, and folders
+
+
+@pytest.mark.parametrize("command", ["inspect", "diagnose", "fit", "score", "look"])
+def test_leaving_out_what_is_not_there_is_an_error(folder, policy, tmp_path, command):
+    output = {"fit": ("-o", tmp_path / "p.npz"), "look": ("-o", tmp_path / "l.html")}.get(command, ())
+    before = (policy,) if command == "score" else ()
+    said = refused(command, *before, folder / "w[01].csv", "--leave-out", "W1,w9", *output)
+    assert "(--leave-out): no demonstration is called 'W1', 'w9'; there are 'w0', 'w1'." in said
+    assert said.endswith("Did you mean 'w1'?")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_stands_for_its_own_files_and_says_what_lies_below(folder, tmp_path):
+    ran = call("inspect", folder, "--json")
+    assert [one["name"] for one in json.loads(ran.out)] == [f"w{k}" for k in range(6)]
+    assert ran.err == (
+        f"Note: {folder}: 6 files read. Folders in it (unseen) hold 2 more .csv; '{folder}/**/*.csv' reads all.\n"
+    )
+    every = call("inspect", f"{folder}/**/*.csv", "--json")
+    assert [one["name"] for one in json.loads(every.out)] == ["w6", "w7", *(f"w{k}" for k in range(6))]
+    assert every.err == ""
+    shutil.copytree(folder, tmp_path / "alles" / "wischen")
+    said = refused("inspect", tmp_path / "alles")
+    assert "without a file to read. Folders in it (wischen) hold 8 more .csv" in said
+
+
+def test_what_holds_of_many_recordings_is_said_once_and_counted(tmp_path):
+    for k in range(4):
+        write(tmp_path / f"w{k}.csv", HEAD, stroke(k, jitter=0.2))
+    ran = call("fit", tmp_path, *LINEAR, "-o", tmp_path.parent / "p.npz")
+    first, others = [line for line in ran.err.splitlines() if "irregular" in line]
+    assert first.startswith(
+        "Note: irregular: 'w0': time stamps are irregular, so it is resampled to its median rate of"
+    )
+    assert others == "Note: irregular: the same of 'w1', 'w2', 'w3', 4 in all."
+    shown = run("inspect", tmp_path)
+    assert f"{first.removeprefix('Note: ')}\n  the same of 'w1', 'w2', 'w3', 4 in all\n" in shown
+
+
+# Score
+
+
+def test_score_says_what_was_learnt_from(folder, policy):
+    new = json.loads(run("score", policy, folder / "unseen", "--json"))
+    assert new["learnt_from"] == []
+    assert "held-out motion: " in new["verdict"]["said"]
+    mixed = json.loads(run("score", policy, folder / "w1.csv", folder / "unseen" / "w6.csv", "--json"))
+    assert mixed["learnt_from"] == ["w1"]
+    assert mixed["verdict"]["mark"] == "doubtful"
+    assert "it learnt from 1 of 2 demonstrations" in mixed["verdict"]["said"]
+
+
+def test_it_knows_files_by_what_is_in_them(folder, policy, tmp_path):
+    shutil.copy(folder / "w1.csv", tmp_path)
+    shutil.copy(folder / "unseen" / "w6.csv", tmp_path / "w2.csv")
+    assert json.loads(run("score", policy, tmp_path, "--json"))["learnt_from"] == ["w1"]
+
+
+def test_strokes_that_were_left_out_of_the_same_file_were_not_learnt_from(tmp_path):
+    file = write(tmp_path / "alle.csv", f"Strich,{HEAD}", strokes(words, 5))
+    fit = ("fit", file, "--group", "Strich", *LINEAR)
+    run(*fit, "--leave-out", "Strich 4", "-o", tmp_path / "p.npz")
+    found = json.loads(run("score", tmp_path / "p.npz", file, "--json"))
+    assert found["learnt_from"] == [words(k) for k in range(4)]
+    held_out = ("score", tmp_path / "p.npz", file, "--leave-out", ",".join(map(words, range(4))), "--json")
+    assert json.loads(run(*held_out))["learnt_from"] == []
+
+
+def test_score_and_look_read_as_told_where_files_are_not_as_those_learnt_from(tmp_path):
+    learnt = write(tmp_path / "alle.csv", f"Strich,{HEAD}", strokes(words))
+    other = write(tmp_path / "neu.csv", f"Zug,{HEAD}", strokes(words))
+    plain = write(tmp_path / "eins.csv", HEAD, stroke(9))
+    run("fit", learnt, "--group", "Strich", *LINEAR, "-o", tmp_path / "p.npz")
+    score = ("score", tmp_path / "p.npz")
+    assert "no column 'Strich' for group; it has Zeit [s], X [mm], Y [mm]. Give another, or --group none" in refused(
+        *score, plain
+    )
+    assert [one["samples"] for one in json.loads(run(*score, other, "--group", "Zug", "--json"))["rows"]] == [40] * 4
+    assert len(json.loads(run(*score, plain, "--group", "none", "--json"))["rows"]) == 1
+    page = ("look", other, tmp_path / "p.npz", "-o", tmp_path / "look.html")
+    assert "4 demonstrations, 160 samples" in run(*page, "--group", "Zug")
+
+
+def test_abbreviations_are_told_below_the_table(folder, policy):
+    lines = run("score", policy, folder / "unseen", "--plane", "1,1").splitlines()
+    assert [line.partition(":")[0] for line in lines[-2:]] == ["nCPE", "nPOE"]
+    assert "nCPE:" not in run("score", policy, folder / "unseen")
+
+
+# Roll-outs
+
+
+def test_what_no_recording_tells_is_the_spread_that_the_constraint_lets_through(folder):
+    demos = uc.prepare(uc.read(folder / "w[0-5].csv"))
+    policy = uc.LocallyLinearPolicy(learner=uc.NoiseCorrected()).fit_demonstrations(demos)
+    plane = uc.constraints.Plane([1.0, 2.0])
+    path = uc.rollout(policy, demos[0].states[0], steps=20, constraint=plane)
+    free = np.array([2.0, -1.0]) / np.sqrt(5.0)  # the one direction that is left
+    wanted = np.mean([np.sum(action**2) for action in policy.predict(path.states)]) ** 0.5
+    expected = []
+    for state in path.states:
+        spread = float(free @ policy.covariances(state[None])[0] @ free) ** 0.5
+        noise = float(np.sum(policy.uncertainty(state[None]).from_noise ** 2)) ** 0.5
+        expected.append(0.0 if spread < noise else spread / wanted)
+    assert max(expected) > 0
+    assert_allclose(uc.evaluation.diagnosis.untold(policy, path), expected)
+    direct = policy.with_learner(uc.Direct())
+    assert uc.evaluation.diagnosis.untold(direct, path) is None
+
+
+def test_a_movement_where_the_policy_is_not_determined_is_not_supported(folder, policy, tmp_path):
+    """Two strokes along one line: across it nothing was seen."""
+    x, y = stroke(0)[10, 1:]
+    along = stroke(0)[11, 1:] - stroke(0)[10, 1:]
+    for k in range(3):
+        write(tmp_path / f"{k}.csv", HEAD, stroke(0))
+    run("fit", tmp_path, "-o", tmp_path.parent / "one_line.npz")
+    start = ("--start", f"{x},{y}", "--steps", 5, "-o", tmp_path / "path.csv", "--force")
+    for plane, sign in (((along[1], -along[0]), "✔"), (along, "!")):
+        ran = call("rollout", tmp_path.parent / "one_line.npz", *start, "--plane", f"{plane[0]},{plane[1]}")
+        assert ran.code == 0
+        assert ran.out.startswith(f"{sign} Near demonstrations")
+        assert ("no recording tells the policy" in text(ran)) == (sign == "!")
+
+
+def test_a_start_where_nothing_was_demonstrated_is_refused_unless_told_to_go_on(policy, tmp_path):
+    start = ("rollout", policy, "--start", "900,0", "--steps", 3, "-o", tmp_path / "path.csv")
+    assert re.fullmatch(
+        r"--start: nothing was demonstrated near 900, 0 \(support .*\)\. .* --least-support 0\.", refused(*start)
+    )
+    assert not list(tmp_path.iterdir())
+    assert run(*start, "--least-support", 0).startswith("✖ From 0.00 s on the movement is far from all data")
+
+
+def test_a_movement_that_ends_for_want_of_support_warns_by_a_class_of_its_own(policy):
+    learnt = uc.load(policy)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        uc.rollout(lambda x: np.ones_like(x), [0.0, 0.0], steps=3)
+        learnt.predict = lambda states: np.full_like(states, 1000.0)
+        uc.rollout(learnt, stroke(0)[5, 1:], steps=200)
+    assert [one.category for one in said] == [uc.errors.SupportEndsWarning]
+
+
+def test_the_verdict_speaks_of_obstacles(folder, policy, tmp_path):
+    track = stroke(0)
+    x, y = track[5, 1:]
+    at = track[5, 1:] + 1.2 * (track[30, 1:] - track[5, 1:])
+    radius = 0.4 * np.linalg.norm(at - track[5, 1:])
+    ball = ("--obstacle", f"{at[0]},{at[1]},{radius}")
+    told = json.loads(run("rollout", policy, "--start", f"{x},{y}", *ball, "--obstacle", "900,900,1", "--json"))
+    states = np.array(told["rows"])[:, 1:3]
+    nearest = np.linalg.norm(states - at, axis=1).min() / radius - 1.0
+    assert f"It keeps clear of 2 obstacles, at the nearest of number 1 by {nearest:.0%} of" in told["verdict"]["said"]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--plane", "0,0"), "--plane: normal: got [0.0, 0.0], expected a vector that is not zero."),
+        (("--obstacle", "1,1,-2"), "--obstacle: radii: got -2.0, expected a number above 0.0."),
+        (("--obstacle", "{start},5"), "--start: is inside obstacle 1 of 1; expected a start outside of all."),
+        (("--dt", "-1"), "--dt: got -1.0, expected a number above 0.0."),
+    ],
+)
+def test_what_cannot_be_begins_with_its_option(policy, options, said):
+    start = ",".join(map(str, stroke(0)[5, 1:]))
+    assert refused("rollout", policy, "--start", start, *(one.format(start=start) for one in options)) == said
+
+
+# To write and to look
+
+
+def test_a_folder_that_is_missing_is_named(policy, tmp_path):
+    said = refused("export", policy, "-o", tmp_path / "nodir" / "x.c")
+    assert said == f"{tmp_path}/nodir/x.c: cannot be written (there is no folder {tmp_path}/nodir)."
+
+
+def test_a_policy_alone_is_no_look_and_says_what_to_add(policy, tmp_path):
+    said = refused("look", policy, "-o", tmp_path / "look.html")
+    assert said == f"{policy}: holds no recording to look at; add some: unconstrain look {policy} wipe_*.csv"
+
+
+def test_look_and_play_begin_with_a_verdict(folder, tmp_path):
+    assert run("look", folder / "w[0-5].csv", "-o", tmp_path / "a.html").startswith("✔ 6 demonstrations, nothing odd")
+    few = run("look", folder / "w0.csv", "-o", tmp_path / "b.html")
+    assert few.startswith("! 1 of 1 demonstration not as it should be: few-demonstrations.")
+    assert "few-demonstrations" in (tmp_path / "b.html").read_text()
+    assert run("play", "-o", tmp_path / "c.html").startswith("✔ A page to draw on")
+
+
+def test_a_live_look_listens_where_it_is_told(folder, tmp_path, monkeypatch):
+    pytest.importorskip("viser")
+    heard = []
+
+    def echo(said, **how):
+        heard.append(said)
+        if said.startswith("live: "):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(looking.click, "echo", echo)
+    call("look", folder / "w0.csv", "--live", "--port", 18765)
+    monkeypatch.setattr(looking.click, "echo", click.utils.echo)
+    assert "live: http://127.0.0.1:18765 (Ctrl-C ends it)" in heard
+    assert "--port: belongs to --live" in refused("look", folder / "w0.csv", "--port", 1, "-o", tmp_path / "l.html")
