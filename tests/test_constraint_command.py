@@ -178,7 +178,7 @@ def test_one_constraint_at_a_time_and_of_the_right_size(folder, tmp_path):
 
 def test_what_is_decided_is_said_and_nothing_to_learn_from_is_refused(folder, tmp_path):
     nothing = ("constraint", folder / "wipe_0.csv", "--leave-out", "wipe_0", "-o", tmp_path / "none.npz")
-    assert "got no recording, expected at least one" in refused(*nothing)
+    assert "no demonstration is left to read" in refused(*nothing)
     time, columns = 0.02 * np.arange(201), ("a", "b", "a_next", "b_next")
     states = np.degrees(np.column_stack([np.sin(time), 0.5 * np.sin(time)]))
     write(tmp_path / "to.csv", ",".join(("t", *columns)), [time[:-1], states[:-1], states[1:]])

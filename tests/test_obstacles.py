@@ -106,7 +106,7 @@ def test_a_guided_policy_gets_by_and_arrives():
         (
             lambda: uc.rollout(np.negative, [0.5, 0.0], obstacles=[UNIT]),
             InvalidDataError,
-            "start: row 0 is in obstacle 0",
+            "start: is inside obstacle 1 of",
         ),
         (
             lambda: uc.rollout(np.negative, [5.0], obstacles=[UNIT]),

@@ -141,7 +141,7 @@ def test_the_version_is_that_of_the_installed_package():
 
 def test_every_error_of_ours_is_of_one_family():
     errors = [getattr(uc.errors, name) for name in uc.errors.__all__]
-    assert all(issubclass(error, uc.UnconstrainError) for error in errors)
+    assert all(issubclass(error, uc.UnconstrainError | UserWarning) for error in errors)
     assert issubclass(uc.errors.SettingError, ValueError)
     assert issubclass(uc.errors.MissingExtraError, ImportError)
 

@@ -1,7 +1,7 @@
 """Everything that can go wrong, in one family.
 
 Each message says what was got, what was expected, and what to do about it.
-Catch :class:`UnconstrainError` to catch them all.
+Catch :class:`UnconstrainError` to catch them all; warnings are no errors.
 
 Examples
 --------

@@ -78,8 +78,9 @@ def look(
     seen = _seen(paths, reading)
     scene = None if rrd is None and not live else _scene(seen, robot, tip)
     surveys = uc.preparation.survey_set(seen.recordings, seen.recipe)
-    then = "Look at what the page marks: each says what cures it." if any(one.warnings for one in surveys) else ""
-    say_verdict(uc.evaluation.verdicts.of_surveys(surveys)._replace(next=then or "Open the page; then unconstrain fit"))
+    odd = any(one.warnings for one in surveys)
+    then = "Open the page; what it marks says what cures it." if odd else "Open the page."
+    say_verdict(uc.evaluation.verdicts.of_surveys(surveys)._replace(next="" if live else then))
     samples = sum(map(len, seen.demonstrations))
     click.echo(f"{counted(len(seen.demonstrations), 'demonstration')}, {counted(samples, 'sample')}")
     if not live:

@@ -75,7 +75,8 @@ class Group(click.Group):
         command = self.commands.get(ctx.invoked_subcommand or "")
         name, _, rest = said.partition(": ")
         options = {one.name: one.opts[-1] for one in command.params if one.opts[-1].startswith("--")} if command else {}
-        return f"{options[name]}: {rest}" if name in options else said
+        option = options.get(name) or options.get(name.removesuffix("_s"))  # seconds
+        return f"{option}: {rest}" if option else said
 
 
 @contextmanager

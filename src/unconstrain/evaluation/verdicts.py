@@ -203,7 +203,7 @@ def _of_open(open_: NDArray[np.bool_], most: float, seconds: Array) -> Verdict:
     """Judge a movement that is near demonstrations, but goes where they do not tell the policy."""
     since, then = seconds[int(open_.argmax())], "'unconstrain diagnose' says what to record."
     said = f"Near demonstrations, but {open_.mean():.0%} of the time, first at {since:.2f} s, no recording tells the "
-    said += f"policy in a direction that it takes: undetermined, by up to {most:.0%} of a typical action."
+    said += f"policy in a direction that it takes: undetermined, by up to {most:.0%} of its typical action."
     trust = f"The first {since:.2f} s." if open_.argmax() else ""
     return Verdict(Mark.DOUBTFUL, said, trust, "Directions that are not determined there.", then)
 
@@ -227,7 +227,7 @@ def of_surveys(surveys: Sequence[Any], needed: str = "") -> Verdict:
         said = f"{_count(len(surveys))}, nothing odd: ready to learn from."
         return Verdict(Mark.DOUBTFUL if few else Mark.GOOD, said, doubt=fewer if few else "", next="unconstrain fit")
     said = f"{len(warned)} of {_count(len(surveys))} not as it should be: {codes}."
-    then = f"Read the notes below; each names its cure. {needed}".rstrip()
+    then = "Read the notes below; each names its cure." + (f" And fit needs to know more: {needed}" if needed else "")
     return Verdict(Mark.DOUBTFUL, said, doubt=fewer if few else "", next=then)
 
 

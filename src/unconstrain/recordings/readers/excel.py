@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ...base.arrays import require_extra
+from ...base.display import meant
 from ...base.errors import ReadError
 from .layout import find_block
 from .lines import Lines
@@ -27,7 +28,8 @@ def read_excel(path: Path, reading: Reading) -> Iterator[Table]:
     """Read one workbook, or the sheet of it that is asked for as topic; see :class:`~.table.ReadFile`."""
     sheets = _sheets(path)
     if reading.topic is not None and reading.topic not in sheets:
-        raise ReadError(f"{path}: no sheet {reading.topic!r}; it has {', '.join(sheets) or 'none'}.")
+        near = meant([reading.topic], sheets)
+        raise ReadError(f"{path}: no sheet {reading.topic!r}; it has {', '.join(sheets) or 'none'}.{near}")
     asked = sheets if reading.topic is None else {reading.topic: sheets[reading.topic]}
     tables = [table for title, rows in asked.items() for table in _of_sheet(title, rows, path, reading, len(asked) > 1)]
     if not tables:
