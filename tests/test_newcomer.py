@@ -133,11 +133,12 @@ def test_what_fit_has_to_be_told_is_the_verdict_of_inspect(tmp_path):
 # Names that are none, and folders
 
 
-@pytest.mark.parametrize("command", ["inspect", "diagnose", "fit", "score", "look"])
+@pytest.mark.parametrize("command", ["inspect", "diagnose", "fit", "score", "look", "convert"])
 def test_leaving_out_what_is_not_there_is_an_error(folder, policy, tmp_path, command):
     output = {"fit": ("-o", tmp_path / "p.npz"), "look": ("-o", tmp_path / "l.html")}.get(command, ())
     before = (policy,) if command == "score" else ()
-    said = refused(command, *before, folder / "w[01].csv", "--leave-out", "W1,w9", *output)
+    after = (tmp_path / "to.csv",) if command == "convert" else ()
+    said = refused(command, *before, folder / "w[01].csv", *after, "--leave-out", "W1,w9", *output)
     assert "(--leave-out): no demonstration is called 'W1', 'w9'; there are 'w0', 'w1'." in said
     assert said.endswith("Did you mean 'w1'?")
     assert not list(tmp_path.iterdir())

@@ -12,8 +12,9 @@ import click
 
 import unconstrain as uc
 
+from ..base.errors import NOTHING_LEFT, ReadError
 from .printing import option_for_json
-from .reading import options_for_reading, reading_of, recipe_of
+from .reading import left_in, options_for_reading, reading_of, recipe_of
 from .writing import check_outputs, option_for_force
 
 
@@ -30,8 +31,10 @@ def convert(files: Sequence[str], output: str, align: bool, force: bool, as_json
     """
     paths = uc.readers.expand(files)
     check_outputs((output,), paths, force)
-    recordings = uc.read(paths, **reading_of(**options).arguments)
-    recordings = [_timed(recording, options.get("rate")) for recording in recordings]
+    every = left_in(uc.read(paths, **reading_of(**options).arguments), options["leave_out"])
+    recordings = [_timed(recording, options.get("rate")) for recording in every]
+    if not recordings:
+        raise ReadError(NOTHING_LEFT)
     if align:
         recordings = [uc.preparation.align(recordings)]
     states, actions = _columns(recordings[0], options)

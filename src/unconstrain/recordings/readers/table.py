@@ -366,14 +366,14 @@ def _labels(table: Table, roles: Roles) -> tuple[str, int]:
 
 def _stretches(cells: Sequence[Any] | Array) -> list[int]:
     """Rows where the value changes; none where a value comes again, or stands in too few rows."""
-    values = cells if isinstance(cells, np.ndarray) else np.array([*map(str, cells)], dtype=object)
+    values = cells if isinstance(cells, np.ndarray) else np.fromiter(cells, object, len(cells))
     head, most = values[:1000], len(values) // FEWEST_ROWS
     if np.count_nonzero(head[1:] != head[:-1]) > len(head) // FEWEST_ROWS:  # as in most columns
         return []
     bounds = (np.flatnonzero(values[1:] != values[:-1]) + 1).tolist()
-    each = [values[at] for at in (0, *bounds)] if len(bounds) < most else []
-    long = np.diff([0, *bounds, len(values)]).min(initial=len(values)) >= FEWEST_ROWS
-    return bounds if long and len(set(each)) == len(each) else []
+    if len(bounds) >= most or np.diff([0, *bounds, len(values)]).min(initial=len(values)) < FEWEST_ROWS:
+        return []
+    return bounds if len({str(values[at]) for at in (0, *bounds)}) == len(bounds) + 1 else []
 
 
 def _jumps(values: Array, bounds: NDArray[np.intp]) -> bool:
