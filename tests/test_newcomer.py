@@ -188,6 +188,7 @@ def test_it_knows_files_by_what_is_in_them(folder, policy, tmp_path):
     shutil.copy(folder / "w1.csv", tmp_path)
     shutil.copy(folder / "unseen" / "w6.csv", tmp_path / "w2.csv")
     assert json.loads(run("score", policy, tmp_path, "--json"))["learnt_from"] == ["w1"]
+    assert "digests" not in run("info", policy)
 
 
 def test_strokes_that_were_left_out_of_the_same_file_were_not_learnt_from(tmp_path):
