@@ -194,7 +194,7 @@ def test_its_page_draws_held_directions_where_states_are(folder):
     assert "held directions" in page
     states = np.random.default_rng(6).uniform(-1, 1, (80, 2))
     demo = uc.Demonstration(states, states * [1.0, 0.0])
-    page = constraint_page(uc.LearntConstraint().fit(states, demo.actions), [demo], "flat")
+    page = constraint_page([uc.LearntConstraint().fit(states, demo.actions)], [demo], "flat")
     assert "What the data does not tell" in page
     assert "a free policy that is a function of the state looks the same" in page
 
@@ -215,17 +215,60 @@ def test_it_names_the_mechanism_of_a_door(tmp_path):
     assert "radius 0.71" in page.read_text()
 
 
-def test_mechanisms_that_differ_stand_in_a_table(tmp_path):
-    rng, time = np.random.default_rng(0), np.linspace(0, 9, 150)
-    for number, tilt in enumerate((0.0, 0.4)):
-        flat = np.column_stack([0.1 * np.cos(3 * time), 0.12 * np.sin(2 * time)])
-        plate = flat @ [[1, 0, 0], [0, np.cos(tilt), np.sin(tilt)]] + 0.001 * rng.standard_normal((150, 3))
-        table = np.column_stack([time, plate])
-        np.savetxt(tmp_path / f"plate_{number}.csv", table, delimiter=",", header="t,x,y,z", comments="")
-    page = tmp_path / "plates.html"
-    paths = sorted(tmp_path.glob("*.csv"))
-    told = json.loads(run("constraint", *paths, "-o", tmp_path / "p.npz", "--report", page, "--json"))
+TILTS = (0.0, 0.4, -0.4)
+
+
+@pytest.fixture(scope="module")
+def tilted(tmp_path_factory):
+    """Three plates of other tilts, in mm, wiped once each."""
+    folder = tmp_path_factory.mktemp("tilted")
+    rng, time = np.random.default_rng(0), np.linspace(0, 4.5, 80)
+    for number, tilt in enumerate(TILTS):
+        flat = np.column_stack([100 * np.cos(3 * time), 120 * np.sin(2 * time)])
+        plate = flat @ [[1, 0, 0], [0, np.cos(tilt), np.sin(tilt)]] + rng.standard_normal((80, 3))
+        write(folder / f"plate_{number}.csv", "t [s],x [mm],y [mm],z [mm]", [time, plate])
+    return folder
+
+
+def test_plates_of_other_tilts_have_a_constraint_each_and_a_table(tilted, tmp_path):
+    order = ("constraint", tilted, "-o", tmp_path / "p.npz", "--report", tmp_path / "p.html")
+    said = run(*order)
+    assert "1 of 3 directions were held, others in each of 3 demonstrations" in said
+    assert "Record what is missing" not in said
+    [line] = [line for line in said.splitlines() if line.startswith("Mechanism: ")]
+    assert "a plane for each of 3 demonstrations, against" in line
+    rows = [line.split() for line in said.splitlines() if line.startswith("plate_")]
+    assert_allclose(
+        [float(row[row.index("constant") + 2].rstrip("°")) for row in rows], np.degrees(np.abs(TILTS)), atol=1
+    )
+    for number, tilt in enumerate(TILTS):
+        found = uc.load(tmp_path / f"p_plate_{number}.npz", uc.LearntConstraint)
+        assert abs(found(np.zeros((1, 3)))[0, 0] @ [0.0, -np.sin(tilt), np.cos(tilt)]) > 0.99
+    assert not (tmp_path / "p.npz").exists()
+    assert "p_plate_0.npz: is there; give another name, or --force" in refused(*order[:-2])
+    page = (tmp_path / "p.html").read_text()
+    assert page.count("1 of 3, constant") == 3
+    assert "tilt from z" in page
+
+
+def test_one_plate_has_one_constraint_in_the_unit_of_its_file_and_of_no_other(tilted, tmp_path):
+    said = run("constraint", tilted / "plate_1.csv", "-o", tmp_path / "p.npz")
+    assert "Mechanism: a plane through (" in said
+    text = (tilted / "plate_1.csv").read_text().replace(" [mm]", "")
+    (tmp_path / "none.csv").write_text(text)
+    assert "Mechanism, if these are positions: a plane through (" in run(
+        "constraint", tmp_path / "none.csv", "-o", tmp_path / "n.npz"
+    )
+    (tmp_path / "mixed.csv").write_text(text.replace("x,y,z", "x [mm],y [m],z [rad]"))
+    mixed = call("constraint", tmp_path / "mixed.csv", "-o", tmp_path / "m.npz")
+    assert "no mechanism is named: the columns are in mm, m, rad, expected one unit of length" in mixed.stderr
+    assert "Mechanism" not in mixed.stdout
+
+
+def test_mechanisms_that_differ_are_told_by_name(tilted, tmp_path):
+    paths = [tilted / "plate_0.csv", tilted / "plate_1.csv"]
+    told = json.loads(run("constraint", *paths, "--features", "constant", "-o", tmp_path / "p.npz", "--json"))
     assert told["mechanism"].startswith("a plane for each of 2 demonstrations, against")
-    assert list(told["mechanisms"]) == ["plate_0", "plate_1"]
+    assert list(told["mechanisms"]) == list(told["each"]) == ["plate_0", "plate_1"]
     assert all(text.startswith("a plane through") for text in told["mechanisms"].values())
-    assert page.read_text().count("a plane through") == 2
+    assert [one["rank"] for one in told["each"].values()] == [1, 1]

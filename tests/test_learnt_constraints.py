@@ -352,6 +352,49 @@ def test_demonstrations_may_each_have_a_plane_of_their_own(positions):
             uc.LearntConstraint().fit_each(states, actions, groups)
 
 
+def wiped(tilts, rng, samples=60, noise=0.02):
+    """Round strokes about the origin on plates that are tilted about x."""
+    states, actions = [], []
+    for tilt in tilts:
+        turn = np.array([[1, 0, 0], [0, np.cos(tilt), np.sin(tilt)]])
+        points = rng.uniform(-1, 1, (samples, 2))
+        states.append(points @ turn)
+        actions.append(
+            np.column_stack([-points[:, 1], points[:, 0]]) @ turn + noise * rng.standard_normal((samples, 3))
+        )
+    return np.concatenate(states), np.concatenate(actions), np.repeat(np.arange(len(tilts)), samples)
+
+
+def test_each_demonstration_has_its_own_constraint_where_one_for_all_misses_more():
+    tilts = [0.0, 0.3, -0.3, 0.5]
+    states, actions, groups = wiped(tilts, np.random.default_rng(31))
+    each = uc.LearntConstraint().differing(states, actions, groups)
+    assert list(each) == list(range(4))
+    for tilt, one in zip(tilts, each.values(), strict=True):
+        assert (one.rank_, one.choice_.name) == (1, "constant")
+        assert abs(one(states[:1])[0, 0] @ [0.0, -np.sin(tilt), np.cos(tilt)]) > 0.999
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_what_is_alike_is_not_told_apart(count):
+    states, actions, groups = wiped([0.3] * count, np.random.default_rng(32))
+    assert uc.LearntConstraint().differing(states, actions, groups) == {}
+
+
+def test_where_one_demonstration_is_free_there_is_not_one_for_each():
+    rng = np.random.default_rng(33)
+    states, actions, groups = wiped([0.0, 0.4, 0.8], rng)
+    actions[groups == 1] = rng.standard_normal((60, 3))
+    assert uc.LearntConstraint("constant").differing(states, actions, groups) == {}
+
+
+def test_what_others_miss_is_what_moves_along_the_held_direction():
+    states, actions, _ = wiped([0.0], np.random.default_rng(34), noise=0.0)
+    found = uc.LearntConstraint("constant").fit(states, actions).choice_
+    moved = actions + np.array([0.0, 0.0, 0.5])
+    assert_allclose(found.missed(states, moved), 0.25 / ((moved**2).sum(axis=1).mean() / 3))
+
+
 @pytest.mark.parametrize(
     ("settings", "data", "message"),
     [

@@ -1,5 +1,7 @@
 """Mechanisms with names: found in movements, with odds and intervals that can be trusted."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -9,7 +11,9 @@ from recorded import DATA, needs_rim
 from unconstrain.base.errors import InvalidDataError
 from unconstrain.constraints import identify
 from unconstrain.constraints.mechanisms.kinds import Circle, Cylinder, Line, Plane, Point, Screw, Sphere
-from unconstrain.constraints.mechanisms.track import correlation_time
+from unconstrain.constraints.mechanisms.mechanism import frame_of, on_one_side
+from unconstrain.constraints.mechanisms.tied import Hinge, Slider, TurningScrew
+from unconstrain.constraints.mechanisms.track import Track, correlation_time
 from unconstrain.paper.experiments.mechanisms import (
     FREE,
     KINDS,
@@ -156,6 +160,96 @@ def test_exact_movements_are_found_exactly():
     assert found.kind == "circle"
     assert_allclose(found.mechanism.centre, [0, 0, 0.3], atol=1e-6)
     assert found.candidates[0].noise < 1e-6
+
+
+@pytest.fixture(scope="module")
+def plates(tmp_path_factory):
+    """Two strokes of wiping in the bundled example: round, on a plate."""
+    folder = tmp_path_factory.mktemp("example") / "wiping"
+    uc.datasets.write_example(folder)
+    return [uc.read(folder / f"{name}.csv")[0].values for name in ("plate1_1", "plate4_1")]
+
+
+def test_a_cycle_that_is_wanted_on_a_plate_is_no_hinge(plates):
+    for positions in plates:
+        found = identify(positions)
+        assert found.kind == "plane"
+        assert ", against nothing held more than 10000:1" in found.sentence or ", against a circle" in found.sentence
+        assert found.doubt.startswith("within the plane the path is near a circle of radius ")
+        assert "strokes from other starts would tell whether it is held" in found.doubt
+
+
+def crank(stray, depth=1.0, samples=200):
+    """Three turns about (0.3, 0, 0) at 0.1 m, noise of 2 mm; who strays comes from outside and comes near slowly."""
+    angle = np.linspace(0, 6 * np.pi, samples)
+    radius = 0.1 + stray * np.exp(-angle / 3)
+    flat = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(samples)])
+    return [0.3, 0.0, 0.0] + (flat + noise(flat.shape) * [depth, 1.0, 1.0]) @ FRAME.T
+
+
+def test_a_crank_is_a_hinge_and_one_that_is_left_is_a_habit():
+    held, left = identify(crank(0.0)), identify(crank(0.03))
+    assert (held.kind, left.kind) == ("circle", "plane")
+    assert held.decided
+    assert_allclose(held.mechanism.radius, 0.1, atol=held.mechanism.margins["radius"][0])
+    assert held.doubt.startswith("a policy that keeps to this path within a surface looks the same in one stroke")
+
+
+def test_a_sensor_that_is_noisier_in_one_direction_makes_no_habit_of_a_hinge():
+    assert identify(crank(0.0, depth=3.0)).kind == "circle"
+
+
+def test_several_strokes_or_forces_leave_no_doubt_of_one():
+    groups = np.repeat([0, 1], 100)
+    assert identify(crank(0.0), groups=groups).doubt == ""
+    assert identify(straight_stroke(0.0)[0], forces=straight_stroke(0.0)[1]).doubt == ""
+    assert "in one stroke" in identify(straight_stroke(0.0)[0]).doubt
+
+
+def test_a_radius_that_is_not_known_decides_nothing(plates):
+    found = identify(plates[0][:, :2])
+    assert found.mechanism.margins["radius"] > 0.5 * found.mechanism.radius
+    assert not found.decided
+    assert found.sentence.startswith("undecided: a circle")
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_axes_are_on_one_side_that_of_the_largest_entry_of_their_common_direction(way):
+    tilts = [np.array([np.sin(angle), 0.1, -np.cos(angle)]) for angle in (-0.5, 0.0, 0.4, 0.7)]
+    signs = way * np.array([1.0, -1.0, 1.0, -1.0])
+    planes = [Plane(centre=AT, frame=frame_of(sign * tilt)) for sign, tilt in zip(signs, tilts, strict=True)]
+    turned = np.array([one.axis for one in on_one_side(planes)])
+    assert_allclose(turned, [-tilt / np.linalg.norm(tilt) for tilt in tilts], atol=1e-12)
+    assert_allclose([one.axis for one in on_one_side(planes[:1])], turned[:1])
+
+
+@pytest.mark.parametrize("kind", [Plane, Line, Circle, Screw, Slider, Hinge, TurningScrew])
+def test_turning_an_axis_round_changes_nothing_but_the_frame(kind):
+    rng = np.random.default_rng(13)
+    one = kind(centre=AT, frame=FRAME, radius=0.4, pitch=0.05, orientation=np.array([0.5, 0.5, -0.5, 0.5]))
+    quaternions = np.array([0.4, 0.5, -0.6, 0.5]) + 0.2 * rng.standard_normal((20, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+    track = Track(AT + 0.3 * rng.standard_normal((20, 3)), np.arange(20), quaternions)
+    other = one.facing(-one.axis)
+    assert_allclose(other.axis, -one.axis)
+    assert_allclose(np.linalg.det(other.frame), 1.0)
+    assert_allclose(np.abs(other.residuals(track)), np.abs(one.residuals(track)), atol=1e-12)
+
+
+def test_planes_of_other_tilts_have_normals_on_one_side():
+    positions, groups = demonstrations(3, tilt=0.4)
+    planes = identify(positions, groups=groups).candidates[0].mechanisms
+    assert len(planes) == 3
+    assert min(one.axis[2] for one in planes) > 0.6
+
+
+def test_lengths_are_in_the_unit_that_is_said():
+    metres, millimetres, nothing = (
+        identify(scale * arc(110), unit=unit).sentence for scale, unit in ((1, "m"), (1e3, "mm"), (1e3, ""))
+    )
+    assert re.search(r"radius 0\.71\d* m ± [\d.]+ mm,", metres)
+    assert re.search(r"radius 7\d\d\.?\d* mm ± [\d.]+ mm,", millimetres)
+    assert re.search(r"radius 7\d\d\.?\d* ± [\d.]+,", nothing)
 
 
 def test_an_exact_line_is_no_screw_without_a_radius():

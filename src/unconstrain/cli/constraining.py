@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
+import numpy as np
 
 import unconstrain as uc
 
+from ..base.display import bare, listed
 from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
 from .informing import provenance
@@ -20,6 +23,9 @@ from .writing import check_name, check_outputs, option_for_force
 
 MOST_POSITIONS = 4000
 """Positions, at most, by which a mechanism is named; more are thinned evenly."""
+
+LENGTHS = ("", "m", "mm", "cm", "um", "km", "in", "ft")
+"""Units of positions, and none."""
 
 FEATURES = ("auto", "constant", "affine", "quadratic", "rbf")
 
@@ -58,27 +64,64 @@ def constraint(
     _check_asked(jacobian, tip, surface, with_task)
     with shown("reading, learning"):
         demonstrations, recipe, (first, *_) = prepared(paths, reading)
-        states, actions, groups = uc.stack(demonstrations)
         arm = None if jacobian is None else arm_of(jacobian, tip).jacobian
-        learnt = uc.LearntConstraint(features, arm, task=with_task)
-        learnt.fit(states, None if surface else actions, groups=groups)
+        learnt = _learnt(uc.LearntConstraint(features, arm, task=with_task), demonstrations, surface)
     refuse_warnings(reading["strict"])
     if recipe.angles:
         click.echo(f"Note: {', '.join(recipe.angles)} as unwrapped: a turn more is another state to it.", err=True)
-    verdict = uc.evaluation.verdicts.of_constraint(learnt)
-    named = mechanism_of(demonstrations) if jacobian is None and _are_positions(recipe) else None
+    outputs = {name: _of_demonstration(output, name) for name in learnt}
+    check_outputs([place for name, place in outputs.items() if name], (*paths, jacobian), force)
+    verdict = uc.evaluation.verdicts.of_constraint(*learnt.values())
+    named = mechanism_of(demonstrations, recipe, first) if jacobian is None else None
     if not as_json:
         say_verdict(verdict)
         click.echo(f"Learnt from {said_recipe(recipe, first)}.")
         _say(learnt, "distance from it" if surface else "action", named)
-    uc.save(learnt, output, provenance(paths, recipe, first, **reading))
+    for name, place in outputs.items():
+        uc.save(learnt[name], place, provenance(paths, recipe, first, **reading))
+    written = {f"constraint of {name}" if name else "constraint": place for name, place in outputs.items()}
     if report is not None:
-        from ..pages.constraint import constraint_page
-
-        names = recipe.labels(first.units)[0]
-        write(report, constraint_page(learnt, demonstrations, Path(report).stem, names, *(named or ())))
-    written = {"constraint": output} | ({} if report is None else {"report": report})
+        _report(report, learnt, demonstrations, recipe.labels(first.units)[0], named)
+        written["report"] = report
     say_written(written, _told(learnt, verdict, named) if as_json else None)
+
+
+def _report(
+    place: str,
+    learnt: Mapping[str, uc.LearntConstraint],
+    demonstrations: Sequence[uc.Demonstration],
+    columns: Sequence[str],
+    named: Named | None,
+) -> None:
+    from ..pages.constraint import constraint_page
+
+    said = () if named is None else named.sentences
+    every = list(learnt.values())
+    write(place, constraint_page(every, demonstrations, Path(place).stem, columns, said, table_of(learnt, named)))
+
+
+def _learnt(
+    constraint: uc.LearntConstraint, demonstrations: Sequence[uc.Demonstration], surface: bool
+) -> dict[str, uc.LearntConstraint]:
+    """One for all, without a name; or one for each, by name, where one for all has doubts or is less simple."""
+    states, actions, groups = uc.stack(demonstrations)
+    moves = None if surface else actions
+    try:
+        shared = constraint.fit(states, moves, groups=groups).choice_
+    except InvalidDataError:
+        each = constraint.differing(states, moves, groups)
+        if not each:
+            raise
+    else:
+        each = constraint.differing(states, moves, groups) if shared.doubts or FEATURES.index(shared.name) > 1 else {}
+        form = max((FEATURES.index(one.choice_.name) for one in each.values()), default=0)
+        each = each if shared.doubts or form < FEATURES.index(shared.name) else {}
+    return {demonstrations[int(str(number))].name: one for number, one in each.items()} or {"": constraint}
+
+
+def _of_demonstration(output: str, name: str) -> str:
+    path, plain = Path(output), re.sub(r"[^\w.-]+", "_", name)
+    return str(path.with_name(f"{path.stem}_{plain}{path.suffix}")) if name else output
 
 
 def _check_asked(jacobian: str | None, tip: str | None, surface: bool, with_task: bool) -> None:
@@ -88,7 +131,21 @@ def _check_asked(jacobian: str | None, tip: str | None, surface: bool, with_task
         raise SettingError("--surface: got --with-task or --jacobian too; positions alone show neither.")
 
 
-def _told(learnt: uc.LearntConstraint, verdict: uc.evaluation.verdicts.Verdict, named: Named | None) -> dict[str, Any]:
+def _told(
+    learnt: Mapping[str, uc.LearntConstraint], verdict: uc.evaluation.verdicts.Verdict, named: Named | None
+) -> dict[str, Any]:
+    each = {name: _numbers(one) for name, one in learnt.items()}
+    return {
+        **each.pop("", {}),
+        "each": each,
+        "mechanism": None if named is None else named.found.summary,
+        "mechanisms": {} if named is None else dict(named.each),
+        "mechanism_doubt": "" if named is None else named.found.doubt,
+        "verdict": verdict.to_json(),
+    }
+
+
+def _numbers(learnt: uc.LearntConstraint) -> dict[str, Any]:
     choice = learnt.choice_
     return {
         "rank": learnt.rank_,
@@ -97,9 +154,6 @@ def _told(learnt: uc.LearntConstraint, verdict: uc.evaluation.verdicts.Verdict, 
         "features": choice.name,
         "candidates": dict(choice.candidates),
         "doubts": list(choice.doubts),
-        "mechanism": None if named is None else named.summary,
-        "mechanisms": {} if named is None else dict(named.each),
-        "verdict": verdict.to_json(),
     }
 
 
@@ -114,8 +168,6 @@ def held_of(
     plane: tuple[float, ...] | None, path: str | None, recipe: uc.Recipe, states: int, actions: int, meaning: str
 ) -> uc.constraints.Constraint | None:
     """The constraint of the options: a plane, or a learnt one from a file, of the states that a recipe prepares."""
-    import numpy as np
-
     if plane is not None and path is not None:
         raise SettingError("--plane: got --constraint too, expected one of them.")
     if plane is not None:
@@ -154,25 +206,51 @@ def known_arms() -> Any:
 
 
 class Named(NamedTuple):
-    """What may have held some demonstrations, in words; and what each, with its name, where they differ."""
+    """What may have held some demonstrations, by name, and whether their unit is known."""
 
-    summary: str
-    each: list[tuple[str, str]]
+    found: Any
+    names: list[str]
+    up: str
+    """The last column."""
+
+    @property
+    def each(self) -> list[tuple[str, str]]:
+        """Name and mechanism of each, where they differ."""
+        held = self.found.candidates[0].mechanisms
+        return [] if len(held) == 1 else [(name, one.sentence) for name, one in zip(self.names, held, strict=True)]
+
+    @property
+    def sentences(self) -> list[str]:
+        """The verdict, and what it leaves open."""
+        known = "Mechanism" if self.found.mechanism.unit else "Mechanism, if these are positions"
+        doubt = self.found.doubt
+        return [f"{known}: {self.found.summary}.", *([f"{doubt[0].upper()}{doubt[1:]}."] if doubt else [])]
 
 
-def mechanism_of(demonstrations: Sequence[uc.Demonstration]) -> Named | None:
-    """Which mechanism may have held positions; None where too little was recorded."""
+def mechanism_of(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe, first: uc.Recording) -> Named | None:
+    """Which mechanism may have held positions; None where these are none, or too little was recorded."""
+    names = recipe.states or ()
+    if not _are_positions(recipe):
+        return None
     positions, _, groups = uc.stack(demonstrations)
     every = -(-len(positions) // MOST_POSITIONS)
     try:
-        found = uc.constraints.identify(positions[::every], groups=groups[::every])
+        unit = _unit_of([first.units.get(name, "") for name in names])
+        found = uc.constraints.identify(positions[::every], groups=groups[::every], unit=unit)
     except InvalidDataError as error:
         click.echo(f"Note: no mechanism is named: {error}", err=True)
         return None
-    names = [demonstrations[number].name for number in dict.fromkeys(groups[::every].tolist())]
-    held = found.candidates[0].mechanisms
-    each = [] if len(held) == 1 else [(name, one.sentence) for name, one in zip(names, held, strict=True)]
-    return Named(found.summary, each)
+    return Named(found, [demonstrations[number].name for number in np.unique(groups[::every]).tolist()], names[-1])
+
+
+def _unit_of(units: Sequence[str]) -> str:
+    """Of lengths, as the columns say it; empty where they do not."""
+    [unit, *others] = dict.fromkeys(unit.lower() for unit in units)
+    if others or unit not in LENGTHS:
+        raise InvalidDataError(
+            f"the columns are in {listed(units)}, expected one unit of length: these are no positions."
+        )
+    return unit
 
 
 def _are_positions(recipe: uc.Recipe) -> bool:
@@ -181,7 +259,19 @@ def _are_positions(recipe: uc.Recipe) -> bool:
     return recipe.actions is None and count in (2, 3) and recipe.space == uc.spaces.Euclidean(count)
 
 
-def _say(learnt: uc.LearntConstraint, what: str, named: Named | None) -> None:
+def _say(learnt: Mapping[str, uc.LearntConstraint], what: str, named: Named | None) -> None:
+    if "" in learnt:
+        _say_one(learnt[""], what)
+    else:
+        click.echo("Each demonstration has its own: one constraint for all misses more where held out.")
+    for sentence in named.sentences if named is not None else ():
+        click.echo(sentence)
+    head, rows = table_of(learnt, named)
+    if rows:
+        print_table(head, rows)
+
+
+def _say_one(learnt: uc.LearntConstraint, what: str) -> None:
     choice = learnt.choice_
     smooth = f", smoothed with {choice.smoothness:g}" if choice.smoothness else ""
     click.echo(f"{learnt.rank_} of {choice.actions} directions held, by {choice.name} features{smooth}.")
@@ -193,7 +283,21 @@ def _say(learnt: uc.LearntConstraint, what: str, named: Named | None) -> None:
     print_table(["features", "missed where held out"], rows)
     for doubt in choice.doubts:
         click.echo(f"Note: {doubt}", err=True)
-    if named is not None:
-        click.echo(f"Mechanism, if these are positions in m: {named.summary}.")
+
+
+def table_of(learnt: Mapping[str, uc.LearntConstraint], named: Named | None) -> tuple[list[str], list[list[str]]]:
+    """What held each demonstration, where that differs: head and rows."""
+    own = {name: one for name, one in learnt.items() if name}
+    columns = {
+        "held": [f"{one.rank_} of {one.choice_.actions}, {one.choice_.name}" for one in own.values()],
+        "missed where held out": [f"{one.choice_.held_out:.3g}" for one in own.values()],
+    }
+    names = list(own)
     if named is not None and named.each:
-        print_table(["demonstration", "mechanism"], named.each)
+        names, axes = named.names, [one.axis for one in named.found.candidates[0].mechanisms]
+        columns[f"tilt from {bare(named.up)}"] = [
+            f"{np.degrees(np.arccos(min(abs(axis[-1]), 1.0))):.1f}°" for axis in axes
+        ]
+        columns["mechanism"] = [text for _, text in named.each]
+    shown = {head: values for head, values in columns.items() if values}
+    return ["demonstration", *shown], [list(row) for row in zip(names, *shown.values(), strict=True)]

@@ -68,6 +68,8 @@ class Choice:
         Dimensions n and d.
     unit : float
         Of the actions.
+    several : bool
+        Whether it is of several demonstrations.
     """
 
     name: str
@@ -82,6 +84,14 @@ class Choice:
     columns: int
     actions: int
     unit: float
+    several: bool = False
+
+    def missed(self, states: Array, actions: Array) -> float:
+        """Mean square along held directions, as a share of that of all actions, of others than were learnt from."""
+        samples = self.form.lift(states, actions / self.unit)
+        rows, one = self.fields.rows(samples), np.zeros(len(states), dtype=np.intp)
+        others = Kept(one.astype(np.uint64), states, actions / self.unit, np.ones(len(states)), one)
+        return _missed(rows, self.fields.residuals(samples, rows), others).share
 
     def checked(self) -> Choice:
         """Itself, if it is finite.
@@ -95,10 +105,19 @@ class Choice:
         return self
 
     @property
+    def lacking(self) -> bool:
+        """Whether movements were not recorded that would tell what is held."""
+        return self._one_way or self.fields.next < HELD
+
+    @property
+    def _one_way(self) -> bool:
+        return self.fields.rank == self.actions - 1 and self.explained > ONE_WAY
+
+    @property
     def doubts(self) -> tuple[str, ...]:
         """What the data does not tell, in sentences."""
         said = []
-        if self.fields.rank == self.actions - 1 and self.explained > ONE_WAY:
+        if self._one_way:
             said.append(
                 "At each state only one direction was seen: a free policy that is a function of the state looks the "
                 "same. Record movements that cross each other, or name the features."
@@ -110,9 +129,10 @@ class Choice:
             )
         if max(self.held_out, self.proportional) > DOUBTFUL:
             faster = f", {self.proportional:.0%} where movements are fast" if self.proportional > DOUBTFUL else ""
+            differs = ", or differs between demonstrations" if self.several else ""
             said.append(
                 f"Along the held directions moves {self.held_out:.0%} of a mean square action{faster}: noise, or the "
-                "constraint is not quite of this form, or differs between demonstrations."
+                f"constraint is not quite of this form{differs}."
             )
         return tuple(said)
 
@@ -143,7 +163,16 @@ def chosen(evidence: Evidence) -> Choice:
     shares = {name: min(one.held_out.share for one in tried if one.name == name) for name in evidence.forms}
     sizes = kept.states.shape[1], kept.actions.shape[1]
     told = noise, best.held_out.share, best.held_out.rate, explained, shares
-    return Choice(best.name, evidence.forms[best.name], best.strength, best.fields, *told, *sizes, evidence.unit)
+    return Choice(
+        best.name,
+        evidence.forms[best.name],
+        best.strength,
+        best.fields,
+        *told,
+        *sizes,
+        evidence.unit,
+        evidence.split is not None,
+    )
 
 
 def simplest(losses: Array, margin: float = 0.0) -> int:

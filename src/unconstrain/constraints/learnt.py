@@ -19,7 +19,7 @@ from ..models import FeatureMap, Placeable
 from ..risks import null_space_projection
 from ..training import Batch, FirstLook
 from .choice import EXACT, Choice, chosen, simplest
-from .evidence import Evidence
+from .evidence import FOLDS, Evidence
 from .forms import NAMED, Jacobian, Lifted, Surface, Velocities, forms_of
 
 
@@ -128,9 +128,35 @@ class LearntConstraint(Parameters, Shown):
             raise InvalidDataError(f"{free[0]!r}: no direction is held in it, expected one; fit the others without it.")
         return {name: one for name, one in zip(places, best, strict=True) if one is not None}
 
-    def _alone(self, features: Any, states: Array, actions: Array | None) -> LearntConstraint | None:
+    def differing(
+        self, states: ArrayLike, actions: ArrayLike | None, groups: Groups
+    ) -> dict[Hashable, LearntConstraint]:
+        """As :meth:`fit_each`, if that misses less where held out than one constraint for all, by a standard error.
+
+        Otherwise, or if in one of them no direction is held, there is none. One for all is judged by demonstrations
+        that it was not learnt from.
+        """
+        table, names = as_matrix(states, "states"), as_groups(groups, len(np.asarray(states)))
+        moves = table - table.mean(axis=0) if actions is None else as_matrix(actions, "actions")
+        order = list(dict.fromkeys(names.tolist()))
         try:
-            return LearntConstraint(features, self.jacobian, task=self.task).fit(states, actions)
+            each = self.fit_each(states, actions, groups) if len(order) > 1 else {}
+        except InvalidDataError:
+            return {}
+        shared = dict.fromkeys(order, 0.0)
+        for left in (order[fold::FOLDS] for fold in range(FOLDS) if each):
+            rest = ~np.isin(names, left)
+            one = self._alone(self.features, table[rest], None if actions is None else moves[rest], names[rest])
+            parts = {name: names == name for name in left if one is not None}
+            shared |= {name: _loss(one, table[rows], moves[rows]) for name, rows in parts.items()}
+        losses = [list(shared.values()), [_loss(each[name]) for name in order if each]]
+        return each if each and simplest(np.array(losses)) else {}
+
+    def _alone(
+        self, features: Any, states: Array, actions: Array | None, groups: Groups | None = None
+    ) -> LearntConstraint | None:
+        try:
+            return LearntConstraint(features, self.jacobian, task=self.task).fit(states, actions, groups)
         except InvalidDataError:
             return None
 
@@ -219,8 +245,12 @@ class LearntConstraint(Parameters, Shown):
         return self.choice_.name or "own features", held, f"noise={self.noise_:.3g}"
 
 
-def _loss(alone: LearntConstraint | None) -> float:
-    return 0.0 if alone is None else float(np.log(max(alone.choice_.held_out, EXACT)))
+def _loss(one: LearntConstraint | None, *others: Array) -> float:
+    """Logarithm of what is missed where held out, or of other states and actions."""
+    if one is None:
+        return 0.0
+    missed = one.choice_.missed(*others) if others else one.choice_.held_out
+    return float(np.log(max(missed, EXACT)))
 
 
 def _here(function: Callable[[Any], Any], parts: Sequence[Any]) -> Any:

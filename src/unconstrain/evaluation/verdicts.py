@@ -158,18 +158,23 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
     return Verdict(mark, said, trust, doubt, then)
 
 
-def of_constraint(learnt: LearntConstraint) -> Verdict:
-    """Judge a learnt constraint by what it missed where held out."""
-    choice, shown = learnt.choice_, 1.0 - learnt.choice_.held_out
-    if learnt.rank_ == 0:
+def of_constraint(learnt: LearntConstraint, *others: LearntConstraint) -> Verdict:
+    """Judge a learnt constraint, or one for each demonstration, by what was missed where held out."""
+    every = (learnt, *others)
+    choice = max((one.choice_ for one in every), key=lambda each: each.held_out)
+    missed, ranks = sum(one.choice_.held_out for one in every) / len(every), {one.rank_ for one in every}
+    if max(ranks) == 0:
         said = "No direction was held: nothing constrained these movements, or each direction was seen."
         return Verdict(Mark.DOUBTFUL, said, next="Look whether the demonstrations were held in different ways.")
-    mark, word = _graded(shown)
-    held = f"{learnt.rank_} of {choice.actions} directions were held"
-    said = f"{held}; {1 - shown:.0%} of held-out motion is along them: {word}."
+    mark, word = _graded(1.0 - missed)
+    held = f"{' to '.join(map(str, sorted({min(ranks), max(ranks)})))} of {choice.actions} directions were held"
+    apart = f", others in each of {_count(len(every))}" if others else ""
+    said = f"{held}{apart}; {missed:.0%} of held-out motion is along them: {word}."
     then = "Use it with 'unconstrain rollout --constraint' or 'score --constraint'."
-    if choice.doubts:
-        mark, then = (Mark.DOUBTFUL if mark is Mark.GOOD else mark), "Record what is missing, then learn it again."
+    if choice.doubts and mark is Mark.GOOD:
+        mark = Mark.DOUBTFUL
+    if choice.lacking:
+        then = "Record what is missing, then learn it again."
     doubt = "; ".join(text.rstrip(".") for text in choice.doubts)
     still = "A direction in which nobody wanted to move looks held, too."
     return Verdict(mark, said, "What was held, near recorded states.", f"{doubt}. {still}" if doubt else still, then)

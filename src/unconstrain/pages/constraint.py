@@ -15,6 +15,8 @@ from . import figures, html
 if TYPE_CHECKING:
     from ..constraints import LearntConstraint
 
+    Part = tuple[LearntConstraint, Sequence[Demonstration]]
+
 MOST_NORMALS = 150
 MOST_POINTS = 4000
 
@@ -23,28 +25,29 @@ _HELD = "inconsistency"
 
 
 def constraint_page(
-    learnt: LearntConstraint,
+    learnt: Sequence[LearntConstraint],
     demonstrations: Sequence[Demonstration],
     title: str,
     columns: Sequence[str] | None = None,
-    mechanism: str | None = None,
-    each: Sequence[tuple[str, str]] = (),
+    mechanism: Sequence[str] = (),
+    each: tuple[Sequence[str], Sequence[Sequence[str]]] = ((), ()),
 ) -> str:
     """Make the page of a learnt constraint.
 
     Parameters
     ----------
-    learnt : LearntConstraint
+    learnt : sequence of LearntConstraint
+        One for all demonstrations, or one for each.
     demonstrations : sequence of Demonstration
         What it was learnt from, or others.
     title : str
         Of the page.
     columns : sequence of str, optional
         Names of the states.
-    mechanism : str, optional
-        What may have held them, in words.
-    each : sequence of pairs of str, optional
-        What held each demonstration, with its name, where they differ.
+    mechanism : sequence of str, optional
+        What may have held them, in sentences.
+    each : pair of sequences, optional
+        Head and rows of a table: what held each demonstration, where they differ.
 
     Returns
     -------
@@ -56,54 +59,69 @@ def constraint_page(
     MissingExtraError
         If matplotlib or jinja2 is not installed.
     """
-    choice, demos = learnt.choice_, list(demonstrations)
-    tiles = [
-        (f"{learnt.rank_} of {choice.actions}", "directions held"),
-        (choice.name or "own", "features"),
-        (html.number(learnt.noise_), "noise and misfit along them"),
-        (html.number(npoe(learnt, demos)), "nPOE, the share of the observed motion that it would take"),
-    ]
-    rows = [[name or "own", html.number(share)] for name, share in choice.candidates.items()]
-    note = "Mean square along the held directions, as a share of the mean square action, where held out."
+    demos, choice = list(demonstrations), learnt[0].choice_
     parts = (
-        [html.section("Where it holds", held_directions(learnt, demos, columns))]
-        if choice.columns == choice.actions > 1
-        else []
+        [(learnt[0], demos)] if len(learnt) == 1 else [(one, [demo]) for one, demo in zip(learnt, demos, strict=True)]
     )
-    doubts = [html.section("What the data does not tell", html.bullets(choice.doubts))] if choice.doubts else []
+    doubts = list(dict.fromkeys(doubt for one in learnt for doubt in one.choice_.doubts)) if len(learnt) == 1 else []
     return html.document(
         title,
-        verdicts.of_constraint(learnt),
+        verdicts.of_constraint(*learnt),
         html.words("constraint_lead"),
         *_named(mechanism, each),
-        *parts,
-        *doubts,
-        html.section("Numbers", html.tiles(tiles)),
-        html.section("How its form was chosen", html.table(["features", "missed"], rows, note=note)),
+        *(
+            [html.section("Where it holds", held_directions(parts, columns))]
+            if choice.columns == choice.actions > 1
+            else []
+        ),
+        *([html.section("What the data does not tell", html.bullets(doubts))] if doubts else []),
+        html.section("Numbers", _numbers(parts)),
+        *([_chosen(learnt[0])] if len(learnt) == 1 else []),
     )
 
 
-def _named(mechanism: str | None, each: Sequence[tuple[str, str]]) -> list[html.Markup]:
-    if mechanism is None:
-        return []
-    note = "Positions in m, with half of their 95 % intervals."
-    table = [html.table(["demonstration", "mechanism"], each, note=note, left=2)] if each else []
-    return [html.section("The mechanism", html.paragraph(f"{mechanism[:1].upper()}{mechanism[1:]}."), *table)]
+def _numbers(parts: Sequence[Part]) -> html.Markup:
+    learnt = [one for one, _ in parts]
+    ranks = sorted({one.rank_ for one in learnt})
+    held = " to ".join(map(str, dict.fromkeys((ranks[0], ranks[-1]))))
+    taken = float(np.mean([npoe(one, demos) for one, demos in parts]))
+    return html.tiles(
+        [
+            (f"{held} of {learnt[0].choice_.actions}", "directions held"),
+            (learnt[0].choice_.name or "own", "features"),
+            (html.number(float(np.mean([one.noise_ for one in learnt]))), "noise and misfit along them"),
+            (html.number(taken), "nPOE, the share of the observed motion that it would take"),
+        ]
+    )
 
 
-def held_directions(
-    learnt: LearntConstraint, demos: Sequence[Demonstration], columns: Sequence[str] | None = None
-) -> html.Markup:
-    """Held directions through recorded states, over the first two or three columns."""
-    states, _, _ = stack(demos)
+def _chosen(learnt: LearntConstraint) -> html.Markup:
+    rows = [[name or "own", html.number(share)] for name, share in learnt.choice_.candidates.items()]
+    note = "Mean square along the held directions, as a share of the mean square action, where held out."
+    return html.section("How its form was chosen", html.table(["features", "missed"], rows, note=note))
+
+
+def _named(mechanism: Sequence[str], each: tuple[Sequence[str], Sequence[Sequence[str]]]) -> list[html.Markup]:
+    head, rows = each
+    said = [html.section("The mechanism", *map(html.paragraph, mechanism))] if mechanism else []
+    note = "Lengths in the unit of the columns, with half of their 95 % intervals."
+    return [
+        *said,
+        *([html.section("Each demonstration", html.table(head, rows, note=note, left=len(head)))] if rows else []),
+    ]
+
+
+def held_directions(parts: Sequence[Part], columns: Sequence[str] | None = None) -> html.Markup:
+    """Held directions through recorded states, over the first two or three columns: constraints with what they held."""
+    demos = [demo for _, held in parts for demo in held]
+    states = np.concatenate([demo.states for demo in demos])
     labels = list(columns or (f"state {column + 1}" for column in range(states.shape[1])))
-    few = states[:: -(-len(states) // MOST_NORMALS)]
     shown = min(states.shape[1], 3)
     reach = float(np.ptp(states[:, :shown], axis=0).max()) / 25
-    lines = np.concatenate([_strokes(few, reach * learnt(few)[:, row]) for row in range(learnt.rank_)])[:, :shown]
-    every = -(-len(states) // MOST_POINTS)
-    tracks = [demo.states[::every, :shown] for demo in demos]
-    drawn = [*(("training", track) for track in tracks), (_HELD, lines)]
+    every = -(-len(states) // MOST_NORMALS)
+    lines = np.concatenate([_strokes_of(one, stack(held)[0][::every], reach) for one, held in parts])[:, :shown]
+    thinned = -(-len(states) // MOST_POINTS)
+    drawn = [*(("training", demo.states[::thinned, :shown]) for demo in demos), (_HELD, lines)]
     panel = (
         figures.movements(drawn, labels=(labels[0], labels[1], labels[2]))
         if shown == 3
@@ -112,6 +130,10 @@ def held_directions(
     caption = "Grey lines are the demonstrations. Strokes are directions in which they were held at these states."
     words = {_HELD: "held directions", "training": "demonstrations"}
     return html.picture("held", [panel], caption, keys=(_HELD, "training"), labels=words)
+
+
+def _strokes_of(learnt: LearntConstraint, states: Array, reach: float) -> Array:
+    return np.concatenate([_strokes(states, reach * learnt(states)[:, row]) for row in range(learnt.rank_)])
 
 
 def _strokes(points: Array, half: Array) -> Array:

@@ -17,10 +17,18 @@ g = n s²/σ² and Δ, by how much bending explains the recording better, Laplac
     (1 + g)^(−q/2) exp(−Δ / (1 + g)).
 
 So a bend that is too small to be seen leaves the two undecided; a fixed width would call the straight one certain.
+
+A path along which one direction is free may be a habit within a surface: whoever wipes a plate in circles wants the
+circle, and only the plate holds. What holds is as tight in one direction as in the other. Who follows a habit strays
+along the surface by more than the noise across it, and for long. So the best of these paths is explained a second time,
+with noise of its own in either direction (Bartlett's likelihood ratio), for which two numbers are paid by Schwarz's
+criterion, its size and where it points. That explanation counts for each kind that holds less: of such a kind the
+movement was uniform, or it was a habit.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import combinations
 
 import numpy as np
@@ -28,7 +36,8 @@ from scipy.special import logsumexp
 
 from ...base.arrays import Array
 from .fitting import RESOLUTION, Fit, noise
-from .track import Track, principal
+from .mechanism import Mechanism
+from .track import Track, correlation_time, principal
 
 UNIT_ENTROPY = np.sqrt(2 * np.pi * np.e)
 """Extent of the uniform distribution that has the entropy of a normal one of variance 1."""
@@ -39,21 +48,60 @@ LEAST_BEND = 1 / 300
 USUAL_NOISE = 0.02
 """Share of the widest extent. Noise above it, and above what is white, has a prior that falls with its square."""
 
+HABIT = 1 / 20
+"""Odds, before anything was recorded, that whoever moves along a curve wants to, and is not held."""
 
-def log_evidence(fits: list[Fit], straight: list[Fit] | None, time: float, white: float) -> float:
-    """Of one kind: one mechanism for all demonstrations, or one for each.
+LASTING = 2.0
+"""Straying lasts so many times longer than noise does: a sensor may be noisier in one direction than in the other."""
+
+Explained = Mapping[tuple[type[Mechanism], int], list[Fit]]
+"""By kind, and by how many mechanisms there are: one for all demonstrations, or one for each."""
+
+
+def log_evidences(explained: Explained, time: float, white: float) -> dict[tuple[type[Mechanism], int], float]:
+    """Of every explanation.
 
     Parameters
     ----------
-    fits : list of Fit
-        Their noise is common.
-    straight : list of Fit, or None
-        Of the kind that it is where it does not bend.
+    explained : mapping
     time : float
         Samples that are worth one.
     white : float
         Standard deviation of what is white in a coordinate.
     """
+    found = {}
+    for (kind, count), fits in explained.items():
+        straight = None if kind.form.straight is None else explained[kind.form.straight, count]
+        found[kind, count] = _log_evidence(fits, straight, time, white)
+    paths = [each for each, fits in explained.items() if fits[0].held.shape[1] == 2 == fits[0].track.dimensions - 1]
+    if not paths:
+        return found
+    best = max(paths, key=lambda each: found[each])
+    looser = [each for each, fits in explained.items() if fits[0].held.shape[1] < 2]
+    wanted = found[best] + _habit(explained[best], time)
+    credit = float(np.logaddexp(0.0, wanted - max(found[each] for each in looser)))
+    return {each: value + credit * (each in looser) for each, value in found.items()}
+
+
+def _habit(fits: list[Fit], time: float) -> float:
+    """Log odds of a habit against a mechanism that holds the same path in all directions but one."""
+    gain = sum(_looseness(one) for one in fits) / time
+    paid = sum(np.log(max(len(one.residuals) / time, 2.0)) for one in fits)
+    return float(gain - paid + np.log(HABIT))
+
+
+def _looseness(one: Fit) -> float:
+    """Log likelihood ratio of noise that differs between both directions that are held, where the larger lasts."""
+    squares, turn = np.linalg.eigh(one.held.T @ one.held / len(one.held))
+    tight, loose = (correlation_time((one.held @ turn)[:, [way]], one.track.groups) for way in (0, 1))
+    if loose <= LASTING * tight:
+        return 0.0
+    squares = np.maximum(squares, RESOLUTION**2)
+    return len(one.held) * float(np.log(squares.mean()) - np.log(squares).mean())
+
+
+def _log_evidence(fits: list[Fit], straight: list[Fit] | None, time: float, white: float) -> float:
+    """Of one kind, whose noise is common to all fits, and of that which it is where it does not bend."""
     variances = noise(fits)
     value = _explained(fits, time) - _slack(fits, white) + sum(_parameters(one, variances, time) for one in fits)
     if straight is None:

@@ -35,6 +35,11 @@ class Fit:
         """Shape (N, c)."""
         return self.mechanism.residuals(self.track)
 
+    @property
+    def held(self) -> Array:
+        """Residuals of the positions, in each direction that is held, (N, k)."""
+        return self.residuals[:, : sum(self.mechanism.form.blocks[:1])]
+
     @cached_property
     def jacobian(self) -> Array:
         """Change of the residuals with the chart, (k, N, c), by central differences."""
@@ -46,8 +51,7 @@ class Fit:
     @cached_property
     def time(self) -> float:
         """How many samples are worth one."""
-        held = self.residuals[:, : self.mechanism.form.blocks[0]]
-        return correlation_time(held, self.track.groups, self.mechanism.count)
+        return correlation_time(self.held, self.track.groups, self.mechanism.count)
 
     def information(self, variances: Array) -> Array:
         """Fisher information of the chart (k, k), at noise variances (c,)."""

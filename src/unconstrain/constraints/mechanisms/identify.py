@@ -11,11 +11,11 @@ from ...base.arrays import Array, Groups, as_groups, as_matrix
 from ...base.display import Shown
 from ...base.errors import InvalidDataError
 from ...risks import unit_actions
-from .evidence import log_evidence
+from .evidence import log_evidences
 from .fitting import Fit, fit, noise
 from .forces import Witness, witnesses
 from .kinds import FLAT_KINDS, KINDS
-from .mechanism import Mechanism
+from .mechanism import Mechanism, on_one_side, small_length
 from .tied import TIED_KINDS
 from .track import Track, noise_by_differences
 
@@ -30,6 +30,12 @@ SMALLEST_MOVEMENT = 1e-12
 
 LIKELY = 20.0
 """Odds from which one kind is called decided."""
+
+NEAR = 0.15
+"""A path is near a circle that it leaves by less than this share of the radius."""
+
+VAGUE = 0.5
+"""A radius is not known whose margin is more than this share of it: a whole family of curves does as well."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,6 +59,18 @@ class Candidate(Shown):
     def kind(self) -> str:
         """point, line, plane, circle, sphere, cylinder, screw; slider, hinge where orientations tell; or free."""
         return self.mechanisms[0].kind
+
+    @property
+    def free(self) -> int:
+        """In how many directions it moves."""
+        one = self.mechanisms[0]
+        rows = one.rows((one.centre + one.frame[-1])[None])[0]
+        return len(one.centre) - int(rows.any(axis=1).sum())
+
+    def bends(self, other: Candidate) -> bool:
+        """Whether the other is what it is where it does not bend."""
+        straight = self.mechanisms[0].form.straight
+        return straight is not None and straight.form == other.mechanisms[0].form
 
     @property
     def sentence(self) -> str:
@@ -81,11 +99,13 @@ class Identification(Shown):
         Neighbours in time are partly copies of each other.
     witnesses : list of Witness
         What forces say of the directions that the likeliest mechanism holds; empty if none were given.
+    demonstrations : int
     """
 
     candidates: tuple[Candidate, ...]
     effective_samples: float
     witnesses: list[Witness]
+    demonstrations: int = 1
 
     @property
     def kind(self) -> str:
@@ -110,12 +130,16 @@ class Identification(Shown):
     @property
     def odds(self) -> float:
         """Of the likeliest kind against the next."""
-        return float(np.exp(min(self.candidates[0].log_evidence - self._next.log_evidence, MOST_CERTAIN)))
+        return self._odds(next(one for one in self.candidates if one.kind != self.kind))
 
     @property
     def decided(self) -> bool:
-        """Whether one kind is likely enough to speak of."""
-        return self.odds >= LIKELY
+        """Whether one kind is likely enough to speak of, and its radius known at all."""
+        return self.odds >= LIKELY and not self._vague
+
+    @property
+    def _vague(self) -> bool:
+        return bool(self.mechanism.margins.get("radius", np.zeros(1)).item() > VAGUE * self.mechanism.radius)
 
     @property
     def sentence(self) -> str:
@@ -127,23 +151,41 @@ class Identification(Shown):
         """The same, without each mechanism where every demonstration has its own."""
         return self._judged(self.candidates[0].summary)
 
+    @property
+    def doubt(self) -> str:
+        """What the shape of a single stroke does not tell, in words; empty if there is nothing."""
+        best, apart = self.candidates[0], "strokes from other starts would tell whether it is held"
+        if self.demonstrations > 1 or self.witnesses or best.free not in (1, len(self.mechanism.centre) - 1):
+            return ""
+        if best.free == 1:
+            return f"a policy that keeps to this path within a surface looks the same in one stroke; {apart}"
+        circle = next((one for one in self.candidates if one.kind == "circle"), best)
+        if not circle.noise < NEAR * circle.mechanisms[0].radius or circle.free != 1:
+            return ""
+        radius, strays = (
+            small_length(each, self.mechanism.unit) for each in (circle.mechanisms[0].radius, circle.noise)
+        )
+        return (
+            f"within the {best.kind} the path is near a circle of radius {radius}, which it leaves by {strays}; {apart}"
+        )
+
     def _judged(self, best: str) -> str:
-        odds = f"{self.odds:.{0 if self.odds >= 10 else 1}f}:1"
-        if self.odds > 1e4:
-            odds = "more than 10000:1"
-        if self.decided:
-            other = self._next.kind
-            verdict = f"{best}, against {'nothing held' if other == 'free' else f'a {other}'} {odds}"
+        bent = [one for one in self.candidates if one.bends(self.candidates[0]) and self.candidates[0].free == 2]
+        rival = next(one for one in self.candidates if one.kind != self.kind and one not in bent)
+        if self._odds(rival) < LIKELY or self._vague:
+            verdict = f"undecided: {best}; or else {rival.sentence} ({_said(self._odds(rival))})"
         else:
-            verdict = f"undecided: {best}; or else {self._next.sentence} ({odds})"
+            other = "nothing held" if rival.kind == "free" else f"a {rival.kind}"
+            verdict = f"{best}, against {other} {_said(self._odds(rival))}"
+        if bent and self._odds(bent[0]) < LIKELY:
+            verdict += f"; whether it bends a little, as a {bent[0].kind}, does not show ({_said(self._odds(bent[0]))})"
         return "; ".join([verdict, *map(str, self.witnesses)])
+
+    def _odds(self, other: Candidate) -> float:
+        return float(np.exp(min(self.candidates[0].log_evidence - other.log_evidence, MOST_CERTAIN)))
 
     def _summary(self) -> tuple[str, ...]:
         return (self.sentence,)
-
-    @property
-    def _next(self) -> Candidate:
-        return next(candidate for candidate in self.candidates if candidate.kind != self.kind)
 
 
 def identify(
@@ -151,19 +193,22 @@ def identify(
     orientations: ArrayLike | None = None,
     forces: ArrayLike | None = None,
     groups: Groups | None = None,
+    unit: str = "m",
 ) -> Identification:
     """Fit every kind of mechanism to recorded positions and compare them.
 
     Parameters
     ----------
     positions : array_like, shape (N, 2) or (N, 3)
-        In m, in the order of time within each demonstration.
+        In the order of time within each demonstration.
     orientations : array_like, shape (N, 4), optional
         Quaternions (x, y, z, w) of what moves. They tell a hinge, whose tool turns with it, from a circle.
     forces : array_like, shape (N, 2) or (N, 3), optional
         On the mechanism, in N and in the frame of the positions, without the tool's weight.
     groups : sequence, shape (N,), optional
         Which demonstration each sample is from. One mechanism for all is compared with one of a kind for each.
+    unit : str
+        Of the positions; empty where it is not known.
 
     Returns
     -------
@@ -179,16 +224,17 @@ def identify(
     explained = _fits(track)
     time = min(max(one.time for one in fits) for fits in explained.values() if fits[0].mechanism.count)
     white = noise_by_differences(track.positions, track.groups)
-    candidates = []
-    for (kind, count), fits in explained.items():
-        straight = None if kind.form.straight is None else explained[kind.form.straight, count]
-        evidence = log_evidence(fits, straight, time, white)
-        candidates.append(_candidate(fits, evidence, scale, origin))
-    candidates.sort(key=lambda candidate: -candidate.log_evidence)
+    found = log_evidences(explained, time, white)
+    ranked = sorted(found, key=lambda each: -found[each])
+    candidates = tuple(_candidate(explained[each], found[each], scale, origin, unit) for each in ranked)
     said: list[Witness] = []
     if pushed is not None:
         said = witnesses(candidates[0].mechanisms, origin + scale * track.positions, pushed, track.groups)
-    return Identification(tuple(candidates), len(order) / time, said)
+    return Identification(candidates, len(order) / time, said, len(track.demonstrations))
+
+
+def _said(odds: float) -> str:
+    return "more than 10000:1" if odds > 1e4 else f"{odds:.{0 if odds >= 10 else 1}f}:1"
 
 
 def _track(
@@ -232,11 +278,17 @@ def _fits(track: Track) -> dict[tuple[type[Mechanism], int], list[Fit]]:
     if track.poses:
         kinds = (*kinds[:-1], *TIED_KINDS)
     parts = track.demonstrations
-    each = {(kind, len(parts)): [fit(kind, part) for part in parts] for kind in kinds[1:] if len(parts) > 1}
-    return {**{(kind, 1): [fit(kind, track)] for kind in kinds}, **each}
+    each = {(kind, len(parts)): _each(kind, parts) for kind in kinds[1:] if len(parts) > 1}
+    return {**{(kind, 1): _each(kind, [track]) for kind in kinds}, **each}
 
 
-def _candidate(fits: list[Fit], evidence: float, scale: float, origin: Array) -> Candidate:
+def _each(kind: type[Mechanism], parts: list[Track]) -> list[Fit]:
+    """Their axes on one side."""
+    turned = on_one_side([fit(kind, part).mechanism for part in parts])
+    return [Fit(mechanism, part) for mechanism, part in zip(turned, parts, strict=True)]
+
+
+def _candidate(fits: list[Fit], evidence: float, scale: float, origin: Array, unit: str) -> Candidate:
     variances = noise(fits)
-    mechanisms = tuple(one.certain(variances).placed(scale, origin) for one in fits)
+    mechanisms = tuple(one.certain(variances).placed(scale, origin, unit) for one in fits)
     return Candidate(mechanisms, evidence, scale * float(np.sqrt(variances[0])) if len(variances) else np.nan)

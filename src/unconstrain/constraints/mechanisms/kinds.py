@@ -8,16 +8,14 @@ and where fits begin. What is round begins at the algebraic fit, that of ``â€–xâ
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar, Self, TypeVar
+from typing import ClassVar, Self
 
 import numpy as np
 
 from ...base.arrays import Array
 from ...risks import unit_actions
-from .mechanism import Form, Mechanism, frame_of
+from .mechanism import Form, M, Mechanism, frame_of
 from .track import Track, principal
-
-M = TypeVar("M", bound=Mechanism)
 
 MOST_STARTS = 3
 """Axes from which a fit begins, of those tried: the ones of the least algebraic residual."""

@@ -6,8 +6,9 @@ them, a radius, a pitch and an orientation. Its *chart* lists what a fit may cha
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, NamedTuple, Self
+from typing import ClassVar, NamedTuple, Self, TypeVar
 
 import numpy as np
 
@@ -37,6 +38,9 @@ class Form(NamedTuple):
     """Whether orientations are held, too."""
 
 
+M = TypeVar("M", bound="Mechanism")
+
+
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Mechanism(Shown):
     """A kind of constraint on positions. Called as constraints are, it returns A(x).
@@ -56,6 +60,8 @@ class Mechanism(Shown):
         Of the changes that the chart lists.
     quantile : float
         Standard errors in half of a 95 % interval.
+    unit : str
+        Of lengths; empty where it is not known.
     """
 
     form: ClassVar[Form]
@@ -67,6 +73,7 @@ class Mechanism(Shown):
     orientation: Array = field(default_factory=lambda: IDENTITY)
     covariance: Array | None = None
     quantile: float = 1.96
+    unit: str = "m"
 
     def __call__(self, states: Array, times: Array) -> Array:
         """Return A, shape (T, k, D): orthonormal rows, of zeros where nothing is held."""
@@ -118,15 +125,15 @@ class Mechanism(Shown):
 
     @property
     def sentence(self) -> str:
-        """What it is, with 95 % intervals; lengths in m."""
+        """What it is, with 95 % intervals."""
         sure = {name: float(np.max(values)) for name, values in self.margins.items()}
         near = max(sure.get("centre", 0.0), sure.get("across", 0.0), sure.get("along", 0.0))
         tilt = f" ± {np.degrees(sure['tilt']):.2g}°" if "tilt" in sure else ""
         return self.form.phrase.format(
             centre=_vector(self.centre, near),
             axis=_vector(self.axis, 0.01) + tilt,
-            radius=_length(self.radius, sure.get("radius", 0.0)),
-            pitch=_length(2 * np.pi * self.pitch, 2 * np.pi * sure.get("pitch", 0.0)),
+            radius=_length(self.radius, sure.get("radius", 0.0), self.unit),
+            pitch=_length(2 * np.pi * self.pitch, 2 * np.pi * sure.get("pitch", 0.0), self.unit),
         )
 
     def moved(self, step: Array) -> Self:
@@ -142,7 +149,15 @@ class Mechanism(Shown):
             orientation=product(rotation(change["turn"]), self.orientation) if "turn" in change else self.orientation,
         )
 
-    def placed(self, scale: float, origin: Array) -> Self:
+    def facing(self, way: Array) -> Self:
+        """The same, its axis turned to the side of a direction (D,)."""
+        if self.axis @ way >= 0.0:
+            return self
+        turned = self.frame.copy()
+        turned[[0, -1]] *= -1.0
+        return replace(self, frame=turned)
+
+    def placed(self, scale: float, origin: Array, unit: str) -> Self:
         """In other units and about another origin: ``scale`` of theirs are one of these."""
         units = np.repeat([1.0 if name in ANGLES else scale for name in self.form.chart], self.sizes)
         return replace(
@@ -150,6 +165,7 @@ class Mechanism(Shown):
             centre=origin + scale * self.centre,
             radius=scale * self.radius,
             pitch=scale * self.pitch,
+            unit=unit,
             covariance=None if self.covariance is None else units[:, None] * self.covariance * units,
         )
 
@@ -168,6 +184,12 @@ class Mechanism(Shown):
         return dict(zip(self.form.chart, np.split(numbers, ends)[:-1], strict=True))
 
 
+def on_one_side(mechanisms: Sequence[M]) -> list[M]:
+    """The same, their axes on one side: that of their principal direction, whose largest entry is positive."""
+    way = np.linalg.svd(np.array([one.axis for one in mechanisms]))[2][0]
+    return [one.facing(way * np.sign(way[np.abs(way).argmax()])) for one in mechanisms]
+
+
 def frame_of(axis: Array) -> Array:
     """Orthonormal rows (D, D), right-handed, the first along the axis (D,)."""
     d = len(axis)
@@ -181,8 +203,14 @@ def _vector(values: Array, margin: float) -> str:
     return "(" + ", ".join(f"{value:z.{_digits(margin)}f}" for value in values) + ")"
 
 
-def _length(value: float, margin: float) -> str:
-    return f"{value:z.{_digits(margin)}f} m ± {1e3 * margin:.2g} mm"
+def _length(value: float, margin: float, unit: str) -> str:
+    return f"{value:z.{_digits(margin)}f} {unit}".rstrip() + f" ± {small_length(margin, unit)}"
+
+
+def small_length(value: float, unit: str) -> str:
+    """Such as a margin, to two digits: of metres, millimetres."""
+    factor, name = (1e3, "mm") if unit == "m" and value < 1.0 else (1.0, unit)
+    return f"{float(f'{factor * value:.2g}'):.15g} {name}".rstrip()
 
 
 def _digits(margin: float) -> int:

@@ -13,8 +13,8 @@ from typing import Self
 import numpy as np
 
 from ...base.arrays import Array
-from .kinds import Circle, Line, M, Screw, in_step
-from .mechanism import Form, Mechanism, frame_of
+from .kinds import Circle, Line, Screw, in_step
+from .mechanism import Form, M, Mechanism, frame_of
 from .quaternions import inverse, mean_orientation, product, rotation, turns_from
 from .track import Track
 

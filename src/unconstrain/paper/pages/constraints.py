@@ -54,7 +54,7 @@ def _recording(result: Result) -> html.Markup:
         [str(row["blocks"]), html.number(row["s_each"]), html.number(row["npoe"])] for row in result.tables["recorded"]
     ]
     table = html.table(["blocks", "s each", "nPOE where held out"], rows, note="One block held out at a time.")
-    return html.markup("{}{}").format(held_directions(details["learnt"], [details["demonstration"]]), table)
+    return html.markup("{}{}").format(held_directions([(details["learnt"], [details["demonstration"]])]), table)
 
 
 def _components(result: Result) -> html.Markup:
