@@ -134,7 +134,23 @@ def arrival(found: list[Data]) -> Figures:
         figures |= {f"{way}: {what}": float(np.mean([one[what] for one in mine])) for what in ("area", "dtw")}
     for one in found[0]["prices"]:
         figures |= {f"{one['shape']}: price, {step}": one[step] for step in one if step != "shape"}
-    return figures
+    areas = {
+        way: np.array([one["area"] for one in found[0]["ways"] if one["way"] == way]) for way in ("guided", "stable")
+    }
+    ratios, prices = areas["guided"] / areas["stable"], [one["nupe_ratio"] for one in found[0]["rows"]]
+    bouts = [one for one in found[0]["cycles"] if re.fullmatch(r"[A-D]\d", one["cycle"])]
+    shares = [100 * one["correction"] for one in bouts]
+    alone = [one["area_ratio"] for one in found[0]["rows"] if one["area_ratio"] is not None]
+    return figures | {
+        "guided / stable: area, median": float(np.median(ratios)),
+        "guided / stable: area, above 1.2": int((ratios > 1.2).sum()),
+        "guided / unguided: area, median": float(np.median(alone)),
+        "guided / unguided: area, worst": max(alone),
+        "price: worst": max(prices),
+        "price: mean": float(np.mean(prices)),
+        "bouts: correction, %": [min(shares), max(shares)],
+        "bouts: pace off, %": 100 * max(abs(one["pace_off"]) for one in bouts),
+    }
 
 
 def regimes(found: list[Data]) -> Figures:

@@ -9,7 +9,7 @@ import unconstrain as uc
 from recorded import needs_data
 from unconstrain.base.errors import InvalidDataError, SettingError
 from unconstrain.constraints.known import Plane, SwitchingLine
-from unconstrain.motion.potential import descended, excess
+from unconstrain.motion.potential import descended, excess, steepest
 from unconstrain.paper.datasets.handwriting import load_handwriting
 
 GOAL = np.array([0.3, -0.2, 0.1])
@@ -49,7 +49,7 @@ def least_on_plane(potential, start, normal):
 
 def test_every_movement_arrives(guided):
     assert (drifting(STARTS) * (STARTS - GOAL)).sum(axis=1).max() > 1.0
-    for run in uc.rollout(guided, STARTS, 2000, guided.dt_):
+    for run in uc.rollout(guided, STARTS, 4000, guided.dt_):
         assert_allclose(run.states[-1], GOAL, atol=1e-3)
 
 
@@ -77,6 +77,31 @@ def test_v_falls_as_much_as_the_ball_says_whatever_the_policy_wants():
         radius = np.maximum(half - wild.aim_.pace, half / 2)
         fall, least = -np.vecdot(slope, velocities), (velocities**2).sum(axis=1) + half**2 - radius**2
         assert (fall >= least * (1 - 1e-9)).all()
+
+
+def test_what_leads_across_goes_to_the_nearest_that_is_allowed_and_what_leads_up_is_mirrored(guided):
+    slope = guided.potential_.gradient(STARTS)
+    half = np.linalg.norm(slope, axis=1, keepdims=True) / 2
+    radius, centre = np.maximum(half - guided.aim_.pace, half / 2), -slope / 2
+    across = 0.3 * half * np.cross(slope / (2 * half), [0.0, 0.6, 0.8])
+    assert_allclose(
+        guided.aim_.guided(STARTS, across),
+        centre + radius * (across - centre) / np.linalg.norm(across - centre, axis=1, keepdims=True),
+        atol=1e-12,
+    )
+    up = 1e4 * guided.aim_.pace * slope / (2 * half)
+    share = np.maximum(2 * radius / np.linalg.norm(up - centre, axis=1, keepdims=True) - 1, 0.0)
+    assert_allclose(guided.aim_.guided(STARTS, up), centre + share * (up - centre), rtol=1e-3, atol=1e-3 * half.max())
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_the_sharpest_bend_is_that_of_slopes_of_one_half_space(n):
+    rng = np.random.default_rng(n)
+    slopes, weights = rng.standard_normal((12, n)), rng.uniform(0.5, 1.0, 12)
+    slopes /= np.linalg.norm(slopes, axis=1, keepdims=True)
+    felt = [(slopes @ z >= 0) * weights for z in rng.standard_normal((20000, n))]
+    bends = [np.linalg.eigvalsh((share * slopes.T) @ slopes)[-1] for share in np.unique(felt, axis=0)]
+    assert_allclose(steepest(slopes, weights), max(bends) if n > 1 else weights.sum())
 
 
 def test_what_is_allowed_is_not_touched_and_near_the_edge_little(guided):

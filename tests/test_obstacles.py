@@ -80,6 +80,17 @@ def test_on_the_surface_nothing_leads_in_and_what_is_done_is_in_the_null_space()
     assert_allclose(np.vecdot(done, normals[:, 0]), 0.0, atol=1e-12)
 
 
+def test_a_step_asks_each_obstacle_once():
+    asked = []
+
+    def rock(states):
+        asked.append(len(states))
+        return UNIT(states)
+
+    uc.rollout(np.negative, [[3.0, 1.0], [2.0, -2.0]], 20, 0.05, obstacles=[rock])
+    assert asked == [2] * 20
+
+
 def test_far_from_all_obstacles_nothing_changes():
     far, wanted = np.array([[1e6, 0.0]]), np.array([[-1.0, 1.0]])
     assert_allclose(avoided([UNIT, Ellipsoid([0.0, 3.0], 0.5)], far, wanted), wanted, rtol=1e-9)

@@ -60,7 +60,7 @@ def test_cycles_are_found_where_demonstrations_repeat(guided):
 
 
 def test_under_any_plane_the_cycle_comes_nearer_at_every_step_from_both_sides(guided):
-    runs = uc.rollout(guided, STARTS, 200, 0.04, lambda states, _: NORMALS[: len(states), None], method="rk4")
+    runs = uc.rollout(guided, STARTS, 200, 0.08, lambda states, _: NORMALS[: len(states), None], method="rk4")
     begun = [off(guided, run.states[:1])[0] for run in runs]
     assert min(begun) < 0 < max(begun)
     for run in runs:

@@ -154,7 +154,7 @@ class PlacesNothing(uc.policies.Policy):
 
 @pytest.mark.parametrize(
     ("kind", "method"),
-    [(uc.Learner, "learn"), (LearnsNothing, "learn"), (uc.policies.Policy, "place"), (PlacesNothing, "place")],
+    [(uc.Learner, "learn"), (LearnsNothing, "learn"), (uc.policies.Policy, "places"), (PlacesNothing, "places")],
 )
 def test_what_is_abstract_cannot_be_made(kind, method):
     sentence = f"Can't instantiate abstract class {kind.__name__} with(out an implementation for)? abstract method "

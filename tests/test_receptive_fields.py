@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import naive
+import unconstrain as uc
 from unconstrain import ReceptiveFields, cover
 from unconstrain.base.errors import InvalidDataError, SettingError
 from unconstrain.models.receptive_fields import choose_variance
@@ -108,3 +109,23 @@ def test_fields_are_checked():
         ReceptiveFields([1.0, 2.0], 1.0)
     with pytest.raises(SettingError, match=r"variance: got -1\.0, expected a number above 1e-100"):
         ReceptiveFields([[1.0, 2.0]], -1.0)
+
+
+def test_the_variance_is_chosen_by_what_is_held_out():
+    rng = np.random.default_rng(0)
+    starts, times = rng.normal(0.0, 0.05, (8, 1)), np.linspace(0.0, 6.0, 60)
+    states = np.concatenate([np.column_stack([times, start + np.sin(2.0 * times)]) for start in starts])
+    groups = np.repeat(np.arange(8), 60)
+    winding = np.column_stack([np.ones(480), 2.0 * np.cos(2.0 * states[:, 0])]) + rng.normal(0.0, 0.05, (480, 2))
+    straight = states @ [[-1.0, 0.5], [-0.5, -1.0]] + rng.normal(0.0, 0.05, (480, 2))
+    usual = uc.LocallyLinearPolicy(learner="direct").fit(states, straight, groups=groups).fields_.variance
+    chosen = [
+        uc.LocallyLinearPolicy("auto", learner="direct").fit(states, actions, groups=groups)
+        for actions in (winding, straight)
+    ]
+    assert chosen[0].fields_.variance <= usual / 4
+    assert chosen[1].fields_.variance == usual
+    given = uc.LocallyLinearPolicy(chosen[0].fields_.variance, learner="direct").fit(states, winding, groups=groups)
+    assert_allclose(given.predict(states), chosen[0].predict(states))
+    with pytest.raises(SettingError, match="variance: got 'narrow', expected a number"):
+        uc.LocallyLinearPolicy("narrow").fit(states, winding)

@@ -164,13 +164,16 @@ def _corrected(graph: _Graph, correction: Correction) -> None:
 
 
 def _descended(graph: _Graph, number: Mapping[str, str], v: str, slope: str) -> None:
-    add, zero, one, two = graph.add, *(graph.constant(f"number_{each}", np.array(float(each))) for each in range(3))
+    add, zero, two = graph.add, *(graph.constant(f"number_{each}", np.array(float(each))) for each in (0, 2))
     half = add("Div", slope, two)
     away = add("Add", v, half)
     distance, depth = graph.length(away), graph.length(half)
     allowed = add("Max", add("Sub", depth, number["pace"]), add("Div", depth, two))
-    ratio = add("Div", add("Mul", two, allowed), add("Max", distance, graph.tiny()))
-    moved = add("Sub", add("Mul", add("Max", add("Sub", ratio, one), zero), away), half)
+    usual = add("Sqrt", add("Add", graph.inner(v, v), add("Mul", number["pace"], number["pace"])))
+    climb = add("Div", add("Max", graph.inner(v, half), zero), add("Max", add("Mul", depth, usual), graph.tiny()))
+    further = add("Mul", add("Mul", climb, climb), add("Sub", distance, allowed))
+    share = add("Div", add("Sub", allowed, further), add("Max", distance, graph.tiny()))
+    moved = add("Sub", add("Mul", add("Max", share, zero), away), half)
     add("Where", add("LessOrEqual", distance, allowed), v, moved, to="actions")
 
 

@@ -1,7 +1,7 @@
 """Model of a policy: features and receptive fields, without weights."""
 
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,11 +11,14 @@ from ..base.display import Shown
 from ..base.errors import SettingError
 from .features import Affine, FeatureMap, KMeansRBF, Placeable, Polynomial
 from .formula import ClosedForm
-from .receptive_fields import Everywhere, ReceptiveFields, choose_variance, cover
+from .receptive_fields import MOST_FIELDS, Everywhere, ReceptiveFields, choose_variance, cover
 from .spaces import Embedding
 
 MOST_WEIGHTS = 500
 """Models of more weights are not chosen from."""
+
+NARROWER = (1, 2, 4, 8, 16)
+"""Variances of fields that are tried, as shares of the default one."""
 
 SUPPORTED = 1e-3
 """Support below which no demonstration came near, and a policy extrapolates."""
@@ -97,6 +100,26 @@ class Model(Shown):
         most, typical = min(MOST_WEIGHTS, coordinates.shape[0] * actions // 2), coordinates[:1]
         few = {name: one for name, one in placed.items() if actions * one.features(typical).shape[1] <= most}
         return {"affine": placed["affine"]} | few | {"local": cls.local(coordinates, embedding=embedding)}
+
+    @classmethod
+    def of_widths(
+        cls,
+        coordinates: Array,
+        variance: float | Literal["auto"] | None,
+        at_least: float = 0.7,
+        centres: ArrayLike | None = None,
+        embedding: Embedding = _STATES,
+    ) -> dict[str, Self]:
+        """Local models of a variance, or "auto" of the default one and narrower, up to :data:`MOST_FIELDS`, by name."""
+        if variance != "auto":
+            return {"": cls.local(coordinates, variance, at_least, centres, embedding)}
+        widest, found = choose_variance(coordinates, at_least), dict[str, Self]()
+        for share in NARROWER:
+            one = cls.local(coordinates, widest / share, at_least, centres, embedding)
+            if found and len(one.shares(coordinates[:1])[0]) > MOST_FIELDS:
+                break
+            found[f"1/{share}"] = one
+        return found
 
     def design(self, states: Array) -> Array:
         """Features of states (N, n), finite, shape (N, p).

@@ -64,27 +64,30 @@ class Descent(Shown):
             half = project(projections, half)
         away = wanted + half
         distance, depth = (np.linalg.norm(each, axis=1) for each in (away, half))
-        allowed = radius(depth, self.pace)
+        allowed, usual = radius(depth, self.pace), np.sqrt((wanted**2).sum(axis=1) + self.pace**2)
         inside = distance <= allowed
-        share = np.maximum(2.0 * allowed / np.where(inside, 1.0, distance) - 1.0, 0.0)
-        return np.where(inside[:, None], wanted, share[:, None] * away - half)
+        climb = np.maximum(np.vecdot(wanted, half), 0.0) / np.maximum(depth * usual, np.finfo(float).tiny)
+        share = (allowed - climb**2 * (distance - allowed)) / np.where(inside, 1.0, distance)
+        return np.where(inside[:, None], wanted, np.maximum(share, 0.0)[:, None] * away - half)
 
     def single(self) -> Callable[[ArrayLike, Array], None]:
         """The same for one state (n,) and its velocity (n,), which is changed in place."""
         potential, pace = self.potential, self.pace
         directions, halved = potential.directions, 0.5 * potential.weights[:, None] * potential.directions
         begin = directions @ potential.goal + potential.offsets
-        along, maximum, zeros = directions.dot, np.maximum, np.zeros(len(begin))
+        along, maximum, zeros, least = directions.dot, np.maximum, np.zeros(len(begin)), np.finfo(float).tiny
 
         def guide(x: ArrayLike, wanted: Array) -> None:
             beyond = along(x)
             beyond -= begin
             half = maximum(beyond, zeros).dot(halved)
-            away = wanted + half
-            distance, depth = sqrt(away.dot(away)), sqrt(half.dot(half))
+            fast, rise, steep = wanted.dot(wanted), wanted.dot(half), half.dot(half)
+            distance, depth = sqrt(max(fast + 2.0 * rise + steep, 0.0)), sqrt(steep)
             allowed = max(depth - pace, 0.5 * depth)
             if distance > allowed:
-                np.subtract(max(2.0 * allowed / distance - 1.0, 0.0) * away, half, out=wanted)
+                climb = rise / (depth * sqrt(fast + pace**2) or least) if rise > 0.0 else 0.0
+                share = (allowed - climb**2 * (distance - allowed)) / distance
+                np.subtract(max(share, 0.0) * (wanted + half), half, out=wanted)
 
         return guide
 

@@ -12,7 +12,7 @@ from ..base.errors import DivergedError, InvalidDataError, SettingError
 from ..constraints import Constraint, constraint_matrices
 from ..models import spaces
 from ..risks import null_space_projection, project
-from .obstacles import Obstacle, avoided, shortened
+from .obstacles import Obstacle, avoided, shortened, stopped
 
 Task = Callable[[Array, Array], Array]
 """States (K, n) and times (K,) to the b of ``A u = b``, shape (K, k)."""
@@ -57,7 +57,7 @@ class Flow:
                 f"constraint: got {len(self.constraint)} constraints for {len(state)} starts, expected one for each."
             )
         for k, obstacle in enumerate(self.obstacles):
-            inside = obstacle(state)[0] < 0.0
+            inside = obstacle(self.places(state))[0] < 0.0
             if inside.any():
                 raise InvalidDataError(
                     f"start: {'' if len(state) == 1 else f'row {int(inside.argmax())} '}is inside obstacle {k + 1} of "
@@ -71,9 +71,7 @@ class Flow:
             projections = null_space_projection(matrices)
             wanted = self._wanted(state, projections)
         actions = _without_rounding(project(projections, wanted), wanted)
-        if self.obstacles:
-            actions = avoided(self.obstacles, state, actions, projections, self.dt)
-        actions = actions + self.drift(matrices, state, time)
+        actions = self.turned(state, actions, projections) + self.drift(matrices, state, time)
         if not (np.abs(actions) <= LARGEST).all():
             raise self._diverged(state, time)
         return actions, wanted, projections
@@ -85,6 +83,18 @@ class Flow:
     def settled(self, state: Array, time: float) -> Array:
         """States that the constraint allows: here all of them."""
         return state
+
+    def places(self, state: Array) -> Array:
+        """Where obstacles may be, (K, m): here states."""
+        return state
+
+    def turned(self, state: Array, actions: Array, projections: Array) -> Array:
+        """Actions (K, d) turned away from obstacles."""
+        return avoided(self.obstacles, state, actions, projections, self.dt) if self.obstacles else actions
+
+    def shortened(self, states: Array, ways: Array) -> Array:
+        """As much of ways (K, t) as no obstacle is in."""
+        return shortened([obstacle(states) for obstacle in self.obstacles], ways)
 
     def matrices(self, state: Array, time: float) -> Array:
         """A (K, k, d), that of each run; no row where nothing holds."""
@@ -116,7 +126,7 @@ class Flow:
     def moved(self, states: Array, ways: Array, time: float) -> Array:
         """States after ways (K, t), as far as no obstacle is in them."""
         if self.obstacles:
-            ways = shortened([obstacle(states) for obstacle in self.obstacles], ways)
+            ways = self.shortened(states, ways)
         with np.errstate(over="ignore", invalid="ignore"):
             moved = self.space.step(states, ways)
         if not (np.abs(moved) <= LARGEST).all():
@@ -127,7 +137,7 @@ class Flow:
         """Ways, or others where an obstacle is in them."""
         if not self.obstacles:
             return ways
-        short = shortened([obstacle(states) for obstacle in self.obstacles], ways)
+        short = self.shortened(states, ways)
         return np.where((short == ways).all(axis=1, keepdims=True), ways, others)
 
     @contextmanager
@@ -166,15 +176,14 @@ class SecondOrder(Flow):
 
     Differentiated, ``A a = ḃ − Ȧ v``, so that ``a = N π + A⁺(ḃ − Ȧ v)``; for constant constraints ``N π``. Velocities
     that a constraint does not allow, of a start, of what it has switched to, or of rounding, are lost as in an
-    inelastic impact: ``v ← N v + A⁺b``.
+    inelastic impact: ``v ← N v + A⁺b``. So is what would enter an obstacle within a step.
     """
 
     def __post_init__(self) -> None:
         ways = self.space.sizes[2]
         if ways % 2:
             raise SettingError(f"order: got 2 for states of {ways} directions, expected positions and velocities.")
-        if self.obstacles:
-            raise SettingError("obstacles: they turn velocities, and with order=2 actions are accelerations.")
+        super().__post_init__()
 
     @property
     def d(self) -> int:
@@ -188,8 +197,24 @@ class SecondOrder(Flow):
     def settled(self, state: Array, time: float) -> Array:
         """With velocities ``N v + A⁺b``."""
         with self.told(state, time):
-            lost = _least(self.matrices(state, time), self._missing(state, time))
-        return np.concatenate([state[:, : -self.d], state[:, -self.d :] + lost], axis=1)
+            matrices = self.matrices(state, time)
+            velocities = state[:, -self.d :] + _least(matrices, self._missing(state, time))
+        if self.obstacles:
+            near = [obstacle(self.places(state)) for obstacle in self.obstacles]
+            velocities = stopped(near, velocities, null_space_projection(matrices), self.dt)
+        return np.concatenate([state[:, : -self.d], velocities], axis=1)
+
+    def places(self, state: Array) -> Array:
+        """Positions."""
+        return state[:, : -self.d]
+
+    def turned(self, state: Array, actions: Array, projections: Array) -> Array:
+        """Accelerations as they are: obstacles stop velocities."""
+        return actions
+
+    def shortened(self, states: Array, ways: Array) -> Array:
+        """With the ways of positions, (K, d), as far as no obstacle is in them."""
+        return np.concatenate([super().shortened(self.places(states), ways[:, : self.d]), ways[:, self.d :]], axis=1)
 
     def matrices(self, state: Array, time: float) -> Array:
         """A at the positions."""

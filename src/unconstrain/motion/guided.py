@@ -70,10 +70,9 @@ class Guided(Exportable, Shown):
     V falls with every such velocity, and with every Euler step of at most ``dt_``, except where ``N ∇V = 0``. On flat
     constraints that is the place, and the only one, where V has its minimum under the constraint: nothing better can be
     reached. Without a constraint it is the goal. The pace s bounds how slowly. A velocity ``N π`` in the ball is not
-    changed. One outside is mirrored at the ball's surface, to its centre at most, so that V falls about as fast as the
-    policy let it rise:
+    changed. One outside goes to the nearest in it, and where it leads up V, further towards the centre:
 
-        ``u = N (π + c) = −m + (Nπ + m) min(1, (2r / ‖Nπ + m‖ − 1)₊)``.
+        ``u = N (π + c) = −m + (Nπ + m) (r − κ² (‖Nπ + m‖ − r))₊ / ‖Nπ + m‖``,   ``κ = (mᵀNπ)₊ / ‖m‖ √(‖Nπ‖² + s²)``.
 
     **On a cycle.** A closed convex surface attracts that the demonstrated cycle is on, and which every plane through
     its inside cuts in one closed curve; the pace along it is the demonstrated one (:class:`.Orbit`).
@@ -135,13 +134,13 @@ class Guided(Exportable, Shown):
         self.policy = policy
         if orbit is not None and not isinstance(orbit, str):
             given = as_matrix(orbit, "orbit")
-            self.aim_: Descent | Orbit = encircled([Demonstration(given, _velocities(policy, given))])
+            self.aim_: Descent | Orbit = encircled([Demonstration(given, _velocities(policy, given))], policy)
             return
         shown = _kept(policy) if demonstrations is None else demonstrations
         demos = [shown] if isinstance(shown, Demonstration) else list(shown)
         wanted = _velocities(policy, stack(demos).states)
         round_ = orbit is not None or (goal is None and _repeat(demos))
-        self.aim_ = encircled(demos) if round_ else _descent(demos, wanted, goal, dt)
+        self.aim_ = encircled(demos, policy) if round_ else _descent(demos, wanted, goal, dt)
 
     @property
     def potential_(self) -> Potential:

@@ -130,6 +130,32 @@ def avoided(
     return velocities if dt is None else shortened(near, dt * velocities) / dt
 
 
+def stopped(near: Sequence[tuple[Array, Array]], velocities: Array, projections: Array, dt: float) -> Array:
+    """Velocities (K, n) less what would enter within dt seconds, as in an inelastic impact inside the null space."""
+    for value, slope in near:
+        off = project(projections, slope)
+        missing = -np.vecdot(slope, velocities) - MOST * np.maximum(value, 0.0) / dt
+        size = np.vecdot(off, off)
+        held = (missing <= 0.0) | (size <= 1e-18 * np.vecdot(slope, slope))
+        velocities = velocities + np.where(held, 0.0, missing / np.where(held, 1.0, size))[:, None] * off
+    return shortened(near, dt * velocities) / dt
+
+
+@dataclass
+class Once:
+    """An obstacle that is asked once for the same states, however often they are looked at one after the other."""
+
+    obstacle: Obstacle
+    states: Array | None = None
+    found: tuple[Array, Array] = field(init=False)
+
+    def __call__(self, states: Array) -> tuple[Array, Array]:
+        """Values (K,) and gradients (K, n) of g."""
+        if self.states is None or not np.array_equal(self.states, states):
+            self.states, self.found = states, self.obstacle(states)
+        return self.found
+
+
 def shortened(near: Sequence[tuple[Array, Array]], ways: Array) -> Array:
     """Ways (K, n), as much of each as does not enter, with g and its gradient of each obstacle where they begin."""
     for value, slope in near:

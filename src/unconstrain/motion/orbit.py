@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from math import hypot, sqrt
-from operator import mul
+from dataclasses import dataclass, replace
+from math import sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,17 +16,20 @@ from ..recordings import Demonstration, stack
 from ..risks import project
 from .potential import Potential, spread_over
 
-PULL = 0.5
+PULL = 0.25
 """The cycle attracts at least at this share of the turning rate, rad/s."""
 
-RUSH = 2.0
+RUSH = 4.0
 """And at most at this."""
 
 MIDDLE = 0.2
 """Where V is as level as nearer to the middle than this share of the radius, motion is slower in proportion."""
 
-STRAY = 0.02
+STRAY = 0.1
 """The pace is the one learnt from the demonstrations to within this share."""
+
+AROUND, TIMED = 64, 4
+"""Places on the cycle at which its pace is measured, and how often it is then set to the demonstrated one."""
 
 WELL_SHOWN = 0.15
 """Of the turning, what demonstrations say at least at this share of what they say best."""
@@ -115,6 +117,17 @@ class Orbit(Shown):
         moved = along + kept[:, None] * way + np.clip(speed, *bounds)[:, None] * outward
         return np.minimum(1.0, steep / width)[:, None] * moved
 
+    def turning(self, policy: Callable[[Array], Array], plane: Array) -> float:
+        """Turns of a policy guided round the cycle on a plane (2, n) through the middle, rad/s in their mean."""
+        angle = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
+        ways = np.column_stack([np.cos(angle), np.sin(angle)]) @ plane
+        size = self.radius / np.sqrt(2.0 * self.potential(self.potential.goal + ways))  # V grows as a square
+        states = self.potential.goal + size[:, None] * ways
+        held = np.broadcast_to(plane.T @ plane, (AROUND, *self.turn.shape))
+        flat = self.guided(states, project(held, np.asarray(policy(states))), held) @ plane.T
+        rates = (flat[:, 1] * np.cos(angle) - flat[:, 0] * np.sin(angle)) / size
+        return float(1.0 / np.abs(1.0 / rates).mean()) if rates.all() else 0.0
+
     def _width(self, states: Array) -> Array:
         """Where ``‖N ∇V‖`` is less, V is nearly level, and motion slower in proportion, (N,)."""
         return MIDDLE * np.sqrt(np.maximum(2.0 * self.potential(states), self.radius**2))
@@ -126,27 +139,28 @@ class Orbit(Shown):
 
     def single(self) -> Callable[[ArrayLike, Array], None]:
         """The same for one state (n,) and its velocity (n,), which is changed in place."""
-        n, maximum = len(self.turn), np.maximum
         rows, floor, sums = self._rows()
-        slow, fast = PULL * self.rate, RUSH * self.rate
-        level, rate, least, most = self.radius**2, self.rate, 1.0 - STRAY, 1.0 + STRAY
+        shape, maximum = (3, len(self.turn)), np.maximum
+        slow, fast, level, rim = PULL * self.rate, RUSH * self.rate, self.radius**2, MIDDLE * self.radius
+        rate, least, most = self.rate, 1.0 - STRAY, 1.0 + STRAY
 
         def guide(x: ArrayLike, wanted: Array) -> None:
             # Of few numbers Python's sums take less time than NumPy's, and comparisons less than calls of min and max.
-            v, seen = wanted.tolist(), maximum(rows.dot(x), floor).dot(sums).tolist()
-            z, w, g = seen[:n], seen[n : 2 * n], seen[2 * n :]
-            gz, gw, gv, wv = sum(map(mul, g, z)), sum(map(mul, g, w)), sum(map(mul, g, v)), sum(map(mul, w, v))
-            steep, width = hypot(*g) or _TINY, MIDDLE * sqrt(gz if gz > level else level)  # ∇Vᵀ z = 2 V  # noqa: FURB136
+            v, seen = wanted.tolist(), maximum(rows.dot(x), floor).dot(sums).reshape(shape).tolist()
+            gz = gw = gv = wv = gg = ww = 0.0
+            for z, w, g, u in zip(*seen, v, strict=True):
+                gz, gw, gv, wv, gg, ww = gz + g * z, gw + g * w, gv + g * u, wv + w * u, gg + g * g, ww + w * w
+            steep, width = sqrt(gg) or _TINY, MIDDLE * sqrt(gz) if gz > level else rim  # ∇Vᵀ z = 2 V
             off, speed, across = 0.5 * (gz - level) / (steep if steep > width else width), gv / steep, gw / steep  # noqa: FURB136
             low, high = (-fast * off, -slow * off) if off > 0.0 else (-slow * off, -fast * off)
             radial = low if speed < low else high if speed > high else speed  # noqa: FURB136
-            pace = sqrt(abs(hypot(*w) ** 2 - across**2))
+            pace = sqrt(abs(ww - across * across))
             longest = pace if pace > rate * width else rate * width  # noqa: FURB136
             now = (wv - across * speed) / longest
             kept = (least * pace if now < least * pace else most * pace if now > most * pace else now) - now  # noqa: FURB136
             way = kept / longest
             out, share = (radial - speed - way * across) / steep, steep / width if steep < width else 1.0
-            wanted[:] = [share * (a + way * b + out * c) for a, b, c in zip(v, w, g, strict=True)]
+            wanted[:] = [share * (a + way * b + out * c) for a, b, c in zip(v, *seen[1:], strict=True)]
 
         return guide
 
@@ -178,8 +192,8 @@ def turns(demos: Sequence[Demonstration]) -> float:
     return float(abs(sum(np.angle(z[1:] * z[:-1].conj()).sum() for z in plane))) / (2.0 * np.pi * len(demos))
 
 
-def encircled(demos: Sequence[Demonstration]) -> Orbit:
-    """The orbit that the states of demonstrations are on, with the way round of their velocities there."""
+def encircled(demos: Sequence[Demonstration], policy: Callable[[Array], Array]) -> Orbit:
+    """The orbit that the states of demonstrations are on; guided on it a policy goes round at their pace."""
     states, velocities, _ = stack(demos)
     middle = states.mean(axis=0)
     z = states - middle
@@ -189,29 +203,31 @@ def encircled(demos: Sequence[Demonstration]) -> Orbit:
     weights = _level((np.maximum(z @ directions.T, 0.0) / radius) ** 2)
     used = weights > 0.0
     potential = Potential(middle, directions[used], np.zeros(int(used.sum())), weights[used])
-    turn = _turning(potential, demos, np.linalg.lstsq(z, velocities, rcond=1e-6)[0].T)
-    return Orbit(potential, radius, turn, float(np.sqrt((velocities**2).sum(axis=1).mean())) / radius)
+    turned = [_round(potential, demo) for demo in demos]
+    turn = _turning(turned, np.linalg.lstsq(z, velocities, rcond=1e-6)[0].T)
+    orbit = Orbit(potential, radius, turn, float(np.sqrt((velocities**2).sum(axis=1).mean())) / radius)
+    for _ in range(TIMED):
+        paces = [orbit.turning(policy, plane) for plane, *_ in turned]
+        shown = [float(np.vecdot(phases, velocities).mean()) for *_, phases, velocities in turned]
+        faster = sum(shown) / sum(paces) if all(paces) else 1.0
+        orbit = replace(orbit, turn=faster * orbit.turn)
+    return orbit
 
 
-def _turning(potential: Potential, demos: Sequence[Demonstration], plain: Array) -> Array:
-    """B (n, n) of which the part along the cycle is that of the demonstrations, and turns take as long.
+def _turning(turned: Sequence[tuple[Array, ...]], plain: Array) -> Array:
+    """B (n, n) of which the part along the cycle is that of the demonstrations.
 
     Least squares of whole velocities are too slow: what is across the cycle, and what a plane takes away, counts as
     well. So their part along it is fitted, and of B the plain one is left where that says little.
     """
-    z, tangents, phases, velocities = map(
-        np.concatenate, zip(*(_round(potential, demo) for demo in demos), strict=True)
-    )
+    _, z, tangents, _, velocities = map(np.concatenate, zip(*turned, strict=True))
     rows = (tangents[:, :, None] * z[:, None, :]).reshape(len(z), -1)
     left = np.vecdot(tangents, velocities) - rows @ plain.ravel()
-    turn = plain.ravel() + np.linalg.lstsq(rows, left, rcond=WELL_SHOWN)[0]
-    turned = float((np.vecdot(phases, tangents) * (rows @ turn)).sum())
-    faster = float(np.vecdot(phases, velocities).sum()) / turned if turned else 1.0
-    return faster * turn.reshape(plain.shape)
+    return plain + np.linalg.lstsq(rows, left, rcond=WELL_SHOWN)[0].reshape(plain.shape)
 
 
-def _round(potential: Potential, demo: Demonstration) -> tuple[Array, Array, Array, Array]:
-    """Of one demonstration on its plane: z, unit vectors along the cycle, slopes of the phase, velocities; each (T, n).
+def _round(potential: Potential, demo: Demonstration) -> tuple[Array, ...]:
+    """Of one demonstration: its plane (2, n), z, unit vectors along the cycle, slopes of the phase, velocities (T, n).
 
     Of one that goes round, the last whole turns, so that no part of the cycle counts more.
     """
@@ -227,6 +243,7 @@ def _round(potential: Potential, demo: Demonstration) -> tuple[Array, Array, Arr
         for each in (slope / np.maximum(np.abs(slope), tiny), flat / np.maximum(np.abs(flat) ** 2, tiny))
     )
     return (
+        plane,
         z[last],
         *(np.column_stack([each.real, each.imag])[last] @ plane for each in (along, phase)),
         demo.actions[last],

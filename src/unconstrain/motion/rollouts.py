@@ -14,7 +14,7 @@ from ..constraints import Constraint
 from ..models import SUPPORTED, spaces
 from ..recordings import Demonstration, Truth
 from .flow import FLOWS, STEPS, Flow, Method, Task
-from .obstacles import Obstacle
+from .obstacles import Obstacle, Once
 
 
 @overload
@@ -97,7 +97,7 @@ def rollout(
         2: states are positions and velocities, actions accelerations; constraint and task hold the velocities, and are
         given the positions (:class:`.flow.SecondOrder`).
     obstacles : sequence of callables
-        To go round, such as :class:`.obstacles.Ellipsoid`; actions are then not N π.
+        To go round, such as :class:`.obstacles.Ellipsoid`; actions are then not N π. With order 2 they stop velocities.
     least_support : float
         Stop before states with less, once there was more; 0 goes on. As a fitted policy knows, see
         :meth:`~unconstrain.Policy.support`.
@@ -135,7 +135,7 @@ def rollout(
     table, single = as_table(start, "start")
     state = table.reshape(1, -1) if single else table
     told: spaces.Space = space if space is not None else getattr(policy, "space_", spaces.Euclidean())
-    flow = FLOWS[order](policy, constraint, task, told.over(state.shape[1]), dt, tuple(obstacles))
+    flow = FLOWS[order](policy, constraint, task, told.over(state.shape[1]), dt, tuple(map(Once, obstacles)))
     flow.check(state)
     tracks = _Tracks.empty(flow, state, steps)
     names = [name] if single else [f"{name} {k + 1}" for k in range(len(state))]

@@ -67,12 +67,8 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
     _space: spaces.Space
 
     @abstractmethod
-    def place(self, look: FirstLook) -> Model:
-        """Fix features and fields on what was seen at first look."""
-
     def places(self, look: FirstLook) -> Mapping[str, Model]:
-        """Models to choose from, by name; the only one by default."""
-        return {"": self.place(look)}
+        """Fix features and fields on what was seen at first look: models to choose from, by name."""
 
     # Learning: each works on a draft, which takes this policy's place when all has gone well.
 

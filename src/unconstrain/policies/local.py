@@ -1,6 +1,6 @@
 """Locally linear policies (section III-D)."""
 
-from typing import cast
+from typing import Literal, cast
 
 from numpy.typing import ArrayLike
 
@@ -18,8 +18,10 @@ class LocallyLinearPolicy(Policy):
 
     Parameters
     ----------
-    variance : float, optional
+    variance : float or "auto", optional
         The fields' σ², by default a quarter of the states' total variance, more where that takes over 100 fields.
+        "auto" chooses among that and halves of it, down to a sixteenth, by estimated error: movements that wind need
+        narrower fields.
     at_least : float
         Fields are added until every sample has at least this weight in one.
     centres : array_like, shape (M, n), optional
@@ -50,7 +52,7 @@ class LocallyLinearPolicy(Policy):
 
     def __init__(
         self,
-        variance: float | None = None,
+        variance: float | Literal["auto"] | None = None,
         at_least: float = 0.7,
         centres: ArrayLike | None = None,
         learner: Learner | str | None = None,
@@ -66,12 +68,12 @@ class LocallyLinearPolicy(Policy):
         self.space = space
         self.scale = scale
 
-    def place(self, look: FirstLook) -> Model:
-        """Lay fields over the states seen at first look; regressors share one origin."""
+    def places(self, look: FirstLook) -> dict[str, Model]:
+        """Lay fields of each variance over the states seen at first look; regressors share one origin."""
         centres = None if self.centres is None else as_matrix(self.centres, "centres")
         if centres is not None and self.scale_ is not None:
             centres = self.scale_.state(centres)
-        return Model.local(look.states, self.variance, self.at_least, centres, look.embedding)
+        return Model.of_widths(look.states, self.variance, self.at_least, centres, look.embedding)
 
     @property
     def fields_(self) -> ReceptiveFields:

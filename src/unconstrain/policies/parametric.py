@@ -61,18 +61,14 @@ class ParametricPolicy(Policy):
         self.space = space
         self.scale = scale
 
-    def place(self, look: FirstLook) -> Model:
-        """Lay the features over the states seen at first look."""
+    def places(self, look: FirstLook) -> Mapping[str, Model]:
+        """Lay the features over the states seen at first look, or all that are to be chosen from."""
+        if isinstance(self.features, str) and self.features == "auto":
+            return Model.to_choose_from(look.states, look.actions, look.embedding)
         features = self.features if self.features is not None else KMeansRBF()
         if not callable(features) and not isinstance(features, Placeable):
             raise SettingError(
                 f"features: got {features!r}, expected 'auto' or a function of states such as NormalisedRBF."
             )
         placed = features.place(look.states) if isinstance(features, Placeable) else features
-        return Model(placed, Everywhere(), look.embedding)
-
-    def places(self, look: FirstLook) -> Mapping[str, Model]:
-        """Models to choose from, by name."""
-        if not isinstance(self.features, str) or self.features != "auto":
-            return super().places(look)
-        return Model.to_choose_from(look.states, look.actions, look.embedding)
+        return {"": Model(placed, Everywhere(), look.embedding)}

@@ -73,13 +73,15 @@ function policyOf({ origin, maps, exponents, monomials, precision, frame, factor
 
   const clip = (value, low, high) => Math.max(low, Math.min(high, value));
 
-  /** The velocity in the ball in which V falls, or mirrored at its surface; see the documentation. */
+  /** The velocity in the ball in which V falls, or for one outside that of its surface, or further in where it leads up V. */
   function descent(slope, z, twice, v, held) {
     const half = held(slope.map((each) => each / 2)), away = v.map((each, i) => each + half[i]);
     const distance = Math.sqrt(dot(away, away)), depth = Math.sqrt(dot(half, half));
     const allowed = Math.max(depth - correction.pace, depth / 2);
     if (distance <= allowed) return v;
-    const share = Math.max(0, 2 * allowed / distance - 1);
+    const steep = depth * Math.sqrt(dot(v, v) + correction.pace ** 2);
+    const climb = steep > 0 ? Math.max(0, dot(v, half)) / steep : 0;
+    const share = Math.max(0, (allowed - climb * climb * (distance - allowed)) / distance);
     return away.map((each, i) => share * each - half[i]);
   }
 

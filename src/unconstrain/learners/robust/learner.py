@@ -336,8 +336,8 @@ class Robust(_Maximising):
         """
         if seen is None:
             raise SettingError(
-                "features: 'auto' looks at the samples themselves, which stay where they are on a cluster. Fit a part "
-                "with fit(...) first, and take its features_."
+                "features, variance: 'auto' looks at the samples themselves, which stay where they are on a cluster. "
+                "Fit a part with fit(...) first, and take its features_ or fields_.variance."
             )
         first = list(_first(seen))
         keeping = {name: one.keeping(Training.MOST_KEPT) for name, one in begun.items()}

@@ -139,7 +139,7 @@ def _planes(rows: Sequence[Row]) -> html.Markup:
 
 
 def _cycles(rows: Sequence[Row]) -> html.Markup:
-    header = ["cycle", "turns", "radius shown\n(cm)", "radius", "pace shown\n(Hz)", "pace", "drift\n(mm)"]
+    header = ["cycle", "turns", "radius shown\n(cm)", "radius", "pace shown\n(Hz)", "pace", "drift\n(mm)", "correction"]
     body = [
         [
             row["cycle"],
@@ -149,12 +149,13 @@ def _cycles(rows: Sequence[Row]) -> html.Markup:
             html.number(row["pace_shown"]),
             f"{row['pace_off']:+.1%}",
             html.number(row["drift_mm"]),
+            f"{row['correction']:.1%}",
         ]
         for row in rows
     ]
     note = (
         "A plate for each simulated cycle, beside the true policy on it; then ten recorded bouts of wiping, each "
         "learnt from alone and followed on its plane, and what all taught on the plane of each. Drift: from the "
-        "middle of the second turn to that of the last."
+        "middle of the second turn to that of the last. Correction: share of the motion at the states beside."
     )
     return html.table(header, body, note=note, rules=[len(rows) - arrival.cycles.BOUTS - 1])

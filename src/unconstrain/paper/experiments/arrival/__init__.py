@@ -196,8 +196,10 @@ def _of_cycles(rows: Sequence[Row]) -> list[str]:
     said = []
     for name, some in (("simulated", rows[: -cycles.BOUTS - 1]), ("recorded", rows[-cycles.BOUTS - 1 :])):
         radius, pace = (max((row[f"{key}_off"] for row in some), key=abs) for key in ("radius", "pace"))
+        least, most = (pick(row["correction"] for row in some) for pick in (min, max))
         said.append(
             f"{name} cycles after {min(row['turns'] for row in some):.0f} turns, the worst: radius {radius:+.1%}, pace "
-            f"{pace:+.1%}, drift {max(row['drift_mm'] for row in some):.2f} mm"
+            f"{pace:+.1%}, drift {max(row['drift_mm'] for row in some):.2f} mm, correction {least:.0%} to {most:.0%}"
+            " of the motion"
         )
     return said

@@ -12,6 +12,7 @@ import unconstrain as uc
 from ....base.arrays import Array
 from ...datasets import load_rim_wiping
 from ...systems.wiping import HELD_OUT, PLATES, Plate, Strokes, WipingPolicy, demonstrate
+from .strokes import price
 
 if TYPE_CHECKING:
     from . import Settings
@@ -103,8 +104,10 @@ def _followed(
     steps = int((settings.turns + 3) / min(one["pace"] for one in asked) / DT * 1.2)
     starts = np.stack([_on(normal, demo.states) for demo, normal in zip(shown, normals, strict=True)])
     runs = uc.rollout(guided, starts, steps, DT, planes, method="rk4")
+    each = zip(names, asked, runs, normals, shown, strict=True)
     return [
-        _row(name, was, run.states, normal) for name, was, run, normal in zip(names, asked, runs, normals, strict=True)
+        _row(name, was, run.states, normal) | price(guided.policy, guided, [demo])
+        for name, was, run, normal, demo in each
     ]
 
 

@@ -34,8 +34,8 @@ AROUND = 1.5
 LONGEST_STEP = 0.02
 """Of Euler's, s: movements are followed with steps up to this with which V is sure to fall."""
 
-PATIENCE = 3.0
-"""Of what comes nearer slowly at worst: so many times as long."""
+PATIENCE = 6.0
+"""Of what arrives by construction, and comes nearer slowly at worst: so many times as long."""
 
 PIECE_S = 0.5
 """What has not moved for so long, by more than STILL of the largest distance, has come to rest."""
@@ -58,10 +58,10 @@ STEEPEST = np.pi / 4
 def free(shape: str, settings: Settings) -> dict[str, Any]:
     """One shape with nothing in the way: a row, and the paths to draw."""
     demos = load_handwriting(shape, every=settings.every)
-    policy = uc.LocallyLinearPolicy(learner="direct").fit_demonstrations(demos)
+    policy = uc.LocallyLinearPolicy("auto", learner="direct").fit_demonstrations(demos)
     guided = uc.Guided(policy, demonstrations=demos, dt=settings.dt)
     strokes = [demo.states for demo in demos]
-    contracting = _contracting(demos, guided.goal_, FREE)
+    contracting = _contracting(demos, guided.goal_, policy, FREE)
     runs = _runs(policy, guided, contracting, demos, settings)
     ends = {name: arrived(paths, guided.goal_, demos) for name, paths in runs.items()}
     timed = {"unguided": policy, "guided": guided, "contracting": contracting}
@@ -74,7 +74,7 @@ def free(shape: str, settings: Settings) -> dict[str, Any]:
         "area": likeness["guided"]["area"],
         "area_ratio": _ratio(runs, ends["unguided"], strokes),
         "dtw": likeness["guided"]["dtw"],
-        **_price(policy, guided, demos),
+        **price(policy, guided, demos),
         "step": steps["guided"] / steps["unguided"],
         "dt": guided.dt_,
     }
@@ -99,9 +99,8 @@ def _runs(
         "stable": stable(demos, guided.goal_, RATE / _longest(demos)),
     }
     starts = [*(demo.states[0] for demo in demos), *anywhere(demos, settings)]
-    patience = {"contracting": PATIENCE, "stable": PATIENCE}
     return {
-        name: followed(way, starts, demos, settings, _step(guided), patience.get(name, 1.0))
+        name: followed(way, starts, demos, settings, _step(guided), 1.0 if name == "unguided" else PATIENCE)
         for name, way in ways.items()
     }
 
@@ -128,13 +127,13 @@ def lifted(shape: str, settings: Settings) -> dict[str, Any]:
         uc.Demonstration(demo.states @ turn.T, demo.actions @ turn.T, demo.times, name=demo.name)
         for demo, turn in zip(flat, turns, strict=True)
     ]
-    policy = uc.LocallyLinearPolicy(learner=uc.Hybrid(threshold=0.0, softness=0.1)).fit_demonstrations(demos)
+    policy = uc.LocallyLinearPolicy("auto", learner=uc.Hybrid(threshold=0.0, softness=0.1)).fit_demonstrations(demos)
     guided = uc.Guided(policy, demonstrations=demos, dt=settings.dt)
     own = np.stack([turn @ turn.T for turn in turns])
     starts = [demo.states[0] for demo in demos]
     paths = followed(flow(policy, guided.aim_, own), starts, demos, settings, _step(guided))
     there = arrived(paths, guided.goal_, demos)
-    contracting = flow(_contracting(demos, guided.goal_, 0.1), None, own)
+    contracting = flow(_contracting(demos, guided.goal_, policy, 0.1), None, own)
     others = followed(contracting, starts, demos, settings, _step(guided), PATIENCE)
     inside = [path @ turn for path, turn in zip(paths, turns, strict=True)]
     return {
@@ -142,7 +141,7 @@ def lifted(shape: str, settings: Settings) -> dict[str, Any]:
         "own_planes": float(there.mean()),
         "contracting": float(arrived(others, guided.goal_, demos).mean()),
         "area": float(np.mean([swept_area(a, b.states) for a, b in zip(inside, flat, strict=True)])),
-        **_price(policy, guided, demos),
+        **price(policy, guided, demos),
         **_on_random_planes(policy, guided, demos, rng, settings),
     }
 
@@ -219,9 +218,10 @@ def followed(
     return list(np.stack(path, axis=1))
 
 
-def _contracting(demos: Demos, goal: Array, softness: float) -> uc.Policy:
+def _contracting(demos: Demos, goal: Array, policy: uc.LocallyLinearPolicy, softness: float) -> uc.Policy:
+    """In the same fields."""
     learner = uc.Contracting(RATE / _longest(demos), goal, softness)
-    return uc.LocallyLinearPolicy(learner=learner).fit_demonstrations(demos)
+    return uc.LocallyLinearPolicy(policy.fields_.variance, learner=learner).fit_demonstrations(demos)
 
 
 def _likeness(paths: Sequence[Array], there: NDArray[np.bool_], strokes: Sequence[Array]) -> dict[str, float | None]:
@@ -237,7 +237,7 @@ def _ratio(runs: dict[str, list[Array]], there: NDArray[np.bool_], strokes: Sequ
     return None if guided is None or unguided is None else guided / unguided
 
 
-def _price(policy: uc.Policy, guided: uc.Guided, demos: Demos) -> dict[str, float]:
+def price(policy: Callable[[Array], Array], guided: uc.Guided, demos: Demos) -> dict[str, float]:
     """What the correction is at the demonstrated states, and what it costs there."""
     states, actions, _ = uc.stack(demos)
     wanted, added = policy(states), guided.correction(states)
@@ -251,7 +251,7 @@ def _price(policy: uc.Policy, guided: uc.Guided, demos: Demos) -> dict[str, floa
 def _prices(policy: uc.Policy, demos: Demos) -> dict[str, float]:
     """The same price of V for steps of other lengths."""
     return {
-        f"{1e3 * dt:g} ms": _price(policy, uc.Guided(policy, demonstrations=demos, dt=dt), demos)["nupe_ratio"]
+        f"{1e3 * dt:g} ms": price(policy, uc.Guided(policy, demonstrations=demos, dt=dt), demos)["nupe_ratio"]
         for dt in PACES
     }
 
