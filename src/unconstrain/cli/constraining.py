@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
-import numpy as np
 
 import unconstrain as uc
 
@@ -97,7 +97,10 @@ def _report(
 
     said = () if named is None else named.sentences
     every = list(learnt.values())
-    write(place, constraint_page(every, demonstrations, Path(place).stem, columns, said, table_of(learnt, named)))
+    write(
+        place,
+        constraint_page(every, demonstrations, Path(place).stem, columns, said, table_of(learnt, named, whole=True)),
+    )
 
 
 def _learnt(
@@ -173,6 +176,8 @@ def held_of(
     if plane is not None:
         if len(plane) != actions:
             raise SettingError(f"--plane: got {len(plane)} numbers, expected {actions}, {meaning}.")
+        import numpy as np
+
         with of_option("--plane"):
             return uc.constraints.Plane(np.array(plane))
     if path is None:
@@ -240,7 +245,7 @@ def mechanism_of(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe, 
     except InvalidDataError as error:
         click.echo(f"Note: no mechanism is named: {error}", err=True)
         return None
-    return Named(found, [demonstrations[number].name for number in np.unique(groups[::every]).tolist()], names[-1])
+    return Named(found, [demonstrations[number].name for number in sorted({*groups[::every].tolist()})], names[-1])
 
 
 def _unit_of(units: Sequence[str]) -> str:
@@ -269,6 +274,8 @@ def _say(learnt: Mapping[str, uc.LearntConstraint], what: str, named: Named | No
     head, rows = table_of(learnt, named)
     if rows:
         print_table(head, rows)
+    if named is not None and named.each:
+        click.echo("Where each is: --json, and --report draws it.")
 
 
 def _say_one(learnt: uc.LearntConstraint, what: str) -> None:
@@ -285,8 +292,10 @@ def _say_one(learnt: uc.LearntConstraint, what: str) -> None:
         click.echo(f"Note: {doubt}", err=True)
 
 
-def table_of(learnt: Mapping[str, uc.LearntConstraint], named: Named | None) -> tuple[list[str], list[list[str]]]:
-    """What held each demonstration, where that differs: head and rows."""
+def table_of(
+    learnt: Mapping[str, uc.LearntConstraint], named: Named | None, whole: bool = False
+) -> tuple[list[str], list[list[str]]]:
+    """What held each demonstration, where that differs: head and rows; the whole of it is wide."""
     own = {name: one for name, one in learnt.items() if name}
     columns = {
         "held": [f"{one.rank_} of {one.choice_.actions}, {one.choice_.name}" for one in own.values()],
@@ -296,8 +305,8 @@ def table_of(learnt: Mapping[str, uc.LearntConstraint], named: Named | None) -> 
     if named is not None and named.each:
         names, axes = named.names, [one.axis for one in named.found.candidates[0].mechanisms]
         columns[f"tilt from {bare(named.up)}"] = [
-            f"{np.degrees(np.arccos(min(abs(axis[-1]), 1.0))):.1f}°" for axis in axes
+            f"{math.degrees(math.acos(min(abs(axis[-1]), 1.0))):.1f}°" for axis in axes
         ]
-        columns["mechanism"] = [text for _, text in named.each]
+        columns["mechanism"] = [text for _, text in named.each] if whole else []
     shown = {head: values for head, values in columns.items() if values}
     return ["demonstration", *shown], [list(row) for row in zip(names, *shown.values(), strict=True)]
