@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,12 +18,13 @@ from typing import NamedTuple
 import numpy as np
 from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
-from table import Row, row, script
+from table import Row, row, script, spent
 
 import unconstrain as uc
 from unconstrain.base.arrays import Array
 from unconstrain.cli import main as command
 
+INSPECT = ("-m", "unconstrain", "inspect")
 SAMPLES, MEGABYTES, SEEDS = 1_000_000, 100, range(1, 6)
 QUATERNION = ("qw", "qx", "qy", "qz")
 
@@ -291,53 +290,18 @@ def large(folder: Path, rows: int) -> list[Row]:
         uc.writers.write_recordings(episodes, made["LeRobot"], tuple(f"s{at}" for at in range(columns)), ())
         for kind, path in made.items():
             state = "s*" if kind == "CSV" else "observation.state"
-            used = _inspect(path, "--state", state, "--differentiate")
-            lines += _of(f"inspect, {rows:.0e} rows × {columns} columns of {kind}", used, 20, 5)
+            asked = [*INSPECT, path, "--state", state, "--differentiate"]
+            lines += spent(f"inspect, {rows:.0e} rows × {columns} columns of {kind}", asked, 20, 5)
             lines[-1]["at_least"] = 300
     wide = folder / "wide.csv"
     uc.writers.write_recordings([_swinging(50, 8000)], wide)
-    return [*lines, *_of("inspect, 50 rows × 8000 columns of CSV", _inspect(wide), 1)]
-
-
-def _of(what: str, used: Used, most: float, aim: float | None = None) -> list[Row]:
-    """Rows of a process; what other work on the machine takes is not in the time of the processor."""
-    return [
-        row(f"{what}: time", used.seconds, "s"),
-        row(f"{what}: processor", used.processor, "s", most, aim),
-        row(f"{what}: peak memory", used.peak, "MB"),
-    ]
+    return [*lines, *spent("inspect, 50 rows × 8000 columns of CSV", [*INSPECT, wide], 1)]
 
 
 def _swinging(rows: int, columns: int) -> uc.Recording:
     times = 0.02 * np.arange(rows)
     values = np.round(np.sin(times[:, None] * np.linspace(0.3, 1.0, columns)), 6)
     return uc.Recording(tuple(f"s{at}" for at in range(columns)), values, times, "swinging")
-
-
-class Used(NamedTuple):
-    """What a process took: seconds, seconds of a processor, and megabytes at most."""
-
-    seconds: float
-    processor: float
-    peak: float
-
-
-_LAUNCH = """
-import json, os, sys, time
-start = time.perf_counter()
-nowhere = [(os.POSIX_SPAWN_OPEN, 1, os.devnull, os.O_WRONLY, 0)]
-pid = os.posix_spawn(sys.executable, [sys.executable, *sys.argv[1:]], os.environ, file_actions=nowhere)
-_, status, used = os.wait4(pid, 0)
-assert status == 0
-unit = 1 if sys.platform == "darwin" else 1024
-print(json.dumps([time.perf_counter() - start, used.ru_utime + used.ru_stime, used.ru_maxrss * unit / 1e6]))
-"""
-"""The peak of a process counts what the one that starts it holds, which is little here."""
-
-
-def _inspect(*arguments: object) -> Used:
-    line = [sys.executable, "-c", _LAUNCH, "-m", "unconstrain", "inspect", *map(str, arguments)]
-    return Used(*json.loads(subprocess.run(line, stdout=subprocess.PIPE, check=True).stdout))
 
 
 def streamed(folder: Path, megabytes: int) -> list[Row]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
+import subprocess
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from time import perf_counter
@@ -53,6 +55,30 @@ def side_by_side(calls: Sequence[Callable[[], object]], repeats: int = 7) -> np.
 def ratio(times: np.ndarray, of: int, to: int) -> float:
     """Median over the repeats of one call's time against another's."""
     return float(np.median(times[:, of] / times[:, to]))
+
+
+_LAUNCH = """
+import json, os, sys, time
+start = time.perf_counter()
+nowhere = [(os.POSIX_SPAWN_OPEN, 1, os.devnull, os.O_WRONLY, 0)]
+pid = os.posix_spawn(sys.executable, [sys.executable, *sys.argv[1:]], os.environ, file_actions=nowhere)
+_, status, used = os.wait4(pid, 0)
+assert status == 0
+unit = 1 if sys.platform == "darwin" else 1024
+print(json.dumps([time.perf_counter() - start, used.ru_utime + used.ru_stime, used.ru_maxrss * unit / 1e6]))
+"""
+"""The peak of a process counts what the one that starts it holds, which is little here."""
+
+
+def spent(what: str, arguments: Sequence[object], most: float, aim: float | None = None) -> list[Row]:
+    """Rows of Python run with these arguments; what other work on the machine takes is not in the processor's time."""
+    line = [sys.executable, "-c", _LAUNCH, *map(str, arguments)]
+    time, processor, peak = json.loads(subprocess.run(line, stdout=subprocess.PIPE, check=True).stdout)
+    return [
+        row(f"{what}: time", time, "s"),
+        row(f"{what}: processor", processor, "s", most, aim),
+        row(f"{what}: peak memory", peak, "MB"),
+    ]
 
 
 def verdict(line: Row) -> str:

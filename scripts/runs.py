@@ -310,6 +310,7 @@ RUNS = {
     "bench_full": Run(
         "make bench BENCH='--full --only streaming --out results/full/bench.json'", "full/bench.json", bench
     ),
+    "default_fit": Run("python benchmarks/default_fit.py --rows results/default_fit.json", "default_fit.json", bench),
     "limit_cycle": Run(
         "unconstrain reproduce regimes --only 'limit cycle, half' --trials 100 --out results/cycle",
         "cycle/regimes.json",

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.linalg import cho_solve_banded
 
 import unconstrain as uc
 from test_cli import run, write
@@ -59,7 +60,7 @@ def test_one_banded_system_is_the_filter_and_the_smoother(ratio):
     measured = np.sin(0.4 * np.append(0, np.cumsum(steps))) + 0.1 * RNG.normal(size=25)
     means, spreads, _ = recursions(steps, measured, ratio)
     factor = smoothing._factor(smoothing._precision(steps), np.log(ratio))
-    states = smoothing.cho_solve_banded((factor, False), smoothing._measured(measured)).reshape(-1, 3)
+    states = cho_solve_banded((factor, False), smoothing._measured(measured)).reshape(-1, 3)
     assert_allclose(states, means, atol=1e-5 * np.abs(means).max())
     places = ((np.arange(smoothing.PLACES) + 0.5) / smoothing.PLACES * 25).astype(int)
     assert smoothing._velocity_variance(factor, 25) == pytest.approx(spreads[places, 1, 1].mean(), rel=1e-4)
@@ -72,7 +73,7 @@ def test_the_noise_is_the_most_likely_one():
     def profile(ratio):  # the noise that is likeliest beside a ratio scales the residual to one
         residual = smoothing._residual(
             measured,
-            smoothing.cho_solve_banded(
+            cho_solve_banded(
                 (smoothing._factor(smoothing._precision(np.ones(79)), np.log(ratio)), False),
                 smoothing._measured(measured),
             ),

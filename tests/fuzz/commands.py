@@ -57,6 +57,11 @@ def lines(file, name):
         ["score", "p.npz", file], ["rollout", "p.npz", "--start", "1,0"], ["export", "p.npz", "-o", f"./{name}.c"],
         ["diagnose", file, "--model", "affine"], ["convert", file, "-o", "c.parquet"], ["fit", file, "-o", "p.npz"],
         ["inspect", f"./{name}"], ["score", file, file], ["constraint", file, "-o", "k.npz"], ["doctor", "--json"],
+        ["example", f"./{name}"], ["look", file, "-o", f"./{name}.html", "--rrd", f"./{name}.rrd"],
+        ["rollout", "p.npz", "--start", "1,0", "--obstacle", "0.5,0,0.2", "-o", f"./{name}.txt"],
+        ["rollout", "p.npz", "--start", "1,0", "--obstacle", name], ["rollout", "p.npz", "--constraint", f"./{name}"],
+        ["rollout", "p.npz", "--start", "1,0", "--constraint", "p.npz"], ["export", "p.npz", "-o", "p.js", "--json"],
+        ["export", "p.npz", "--ros2", f"./{name}", "--name", name], ["score", "p.npz", file, "--constraint", file],
     )  # fmt: skip
 
 

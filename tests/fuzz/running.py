@@ -34,6 +34,7 @@ TRACED = 1000
 KEPT_S = 20.0
 """Seconds after which a tally is written again."""
 
+APART = "src/unconstrain/recordings/readers/apart.py"
 ROOT = Path(__file__).resolve().parents[2]
 CONTEXT = multiprocessing.get_context("fork")
 HANG, CRASH = "did not end", "ended the process"
@@ -155,7 +156,14 @@ def _work(attack, folder, line, at):
             for at.value in numbers:
                 if (said := trial(attack, at.value, inside)) is not None:
                     line.send((at.value, said))
-        line.send([file for file in code if file.startswith(("src/", "tests/")) and Path(file).name != "running.py"])
+        ours = [file for file in (*code, *_apart(code)) if file.startswith(("src/", "tests/"))]
+        line.send([file for file in ours if Path(file).name != "running.py"])
+
+
+def _apart(code):
+    """Where the project reads in another process, all that may be entered there."""
+    beside = (ROOT / APART).parent.glob("*.py") if APART in code else ()
+    return [str(file.relative_to(ROOT)) for file in beside]
 
 
 @contextmanager

@@ -9,23 +9,6 @@ Examples
 True
 """
 
-from . import diagnosis, verdicts
-from .diagnosis import Diagnosis, diagnose
-from .metrics import cpe, inconsistency, ncpe, ninconsistency, nnpe, npoe, nppe, nupe, upe
+import lazy_loader
 
-__all__ = [
-    "Diagnosis",
-    "cpe",
-    "diagnose",
-    "diagnosis",
-    "inconsistency",
-    "metrics",
-    "ncpe",
-    "ninconsistency",
-    "nnpe",
-    "npoe",
-    "nppe",
-    "nupe",
-    "upe",
-    "verdicts",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -16,21 +16,17 @@ from ..base.errors import InvalidDataError, MissingBeliefError
 from ..learners import Solution, robust
 from ..models import Scale, choose_variance, cover
 from ..recordings import Demonstration, readers, stack
+from .verdicts import ENOUGH as ENOUGH
+from .verdicts import SMALL as SMALL
 
 if TYPE_CHECKING:
     from ..policies import Policy
-
-SMALL = 0.1
-"""An undetermined spread below this share of the typical action is negligible."""
 
 MISFIT = 1.5
 """Residuals above this many times the noise by differences in time are mostly misfit of the model."""
 
 LITTLE = 0.01
 """Shares of samples below this are not worth a sentence."""
-
-ENOUGH = 3
-"""Demonstrations that have to show something for it to be sure."""
 
 FREE, CONSTRAINED = 0.5, 0.1
 """A demonstration looks free above the first, and constrained below the second mean probability of free samples."""

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..models import SUPPORTED
-from .diagnosis import ENOUGH, SMALL, Diagnosis
 
 if TYPE_CHECKING:
     from ..constraints import LearntConstraint
+    from .diagnosis import Diagnosis
 
 GOOD, FAIR = 0.9, 0.7
 """Explained share of motion. Along it a prediction misses √(1 − share) of a typical action: at the first a third, at
@@ -29,6 +29,12 @@ MOSTLY, PARTLY = 0.95, 0.7
 
 MORE = "Record the task again, held in other ways; or tell demonstrations in one file apart with --group."
 """What helps against too few demonstrations."""
+
+SMALL = 0.1
+"""An undetermined spread below this share of the typical action is negligible."""
+
+ENOUGH = 3
+"""Demonstrations that have to show something for it to be sure."""
 
 WIDTH = 80
 """Columns of a terminal that sentences are broken for."""

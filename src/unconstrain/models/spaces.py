@@ -25,7 +25,6 @@ from operator import mul
 from typing import Self
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from ..base.arrays import Array, beside, check_at_least, namespace, on_host
 from ..base.errors import InvalidDataError, SettingError
@@ -400,13 +399,13 @@ class Product(Space):
     def axes(self, coordinates: Array) -> Array:
         """Axes of each part, as blocks on the diagonal."""
         each = [part.axes(own) for part, own in zip(self.parts, self._cut(coordinates, 1), strict=True)]
-        return np.stack([block_diag(*blocks) for blocks in zip(*each, strict=True)])
+        return np.stack([_block_diagonal(*blocks) for blocks in zip(*each, strict=True)])
 
     def frame(self, coordinates: Array) -> Array:
         """Matrix of the frames of the parts."""
         parts = zip(self.parts, self._cut(coordinates[None], 1), strict=True)
         frames = [(part.frame(own[0]), part.sizes[1]) for part, own in parts]
-        return np.asarray(block_diag(*(np.eye(size) if frame is None else frame for frame, size in frames)))
+        return _block_diagonal(*(np.eye(size) if frame is None else frame for frame, size in frames))
 
     def relative(self, states: Array, origin: Array) -> Array:
         """States of each part as seen from others."""
@@ -479,3 +478,9 @@ class Embedding:
     def seen_from(self, mean: Array) -> Self:
         """The same, turned so that a point (m,) of the space's own coordinates is where all begin."""
         return replace(self, frame=self.space.frame(mean))
+
+
+def _block_diagonal(*blocks: Array) -> Array:
+    from scipy.linalg import block_diag  # takes a fifth of a second to import
+
+    return np.asarray(block_diag(*blocks))

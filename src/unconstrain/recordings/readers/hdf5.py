@@ -3,6 +3,8 @@
 The layouts of robot learning are understood: ``data/demo_0/{actions, obs/...}`` (robomimic, robosuite), with the lists
 in ``mask``; ``observations`` with one row more than ``actions`` (Minari); episodes that ``terminals`` and ``timeouts``
 end (D4RL); ``action`` and ``observations/qpos`` (ALOHA). What comes after each step (``next_obs``) is left out.
+
+The HDF5 library ends, or never does, on some damaged files; it is given them in a process of its own (:mod:`~.apart`).
 """
 
 from __future__ import annotations
@@ -15,11 +17,15 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import BLOCK_ROWS, require_extra
+from ...base.foreign import ours_alone
+from .apart import apart
 from .clocks import find_clock
 from .nodes import Visit
 from .reading import Reading
 from .table import Format, Table
 from .trees import Branch, tables_of
+
+EXPECTED = "an HDF5 file"
 
 AFTER = re.compile(r"next_(obs|observations?)|mask|metadata|images?|#refs#|#subsystem#")
 """Groups and data sets that are not read as columns."""
@@ -40,17 +46,17 @@ _ROLES = {"groups": "group"}
 
 def read_hdf5(path: Path, reading: Reading) -> Iterator[Table]:
     """Read one file whole; see :class:`~.table.ReadFile`."""
-    return _read(path, reading, None)
+    return apart(_read, path, reading, None)
 
 
 def read_hdf5_blocks(path: Path, reading: Reading) -> Iterator[Table]:
     """Go through one file by some rows at a time."""
-    return _read(path, reading, BLOCK_ROWS)
+    return apart(_read, path, reading, BLOCK_ROWS)
 
 
-def _read(path: Path, reading: Reading, rows: int | None) -> Iterator[Table]:
+def _read(place: Path, path: Path, reading: Reading, rows: int | None) -> Iterator[Table]:
     h5py = require_extra("h5py", "data")
-    with h5py.File(path, "r") as file:
+    with ours_alone(path, EXPECTED), h5py.File(place, "r") as file:
         branch = _branch(file, path.stem, reading, _masks(file, Visit(h5py)), Visit(h5py))
         yield from tables_of(branch, path, reading.columns, rows)
 
@@ -135,5 +141,5 @@ FORMAT = Format(
     lambda head: head.startswith(b"\x89HDF\r\n\x1a\n"),
     read_hdf5,
     read_hdf5_blocks,
-    expected="an HDF5 file",
+    expected=EXPECTED,
 )

@@ -12,10 +12,14 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import require_extra
+from ...base.foreign import ours_alone
+from .apart import apart
 from .mat5 import read_mat5
 from .reading import Reading
 from .table import Format, Table
 from .trees import Branch, tables_of
+
+EXPECTED = "a MATLAB file, as from save"
 
 DEEPEST = 32
 """Structs within structs, beyond which a file is damaged."""
@@ -26,13 +30,13 @@ LARGEST_CELL = 100_000
 
 def read_matlab(path: Path, reading: Reading) -> Iterator[Table]:
     """Read one file; see :class:`~.table.ReadFile`."""
-    yield from tables_of(Branch(_contents(path), path.stem, is_short=False), path, reading.columns)
-
-
-def _contents(path: Path) -> Mapping[str, Any]:
     if _is_hdf5(path):
-        return _of_hdf5(path)
-    return {name: _plain(value) for name, value in read_mat5(path.read_bytes()).items()}
+        return apart(_read_hdf5, path, reading)
+    return _tables({name: _plain(value) for name, value in read_mat5(path.read_bytes()).items()}, path, reading)
+
+
+def _tables(contents: Mapping[str, Any], path: Path, reading: Reading) -> Iterator[Table]:
+    return tables_of(Branch(contents, path.stem, is_short=False), path, reading.columns)
 
 
 def _is_hdf5(path: Path) -> bool:
@@ -56,10 +60,12 @@ def _flat(value: Any) -> Any:
     return value.reshape(-1) if value.ndim == 2 and 1 in value.shape else value
 
 
-def _of_hdf5(path: Path) -> dict[str, Any]:
+def _read_hdf5(place: Path, path: Path, reading: Reading) -> Iterator[Table]:
     h5py = require_extra("h5py", "data")
-    with h5py.File(path, "r") as file:
-        return {name: _of_node(child, file, h5py) for name, child in file.items() if not name.startswith("#")}
+    with ours_alone(path, EXPECTED):
+        with h5py.File(place, "r") as file:
+            contents = {name: _of_node(child, file, h5py) for name, child in file.items() if not name.startswith("#")}
+        yield from _tables(contents, path, reading)
 
 
 def _of_node(node: Any, file: Any, h5py: Any, depth: int = 0) -> Any:
@@ -89,5 +95,5 @@ FORMAT = Format(
     (".mat",),
     lambda head: head.startswith(b"MATLAB "),
     read_matlab,
-    expected="a MATLAB file, as from save",
+    expected=EXPECTED,
 )

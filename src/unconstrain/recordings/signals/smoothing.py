@@ -18,7 +18,6 @@ up to a constant, and λ is the one of largest likelihood.
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from ...base.arrays import Array
 
@@ -82,7 +81,7 @@ def _smoothed(steps: Array, positions: Array, nothing: float) -> tuple[Array, fl
     scaled = positions / size
     log_ratio = _likeliest(steps, scaled)
     factor = _factor(steps, log_ratio)
-    states = cho_solve_banded((factor, False), _measured(scaled))
+    states = _solved(factor, _measured(scaled))
     variance = _residual(scaled, states) / (len(scaled) - 3) * _velocity_variance(factor, len(scaled))
     return size * states[1::3], size * float(np.sqrt(variance))
 
@@ -95,7 +94,7 @@ def _likeliest(steps: Array, positions: Array) -> float:
             factor = _factor(steps, log_ratio)
         except np.linalg.LinAlgError:  # so smooth that rounding hides the measurements
             return np.inf
-        residual = _residual(positions, cho_solve_banded((factor, False), _measured(positions)))
+        residual = _residual(positions, _solved(factor, _measured(positions)))
         samples = len(positions)
         determinant = 2.0 * float(np.log(factor[BAND]).sum())
         return (samples - 3) * float(np.log(residual)) + 3 * (samples - 1) * log_ratio + determinant
@@ -131,6 +130,8 @@ def _matrices(rows: list[list[Array]]) -> Array:
 
 
 def _factor(steps: Array, log_ratio: float) -> Array:
+    from scipy.linalg import cholesky_banded  # takes a fifth of a second to import
+
     matrix = steps * np.exp(-log_ratio)
     matrix[BAND, ::3] += 1.0
     return np.asarray(cholesky_banded(matrix, overwrite_ab=True))
@@ -143,6 +144,12 @@ def _measured(positions: Array) -> Array:
     return sums
 
 
+def _solved(factor: Array, right: Array) -> Array:
+    from scipy.linalg import cho_solve_banded
+
+    return np.asarray(cho_solve_banded((factor, False), right))
+
+
 def _residual(positions: Array, states: Array) -> float:
     """R, not less than rounding makes it."""
     return max(float(positions @ (positions - states[::3])), 1e-24 * len(positions))
@@ -153,4 +160,4 @@ def _velocity_variance(factor: Array, samples: int) -> float:
     rows = 3 * np.unique(((np.arange(PLACES) + 0.5) / PLACES * samples).astype(np.intp)) + 1
     units = np.zeros((3 * samples, len(rows)))
     units[rows, np.arange(len(rows))] = 1.0
-    return float(cho_solve_banded((factor, False), units)[rows, np.arange(len(rows))].mean())
+    return float(_solved(factor, units)[rows, np.arange(len(rows))].mean())

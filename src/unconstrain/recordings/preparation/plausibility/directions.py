@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import lapack
 
 from ....base.arrays import Array
 from .outlines import Outline
@@ -32,6 +31,8 @@ class _Others:
         ends = np.cumsum([len(one.places) for one in outlines])
         self._rows = [slice(end - len(one.places), end) for end, one in zip(ends, outlines, strict=True)]
         self.steps = np.concatenate([_of_length_one(one.steps / scale) for one in outlines])
+        from scipy.linalg import lapack  # takes a fifth of a second to import
+
         half = lapack.dpotri(lapack.dpotrf(_kernel(at) + RIDGE * np.eye(len(at)))[0])[0]  # at half the price of LU
         self._inverse = np.triu(half) + np.triu(half, 1).T
         self._blocks = [np.linalg.inv(self._inverse[rows, rows]) for rows in self._rows]
