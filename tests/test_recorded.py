@@ -242,6 +242,26 @@ def test_the_normal_of_the_hood_is_a_function_of_where_the_sponge_is():
         assert (residual < 1e-18).all()
 
 
+def test_plates_are_tilted_by_5_to_30_degrees_and_velocities_those_of_positions(drawn):
+    data = drawn("tilted plates")
+    cosines = [np.sqrt(1.0 - one.truth.projections[0][2, 2]) for one in data.demonstrations]
+    assert all(5.0 <= np.degrees(np.arccos(one)) <= 30.0 for one in cosines)
+    for one in data.demonstrations:
+        off = one.actions - np.vecdot(one.truth.projections, one.truth.policy[:, None, :])
+        assert np.median(np.linalg.norm(off, axis=1)) < 0.02 * np.median(np.linalg.norm(one.actions, axis=1))
+
+
+@pytest.mark.parametrize("kind", ["tilted plates", "near-parallel planes"])
+def test_the_default_learner_is_not_behind_where_each_demonstration_has_its_plane(kind, drawn):
+    data = drawn(kind)
+    chosen = data.fit(uc.Robust())
+    safe = (
+        uc.nupe(chosen.with_learner(learner), data.test)
+        for learner in (uc.Direct(), uc.Hybrid(threshold=0, softness=0.1))
+    )
+    assert uc.nupe(chosen, data.test) < 1.1 * min(safe)
+
+
 def test_speeds_differ_by_a_factor_for_each_demonstration():
     demos = simulated.unequal_speeds(np.random.default_rng(0)).demonstrations
     factors = []

@@ -11,15 +11,29 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import naive
 import unconstrain as uc
-from samples import draw, samples_of
+from samples import draw, rotation, samples_of
 from unconstrain.learners.hybrid import SOFTNESSES, chosen_softness
+from unconstrain.learners.robust.choice import Comparison
 from unconstrain.learners.robust.consistent import _nearest
 from unconstrain.learners.robust.constants import ANGULAR_SPREADS
 from unconstrain.learners.robust.likelihood import exceeds_error
-from unconstrain.learners.robust.noise import corrected, corrected_squares, correlation_time, noise_by_differences
+from unconstrain.learners.robust.noise import (
+    beyond_misfit,
+    corrected,
+    corrected_squares,
+    correlation_time,
+    noise_by_differences,
+)
 from unconstrain.learners.robust.posterior import Posterior
-from unconstrain.learners.robust.segments import change_points, found_segments, projection_of, projections_of
+from unconstrain.learners.robust.segments import (
+    change_points,
+    found_segments,
+    held_throughout,
+    projection_of,
+    projections_of,
+)
 from unconstrain.learners.robust.smoothness import Smoothness
+from unconstrain.learners.robust.softened import softened
 from unconstrain.learners.robust.sphere import distances, e_step
 from unconstrain.learners.thresholds import within_errors
 from unconstrain.risks.moments import gather
@@ -284,6 +298,48 @@ def test_a_segments_projection_is_that_of_its_constraint():
     assert_allclose(projection_of(0.01 * rng.standard_normal((40, 3)), 0.01), 0.0)
     assert_allclose(projection_of(np.zeros((5, 3)), 0.0), 0.0)
     assert_allclose(projection_of(actions, 1e-4), np.eye(3), atol=1e-12)
+
+
+@pytest.mark.parametrize("faint", [0.0, 0.01, 0.1, 1.0])
+def test_who_was_always_held_shows_the_policy_along_all_other_directions(faint):
+    """Along its third direction the motion is so much of that along the others: none, noise, some that counts, much."""
+    rng, groups = np.random.default_rng(1), np.arange(400) // 200
+    axes = np.stack([rotation(seed, 3) for seed in (2, 3)])
+    actions = np.vecdot(axes[groups], (rng.standard_normal((400, 3)) * [1.0, 0.8, faint])[:, None])
+    held, moved = held_throughout(actions, groups, np.full(400, 0.01**2))
+    for action, group, is_held, projection in zip(actions, groups, held, moved, strict=True):
+        assert is_held == (faint <= 0.01)
+        plane, own = axes[group][:, :2] @ axes[group][:, :2].T, np.outer(action, action) / (action @ action)
+        assert_allclose(projection, plane if is_held else own, atol=0.02)
+    assert not held_throughout(actions[:200], groups[:200], np.full(200, 0.01**2))[0].any()  # none moved along more
+
+
+def test_noise_that_smoothing_hid_is_at_least_the_misfit():
+    samples = samples_of(draw())
+    least = 0.015**2 * (samples.actions**2).sum(axis=1).mean() / 2
+    assert_allclose(beyond_misfit(np.array([0.0, 1.0]), samples), [least, 1.0])
+
+
+# The choice
+
+
+@pytest.mark.parametrize("always", [True, False])
+def test_what_is_missed_across_the_action_is_seen_where_demonstrations_were_always_held(always):
+    """Of two candidates, one misses what lies across each action, in the plane of its demonstration."""
+    rng, count = np.random.default_rng(4), 240
+    groups = np.arange(count) * 8 // count
+    normals = rng.standard_normal((8, 3))[groups] if always else rng.standard_normal((count, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    policy = np.array([1.0, 0.5, -1.0]) + rng.standard_normal((count, 3))
+    actions = policy - normals * np.vecdot(normals, policy)[:, None]
+    data = draw(samples=count, groups=8, dimensions=2)._replace(actions=actions, groups=groups)
+    samples = samples_of(data)
+    across = np.cross(actions, normals)
+    right = replace(softened(samples)[0], held_out=policy, softness=0.0)
+    wrong = replace(right, name="wrong", held_out=policy + 0.5 * across)
+    found = Comparison([right, wrong], np.zeros(count), samples).judged()
+    assert found["direct"].loss == pytest.approx(0.0, abs=1e-12)
+    assert found["wrong"].loss == pytest.approx(0.25 if always else 0.0, rel=0.5, abs=1e-12)
 
 
 def test_changes_of_the_constraint_are_found():

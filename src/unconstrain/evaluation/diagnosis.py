@@ -411,6 +411,7 @@ _WAYS = {
     "direct": "ordinary regression, as constraints do not show",
     "softened hybrid": "consistent with the actions, and near to them",
     "noise-corrected": "consistent with the actions, with the noise taken out",
+    "hard noise-corrected": "consistent with the actions, with the noise taken out, and little else supposed",
     "segments": "with one constraint for each demonstration",
     "likelihood": "samples look free, or constrained at random",
     "hybrid": "consistent with the actions, and as near to them as that allows",

@@ -28,8 +28,9 @@ class Candidate:
     refits : ndarray, shape (R, M, d, p)
         Weights learnt without each of R folds: those that predict ``held_out``.
     softness : float
-        Of a softened hybrid, infinite for direct regression; zero where no share of the standard risk biases the
-        policy towards the actions; −1 where more is known of the constraints than their actions.
+        Share of the standard risk that biases the policy towards the actions: that of a softened hybrid or of a prior,
+        infinite for direct regression, zero where it has next to no information; −1 where more is known of the
+        constraints than their actions.
     """
 
     name: str

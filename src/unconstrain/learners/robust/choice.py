@@ -1,26 +1,35 @@
 """Choice of a candidate by an estimate of its error, without the truth.
 
-The squared error of a policy has a component along the action and components
-across it. Held-out actions show the former. Nothing shows the latter, but a
-candidate's own variance and bias across the action can be estimated:
+The squared error of a policy has components that held-out motion shows, and
+others that constraints hide. An action shows the component along itself. A
+demonstration that never moved along some directions in which others moved, and
+much along all the rest, was held in the same way all the time, and shows all
+components along that rest. Nothing shows what is hidden, but a candidate's own
+variance and bias there can be estimated:
 
     risk_k = (loss_k − least loss) + variance_k + bias_k
 
-loss_k is the mean square of the residual ``r = ‖u‖ − ûᵀπ̃`` of held-out
-samples. variance_k is the jackknife's, from the policies learnt without each
+loss_k is the mean square of what held-out motion shows to be missed: the
+residual ``r = ‖u‖ − ûᵀπ̃`` along the action, or ``‖N̂ (u − π̃)‖`` where N̂ is
+known. variance_k is the jackknife's, from the policies learnt without each
 fold. bias_k compares the candidate with others of less bias, j, as Goldenshluger
 and Lepski do (*Annals of Statistics* 39(3), 2011):
 
     bias_k = max_j (E ‖π̃_k − π̃_j‖² − variance of π̃_k − π̃_j)₊
 
 Softened hybrids (eq. 6 with ``E_i + s E_2``) have the less bias the smaller
-their softness s; s is infinite for direct regression, and zero for learners
-that minimise an error of consistency alone. Whoever knows the Jacobian of the
-constraints has less bias than all, and a softness of −1. A candidate j that is less
-consistent than k where held out, beyond chance, shows no bias of k; nor does
-one that is so by the residuals weighted by ‖u‖², as under noise alone. Whoever
-knows the Jacobian is a candidate only if it is as consistent as the best of
-the others, and is compared no more.
+their softness s; s is infinite for direct regression, and that of their prior
+for learners that minimise another error of consistency beside a prior of the
+standard risk: zero if it has the information of one sample altogether. The
+likelihood takes samples for free that are near to the policy. If every
+demonstration was held all the time, nothing shows that they were, and it is
+as soft as direct regression; otherwise its softness is zero. Whoever knows the
+Jacobian of the constraints has less bias than all, and a softness of −1. A
+candidate j that is less consistent than k where held out, along the actions,
+beyond chance, shows no bias of k; nor does one that is so by the residuals
+weighted by ‖u‖², as under noise alone. Whoever knows the Jacobian is a
+candidate only if it is as consistent as the best of the others, and is
+compared no more.
 
 Residuals have the variance ``‖π‖² (σ² / ‖u‖² + κ²)`` under any constraint:
 noise of variance σ² turns the direction of a slow action, and people vary by
@@ -55,7 +64,8 @@ from .constants import (
     TIED,
     VARIANCE_ROUNDS,
 )
-from .noise import corrected_squares
+from .noise import beyond_misfit, corrected_squares
+from .segments import held_throughout
 
 TINY = 1e-12
 """Shares of the mean squared action below this are rounding."""
@@ -82,13 +92,13 @@ class Comparison:
         self._residuals = self._lengths - (self._held_out * self._directions).sum(axis=2)
         self._places = slice(None, None, -(-len(samples) // COMPARED_STATES))
         self._leverage = np.max([leverage(one) for one in dict.fromkeys(self._views)], axis=0)
-        self._weights = 1.0 / (1.0 + self._leverage[self._places])
         self._noise, self._variation = self._variances(noise)
+        self._held, self._seen = held_throughout(samples.actions, samples.groups, beyond_misfit(noise, samples))
 
     def judged(self) -> dict[str, Judged]:
         """Figures of each candidate, by name, as shares of the mean squared action."""
         unit = max(self._samples.energy, 1e-300)
-        figures = np.column_stack([self._losses.sum(axis=1), self._variance, self._bias, self.risks]) / unit
+        figures = np.column_stack([self._missed, self._variance, self._bias, self.risks]) / unit
         return {
             one.name: Judged(loss, variance, bias, risk, one.weights)
             for one, (loss, variance, bias, risk) in zip(self._candidates, figures.tolist(), strict=True)
@@ -96,7 +106,7 @@ class Comparison:
 
     @property
     def best(self) -> Candidate:
-        """The candidate of least risk; of softened hybrids, the softest that is as good within chance."""
+        """The candidate of least risk; of those that are softened, the softest that is as good within chance."""
         best = int(self.risks.argmin())
         if self._candidates[best].softness <= 0.0:
             return self._candidates[best]
@@ -117,18 +127,34 @@ class Comparison:
     @cached_property
     def risks(self) -> Array:
         """Estimated squared error, shape (K,), up to what all have in common."""
-        loss = self._losses.sum(axis=1)
-        risk = loss - np.nanmin(loss) + self._variance + self._bias
+        risk = self._missed - np.nanmin(self._missed) + self._variance + self._bias
         found: Array = np.where(np.isfinite(risk), risk, np.inf)
         return found
 
     @cached_property
+    def _missed(self) -> Array:
+        """Weighted mean square of what held-out motion shows to be missed, (K,)."""
+        held, missed = self._held, self._along.copy()
+        off = np.einsum("nab,knb->kna", self._seen[held], self._samples.actions[held] - self._held_out[:, held])
+        missed[:, held] = np.vecdot(off, off) - self._noise[held] * np.einsum("naa->n", self._seen[held])
+        return np.asarray(missed @ self._reliable / self._reliable.sum())
+
+    @cached_property
     def _losses(self) -> Array:
         """Weighted mean square of the held-out residuals, without the noise's part, by demonstration: (K, G)."""
-        squares = self._squares
-        weights = self._samples.counts / (1.0 + self._leverage) / (1.0 + self._noise / (self._variation * squares))
-        turned = self._noise * (self._held_out**2).sum(axis=2) / (squares + self._held_out.shape[2] * self._noise)
-        return self._by_demonstration(weights, self._residuals**2 - turned) / weights.sum()
+        return self._by_demonstration(self._reliable, self._along) / self._reliable.sum()
+
+    @cached_property
+    def _along(self) -> Array:
+        """Squared residuals along the action, without the noise's part, (K, N)."""
+        size = self._squares + self._held_out.shape[2] * self._noise
+        return np.asarray(self._residuals**2 - self._noise * (self._held_out**2).sum(axis=2) / size)
+
+    @cached_property
+    def _reliable(self) -> Array:
+        """Weight of each sample, (N,)."""
+        noise = self._noise / (self._variation * self._squares)
+        return np.asarray(self._samples.counts / (1.0 + self._leverage) / (1.0 + noise))
 
     @cached_property
     def _losses_of_noise(self) -> Array:
@@ -176,8 +202,8 @@ class Comparison:
 
     @cached_property
     def _variance(self) -> Array:
-        """Jackknife variance across the action, shape (K,)."""
-        return np.array([self._jackknife(refits - own) for own, refits in zip(*self._predictions, strict=True)])
+        """Jackknife variance of what motion does not show, shape (K,)."""
+        return np.array([_jackknife(refits - own) for own, refits in zip(*self._predictions, strict=True)])
 
     @cached_property
     def _bias(self) -> Array:
@@ -188,8 +214,8 @@ class Comparison:
         for k, j in combinations(range(len(own)), 2):
             shown = [one for one, by in ((k, j), (j, k)) if self._may_show(by, one)]
             if shown:
-                variance = SHARE_OF_JACKKNIFE * self._jackknife(centred[k] - centred[j])
-                bias[shown] = np.maximum(bias[shown], self._across(own[k] - own[j]) - variance)
+                variance = SHARE_OF_JACKKNIFE * _jackknife(centred[k] - centred[j])
+                bias[shown] = np.maximum(bias[shown], float(((own[k] - own[j]) ** 2).sum()) - variance)
         return bias
 
     def _may_show(self, one: int, other: int) -> bool:
@@ -211,22 +237,27 @@ class Comparison:
 
     @cached_property
     def _predictions(self) -> tuple[Array, Array]:
-        """Of each candidate (K, n, d) and of its refits (K, R, n, d), at some of the states."""
+        """Of each candidate (K, n, d) and of its refits (K, R, n, d), at some of the states, what motion does not show.
+
+        Weighted, so that the sum of squares is the weighted mean square.
+        """
         views = {view: view[self._places] for view in dict.fromkeys(self._views)}
         pairs = [(one, views[view]) for one, view in zip(self._candidates, self._views, strict=True)]
-        own = np.stack([some.predict(one.weights) for one, some in pairs])
-        refits = np.stack([some.predict(one.refits) for one, some in pairs])
+        own = np.stack([self._hidden(some.predict(one.weights)) for one, some in pairs])
+        refits = np.stack([self._hidden(some.predict(one.refits)) for one, some in pairs])
         return own, refits
 
-    def _jackknife(self, deviations: Array) -> float:
-        """``(R − 1) / R`` times the sum of the squared deviations (R, n, d) of the refits."""
-        count = len(deviations)
-        return (count - 1) / count * sum(self._across(each) for each in deviations)
+    def _hidden(self, predictions: Array) -> Array:
+        """Weighted component of predictions (..., n, d) in the directions that motion does not show."""
+        seen, weights = self._seen[self._places], 1.0 / (1.0 + self._leverage[self._places])
+        hidden = predictions - (seen @ predictions[..., None])[..., 0]
+        return np.asarray(np.sqrt(weights / weights.sum())[:, None] * hidden)
 
-    def _across(self, difference: Array) -> float:
-        """Weighted mean square across the action of a difference of predictions (n, d)."""
-        squares = np.vecdot(difference, difference) - np.vecdot(difference, self._directions[self._places]) ** 2
-        return float(self._weights @ squares / self._weights.sum())
+
+def _jackknife(deviations: Array) -> float:
+    """Variance by the jackknife from the deviations (R, n, d) of the refits."""
+    count = len(deviations)
+    return (count - 1) / count * float((deviations**2).sum())
 
 
 def leverage(samples: Samples) -> Array:

@@ -8,7 +8,6 @@ from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...base.arrays import Array
 from ...base.display import counted_off
@@ -39,15 +38,15 @@ from .constants import (
 )
 from .noise import consistency_residuals, corrected, correlation_time, inefficiency, noise_by_differences
 from .posterior import Posterior, unit_information
-from .segments import projections_of
 from .smoothness import Smoothness
 from .sphere import distances
 
 
-def noise_corrected(samples: Samples, noise: float | None = None) -> Candidate:
+def noise_corrected(samples: Samples, noise: float | None = None, worth: float | None = None) -> Candidate:
     """Minimise the inconsistency on noise-corrected moments, with a prior of standard risk and smoothness.
 
-    The noise variance is given, or else the smaller of two estimates, both
+    The prior of the standard risk has the information of ``worth`` samples, by default one for each weight. The noise
+    variance is given, or else the smaller of two estimates, both
     biased upwards: from differences in time (where constraints change at
     every sample) and from the residuals (where the model does not fit).
     """
@@ -57,7 +56,7 @@ def noise_corrected(samples: Samples, noise: float | None = None) -> Candidate:
     for _ in range(NOISE_ROUNDS):
         used = variance
         whole = parts.corrected(used)
-        softness, smoothness, unit = whole.balanced(rough, time)
+        softness, smoothness, unit = whole.balanced(rough, time, worth)
         policy = samples.predict(whole.posterior(softness, smoothness.prior(unit)).weights(d))
         time = correlation_time(consistency_residuals(samples, policy, used)[:, None], samples.groups)
         if noise is None:
@@ -72,13 +71,14 @@ def noise_corrected(samples: Samples, noise: float | None = None) -> Candidate:
     inflated = time * of_noise + inefficiency(time, samples) * (residual - of_noise)
     smoothness = replace(smoothness, precision=smoothness.precision * unit / np.maximum(inflated, 1e-300))
     return Candidate(
-        "noise-corrected",
+        "noise-corrected" if worth is None else "hard noise-corrected",
         weights,
         scaled(posterior, inflated),
         held_out[chosen],
         variance,
         smoothness,
         refits[chosen],
+        softnesses[chosen] if worth is None else 0.0,
     )
 
 
@@ -91,13 +91,11 @@ def _nearest(loss: Array, distance: Array) -> int:
     return int(near[np.abs(distance[near]).argmin()])
 
 
-def by_segments(samples: Samples, labels: NDArray[np.intp], noise: Array) -> Candidate:
-    """Minimise the constrained error with each segment's projection, with a prior of standard risk.
+def by_segments(samples: Samples, projections: Array) -> Candidate:
+    """Minimise the constrained error with each sample's projection (N, d, d), with a prior of standard risk.
 
     Predictions are cross-validated by fold, except for the projections: each is from all samples of its segment.
-    ``noise`` (N,) is the variance on each action coordinate, one number for each segment.
     """
-    projections = projections_of(samples.actions, labels, noise)
     errors = [part.constrained(projections[samples.folds == fold]) for fold, part in enumerate(samples.by_fold())]
     return least_error("segments", samples, errors)
 
@@ -137,6 +135,7 @@ def least_error(name: str, samples: Samples, errors: Sequence[Quadratic], odds: 
         samples.mean(radial**2),
         Smoothness.of(samples),
         np.stack(without),
+        0.0 if chosen == 0 else float(np.median(softness)),
     )
 
 
@@ -203,12 +202,14 @@ class _Corrected:
     def posterior(self, softness: Array, smooth: Quadratic) -> Posterior:
         return Posterior(self.consistent, softness * self.risk + smooth)
 
-    def balanced(self, smoothness: Smoothness, time: float) -> tuple[Array, Smoothness, Array]:
+    def balanced(
+        self, smoothness: Smoothness, time: float, worth: float | None = None
+    ) -> tuple[Array, Smoothness, Array]:
         """Softness (M,), smoothness, and residual variance times autocorrelation time (M,), by fixed-point iteration.
 
         The softness is the residual variance along the action over that across it, times the unit-information factor.
         """
-        factor = unit_information(self.risk.linear.shape[1], self.sizes)
+        factor = unit_information(self.risk.linear.shape[1] if worth is None else worth, self.sizes)
         softness, unit = np.full(len(factor), FIRST_SOFTNESS), np.zeros(len(factor))
         for _ in range(BALANCE_STEPS):
             posterior = self.posterior(softness, smoothness.prior(unit))

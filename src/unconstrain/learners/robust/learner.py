@@ -28,9 +28,9 @@ from .constants import LEAST_INFORMATIVE, LEAST_MISFIT, LONG
 from .held_out import held_out_together
 from .kinematics import Jacobian, with_jacobian
 from .likelihood import maximise
-from .noise import hides_sphere, noise_by_differences, noise_of_each
+from .noise import beyond_misfit, hides_sphere, noise_by_differences, noise_of_each
 from .posterior import Posterior
-from .segments import found_segments
+from .segments import found_segments, held_throughout, projections_of
 from .softened import softened
 
 SUMS_ALONE = (
@@ -232,8 +232,10 @@ class Segments(SampleLearner):
         found = self.labels == "found"
         labels = found_segments(samples.actions, samples.groups, known) if found else samples.groups
         if self.noise is None:
-            return by_segments(samples, labels, noise_of_each(samples.actions, labels, most, samples.noise)), {}
-        return by_segments(samples, labels, np.full(len(samples), self.noise**2)), {}
+            noise = beyond_misfit(noise_of_each(samples.actions, labels, most, samples.noise), samples)
+        else:
+            noise = np.full(len(samples), self.noise**2)
+        return by_segments(samples, projections_of(samples.actions, labels, noise)), {}
 
 
 @dataclass(frozen=True)
@@ -302,12 +304,14 @@ class Robust(_Maximising):
         _say_if_long(samples)
         corrected, most = noise_corrected(samples), _most_noise(samples)
         noise = noise_of_each(samples.actions, samples.groups, most, samples.noise)
-        learnt = [*softened(samples), corrected]
-        if samples.groups.max() > 0:
-            learnt.append(by_segments(samples, samples.groups, noise))
+        learnt = [*softened(samples), corrected, noise_corrected(samples, worth=1.0)]
+        each = samples.actions, samples.groups, beyond_misfit(noise, samples)
+        projections = projections_of(*each)
+        if samples.groups.max() > 0 and not np.allclose(projections, np.eye(samples.actions.shape[1])):
+            learnt.append(by_segments(samples, projections))
         likely, mixture = self._maximised(samples, training, corrected)
         if 1.0 - mixture[-1] > LEAST_INFORMATIVE and not hides_sphere(likely.variance, samples):
-            learnt.append(likely)
+            learnt.append(replace(likely, softness=np.inf) if held_throughout(*each)[0].all() else likely)
         least = min(most, corrected.variance)
         found = Comparison(learnt, np.minimum(noise, least), samples)
         if self.jacobian is None:

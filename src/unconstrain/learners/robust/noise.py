@@ -29,7 +29,14 @@ from scipy.special import gammaincinv
 from ...base.arrays import Array
 from ...risks import Moments, autocorrelations, standard_risk
 from ...training import Samples
-from .constants import DIFFERENCE_ORDER, LEAST_AUTOCORRELATION, LEAST_DIFFERENCES, MOST_LAGS, SPHERE_HIDDEN_BY_NOISE
+from .constants import (
+    DIFFERENCE_ORDER,
+    LEAST_AUTOCORRELATION,
+    LEAST_DIFFERENCES,
+    LEAST_MISFIT,
+    MOST_LAGS,
+    SPHERE_HIDDEN_BY_NOISE,
+)
 
 
 def noise_by_differences(actions: Array, groups: NDArray[np.intp]) -> float:
@@ -87,6 +94,11 @@ def noise_of_each(actions: Array, labels: NDArray[np.intp], most: float, known: 
         if rows.sum() >= LEAST_DIFFERENCES:
             found[rows] = noise_by_differences(actions[rows], labels[rows])
     return found
+
+
+def beyond_misfit(noise: Array, samples: Samples) -> Array:
+    """Variance of the noise (N,), at least that of the least misfit: positions that were smoothed hide their noise."""
+    return np.maximum(noise, LEAST_MISFIT**2 * samples.energy / samples.actions.shape[1])
 
 
 def correlation_time(residuals: Array, groups: NDArray[np.intp]) -> float:

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array
-from .constants import LEAST_SEGMENT, SEGMENT_SIGNAL_TO_NOISE
+from ...risks import unit_actions
+from .constants import HELD_VARIANCES, LEAST_SEGMENT, SEGMENT_SIGNAL_TO_NOISE, SHARE_ALONG_HELD
 
 
 def projection_of(actions: Array, noise: float) -> Array:
@@ -105,3 +106,36 @@ def projections_of(actions: Array, labels: NDArray[np.intp], noise: Array) -> Ar
         rows = labels == label
         found[rows] = projection_of(actions[rows], float(np.sqrt(noise[rows][0])))
     return found
+
+
+def held_throughout(actions: Array, labels: NDArray[np.intp], noise: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Which samples are of segments that were clearly held in the same directions all the time, and where they moved.
+
+    That is where noise explains the motion along some directions, there was much along all others, and other segments
+    moved along more: what nobody moved along says nothing.
+
+    Parameters
+    ----------
+    actions : ndarray, shape (N, d)
+    labels : ndarray of int, shape (N,)
+        Segment of each sample.
+    noise : ndarray, shape (N,)
+        Variance of the noise on each action coordinate.
+
+    Returns
+    -------
+    held : ndarray of bool, shape (N,)
+    moved : ndarray, shape (N, d, d)
+        Projection onto all directions in which the segment moved, or onto the sample's own where it was not held.
+    """
+    directions, _ = unit_actions(actions)
+    held, moved = np.zeros(len(actions), dtype=bool), directions[:, :, None] * directions[:, None, :]
+    whole = np.linalg.eigvalsh(actions.T @ actions / len(actions)) > HELD_VARIANCES * noise.mean()
+    for label in np.unique(labels):
+        rows = labels == label
+        squares, axes = np.linalg.eigh(actions[rows].T @ actions[rows] / rows.sum())
+        still = squares < SEGMENT_SIGNAL_TO_NOISE**2 * noise[rows].mean()
+        much = squares > SHARE_ALONG_HELD * squares.sum()
+        if much.sum() < whole.sum() and (still != much).all():
+            held[rows], moved[rows] = True, axes[:, much] @ axes[:, much].T
+    return held, moved

@@ -132,6 +132,7 @@ SIMULATED = {
     "one-sided contact": _Kind(simulated.one_sided),
     "one plane for all": _Kind(simulated.one_plane, policy=_affine_policy),
     "near-parallel planes": _Kind(simulated.parallel_planes),
+    "tilted plates": _Kind(simulated.tilted_plates),
     "turning planes": _Kind(simulated.turning_planes),
     "two demonstrations": _Kind(simulated.two_demonstrations),
     "fourteen joints": _Kind(simulated.many_joints, policy=_affine_policy),

@@ -45,6 +45,13 @@ def wipe(states: Array) -> Array:
     return np.column_stack([inward * x - 3.0 * y, inward * y + 3.0 * x, 0.5 * x - 1.2 * z - 0.2])
 
 
+def wipe_round(states: Array) -> Array:
+    """Circle of 80 mm about the z-axis at 2.5 rad/s, and to z = 0: velocities (N, 3) at positions (N, 3), mm."""
+    x, y, z = states.T
+    inward = 1.2 * (1.0 - (x**2 + y**2) / 80.0**2)
+    return np.column_stack([inward * x - 2.5 * y, inward * y + 2.5 * x, -1.5 * z])
+
+
 def come_to_rest(states: Array) -> Array:
     """A limit cycle in the plane, and a height that is kept: velocities (N, 3) at positions (N, 3)."""
     return np.column_stack([LimitCycle()(states[:, :2]), -2.0 * states[:, 2:]])
@@ -228,6 +235,16 @@ def parallel_planes(rng: np.random.Generator) -> Simulated:
     return Simulated(with_noise(_wiped(rng, planes=tilted(rng, 8, 5.0)), 0.02, rng))
 
 
+def tilted_plates(rng: np.random.Generator) -> Simulated:
+    """Cycles of 80 mm on eight plates tilted by 5 to 30 degrees, as velocities of positions recorded to 0.05 mm."""
+    tilts, ways = np.radians(rng.uniform(5, 30, 8)), rng.uniform(0, 2 * np.pi, 8)
+    normals = np.column_stack([np.sin(tilts) * np.cos(ways), np.sin(tilts) * np.sin(ways), np.cos(tilts)])
+    starts = np.column_stack([rng.uniform(-120, 120, (8, 2)), np.zeros(8)])
+    starts -= normals * np.vecdot(normals, starts)[:, None]
+    demos = _rolled(wipe_round, starts, 4000, 0.001, [uc.constraints.Plane(normal) for normal in normals])
+    return Simulated([_differentiated(one[::10], 0.05, rng) for one in demos])
+
+
 def turning_planes(rng: np.random.Generator) -> Simulated:
     """Normals that turn slowly with the state, each demonstration's about its own."""
     bends = rng.standard_normal((8, 3, 3)) * [[0.3], [0.3], [0.0]]
@@ -318,6 +335,12 @@ def _free(policy: Policy, states: Array) -> uc.Demonstration:
 
 def _moved(demo: uc.Demonstration, by: Array) -> uc.Demonstration:
     return replace(demo, actions=demo.actions + by)
+
+
+def _differentiated(demo: uc.Demonstration, error: float, rng: np.random.Generator) -> uc.Demonstration:
+    """As it is recorded by its positions alone, each with an error of such a standard deviation."""
+    recorded = demo.states + error * rng.standard_normal(demo.states.shape)
+    return replace(demo, states=recorded, actions=uc.preparation.differentiate(np.asarray(demo.times), recorded))
 
 
 def _spoiled(
