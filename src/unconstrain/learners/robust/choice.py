@@ -11,7 +11,8 @@ variance and bias there can be estimated:
 
 loss_k is the mean square of what held-out motion shows to be missed: the
 residual ``r = ‖u‖ − ûᵀπ̃`` along the action, or ``‖N̂ (u − π̃)‖`` where N̂ is
-known. variance_k is the jackknife's, from the policies learnt without each
+known; N̂ is not known exactly, so differences aside from the action that are
+less than the least misfit do not count. variance_k is the jackknife's, from the policies learnt without each
 fold. bias_k compares the candidate with others of less bias, j, as Goldenshluger
 and Lepski do (*Annals of Statistics* 39(3), 2011):
 
@@ -57,6 +58,7 @@ from .candidate import Candidate
 from .constants import (
     COMPARED_STATES,
     LEAST_DEMONSTRATIONS,
+    LEAST_MISFIT,
     NEGLIGIBLE_LOSS,
     NEGLIGIBLE_RATIO,
     REFUTED,
@@ -98,7 +100,7 @@ class Comparison:
     def judged(self) -> dict[str, Judged]:
         """Figures of each candidate, by name, as shares of the mean squared action."""
         unit = max(self._samples.energy, 1e-300)
-        figures = np.column_stack([self._missed, self._variance, self._bias, self.risks]) / unit
+        figures = np.column_stack([sum(self._missed), self._variance, self._bias, self.risks]) / unit
         return {
             one.name: Judged(loss, variance, bias, risk, one.weights)
             for one, (loss, variance, bias, risk) in zip(self._candidates, figures.tolist(), strict=True)
@@ -127,17 +129,23 @@ class Comparison:
     @cached_property
     def risks(self) -> Array:
         """Estimated squared error, shape (K,), up to what all have in common."""
-        risk = self._missed - np.nanmin(self._missed) + self._variance + self._bias
+        along, aside = self._missed
+        more = aside - aside[np.nan_to_num(along + aside, nan=np.inf).argmin()]
+        unresolved = LEAST_MISFIT**2 * self._samples.energy
+        missed = along + more - np.clip(more, -unresolved, unresolved)
+        risk = missed - np.nanmin(missed) + self._variance + self._bias
         found: Array = np.where(np.isfinite(risk), risk, np.inf)
         return found
 
     @cached_property
-    def _missed(self) -> Array:
-        """Weighted mean square of what held-out motion shows to be missed, (K,)."""
-        held, missed = self._held, self._along.copy()
+    def _missed(self) -> tuple[Array, Array]:
+        """Weighted mean square of what held-out motion shows to be missed, along the action and aside from it, (K,)."""
+        held, aside = self._held, np.zeros_like(self._along)
         off = np.einsum("nab,knb->kna", self._seen[held], self._samples.actions[held] - self._held_out[:, held])
-        missed[:, held] = np.vecdot(off, off) - self._noise[held] * np.einsum("naa->n", self._seen[held])
-        return np.asarray(missed @ self._reliable / self._reliable.sum())
+        expected = self._noise[held] * np.einsum("naa->n", self._seen[held])
+        aside[:, held] = np.vecdot(off, off) - expected - self._along[:, held]
+        along, aside = (each @ self._reliable / self._reliable.sum() for each in (self._along, aside))
+        return along, aside
 
     @cached_property
     def _losses(self) -> Array:
