@@ -30,7 +30,7 @@ def test_a_shape_arrives_free_and_on_planes_at_a_small_price(small):
 
 @needs_data
 def test_it_has_sentences_and_a_page_with_a_picture_of_every_shape(small):
-    assert arrival.headlines(small)[0].startswith("arrive within 5 %, demonstrated starts: guided 100.0%, else 100.0%")
+    assert arrival.headlines(small)[0].startswith("arrive within 5 %, demonstrated starts: guided 100.0%, else ")
     page = pages.page(small)
     assert "small pictures" not in page
     assert ">Line<" in page
@@ -42,7 +42,8 @@ def test_it_has_sentences_and_a_page_with_a_picture_of_every_shape(small):
 def test_what_arrives_by_construction_is_measured_beside(small):
     found = arrival.by_way(small.tables["ways"])
     assert list(found) == ["unguided", "guided", "contracting", "stable"]
-    assert_allclose(small.rows[0]["area_ratio"], found["guided"]["area"] / found["unguided"]["area"])
+    alone = found["unguided"]["area"]  # where any of them arrives
+    assert small.rows[0]["area_ratio"] == (alone and pytest.approx(found["guided"]["area"] / alone))
     for way in ("guided", "contracting", "stable"):
         assert found[way]["shown"] == found[way]["random"] == 1.0
         assert 0.0 < found[way]["dtw"] < 10.0

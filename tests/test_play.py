@@ -16,7 +16,9 @@ SIDE, WIDTH = 5, 0.8
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     path = tmp_path_factory.mktemp("play") / "play.html"
-    assert run("play", "-o", path).strip() == f"page: {path}"
+    said = run("play", "-o", path)
+    assert said.startswith("✔ A page to draw on")
+    assert said.endswith(f"page: {path}\n")
     return path
 
 

@@ -242,4 +242,4 @@ def test_the_command_line_scales_and_says_so(tmp_path):
     assert "Note: --scale auto: angles and orientations have none; give positions in metres." in beside.err
     wrong = call("fit", *files, "-o", output, "--force", "--scale", "1,2")
     assert wrong.code == 2
-    assert "Error: scale: got 2 numbers, expected 3, one for each state." in wrong.err
+    assert "Error: --scale: got 2 numbers, expected 3, one for each state." in wrong.err
