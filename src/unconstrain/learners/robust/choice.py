@@ -12,9 +12,10 @@ variance and bias there can be estimated:
 loss_k is the mean square of what held-out motion shows to be missed: the
 residual ``r = ‖u‖ − ûᵀπ̃`` along the action, or ``‖N̂ (u − π̃)‖`` where N̂ is
 known; N̂ is not known exactly, so differences aside from the action that are
-less than the least misfit do not count. variance_k is the jackknife's, from the policies learnt without each
-fold. bias_k compares the candidate with others of less bias, j, as Goldenshluger
-and Lepski do (*Annals of Statistics* 39(3), 2011):
+less than the least misfit do not count. variance_k is the jackknife's, from
+the policies learnt without each fold. bias_k compares the candidate with
+others of less bias, j, as Goldenshluger and Lepski do (*Annals of Statistics*
+39(3), 2011):
 
     bias_k = max_j (E ‖π̃_k − π̃_j‖² − variance of π̃_k − π̃_j)₊
 
@@ -27,10 +28,10 @@ demonstration was held all the time, nothing shows that they were, and it is
 as soft as direct regression; otherwise its softness is zero. Whoever knows the
 Jacobian of the constraints has less bias than all, and a softness of −1. A
 candidate j that is less consistent than k where held out, along the actions,
-beyond chance, shows no bias of k; nor does one that is so by the residuals
-weighted by ‖u‖², as under noise alone. Whoever knows the Jacobian is a
-candidate only if it is as consistent as the best of the others, and is
-compared no more.
+shows no bias of k: consistency is what it was learnt by, so it fits chance.
+Nor does one that is so by the residuals weighted by ‖u‖², as under noise
+alone. Whoever knows the Jacobian is a candidate only if it is as consistent as
+the best of the others, and is compared no more.
 
 Residuals have the variance ``‖π‖² (σ² / ‖u‖² + κ²)`` under any constraint:
 noise of variance σ² turns the direction of a slow action, and people vary by
@@ -236,12 +237,14 @@ class Comparison:
 
     @cached_property
     def _refuted(self) -> NDArray[np.bool_]:
-        """Whether each is less consistent than each other where held out, beyond chance, (K, K).
+        """Whether each is less consistent than each other where held out, (K, K).
 
         With the weights of the loss, or with ‖u‖², which noise calls for and people who vary do not. Differences that
         are less than any model's misfit say nothing unless one loss is a multiple of the other.
         """
-        return np.asarray(_beyond_chance(self._losses / self._samples.energy) | _beyond_chance(self._losses_of_noise))
+        return np.asarray(
+            _less_consistent(self._losses / self._samples.energy) | _less_consistent(self._losses_of_noise)
+        )
 
     @cached_property
     def _predictions(self) -> tuple[Array, Array]:
@@ -281,11 +284,11 @@ def leverage(samples: Samples) -> Array:
     return np.clip(found, 0.0, 1e6)
 
 
-def _beyond_chance(losses: Array) -> NDArray[np.bool_]:
-    """Whether each candidate's loss (K, G) is larger than each other's, by some standard errors and not negligibly."""
-    (gap, error), whole = _gaps(losses), losses.sum(axis=1)
-    large = (gap > NEGLIGIBLE_LOSS) | (whole[:, None] > NEGLIGIBLE_RATIO * np.maximum(whole, 1e-9))
-    return np.asarray(large & (gap > REFUTED * error))
+def _less_consistent(losses: Array) -> NDArray[np.bool_]:
+    """Whether each candidate's loss (K, G) is larger than each other's, and not negligibly, (K, K)."""
+    whole = losses.sum(axis=1)
+    gap = whole[:, None] - whole
+    return np.asarray((gap > NEGLIGIBLE_LOSS) | (whole[:, None] > NEGLIGIBLE_RATIO * np.maximum(whole, 1e-9)))
 
 
 def _gaps(losses: Array) -> tuple[Array, Array]:
