@@ -214,6 +214,8 @@ def test_score_and_look_read_as_told_where_files_are_not_as_those_learnt_from(tm
     assert len(json.loads(run(*score, plain, "--group", "none", "--json"))["rows"]) == 1
     page = ("look", other, tmp_path / "p.npz", "-o", tmp_path / "look.html")
     assert "4 demonstrations, 160 samples" in run(*page, "--group", "Zug")
+    run("look", learnt, tmp_path / "p.npz", "-o", tmp_path / "again.html")
+    assert "--group Strich" in (tmp_path / "again.html").read_text()
 
 
 def test_abbreviations_are_told_below_the_table(folder, policy):

@@ -32,7 +32,13 @@ FEATURES = ("auto", "constant", "affine", "quadratic", "rbf")
 
 @click.command(epilog="\b\nExample:\n  unconstrain constraint wipe_*.csv --state x,y,z --differentiate -o plate.npz")
 @options_for_reading
-@click.option("-o", "--output", required=True, type=click.Path(dir_okay=False), help="File for the constraint (.npz).")
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    type=click.Path(dir_okay=False),
+    help="File for the constraint (.npz); where each demonstration has its own, the stem of theirs.",
+)
 @click.option("--features", type=click.Choice(FEATURES), default="auto", show_default=True, help="How A may vary.")
 @click.option("--jacobian", metavar="URDF", help="States are joint angles of this robot: what is held is its hand.")
 @click.option("--tip", help="With --jacobian: the link that is its hand.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +17,7 @@ from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainEr
 from ..base.files import write
 from .constraining import arm_of, known_arms
 from .printing import refuse_warnings, say_verdict
-from .reading import options_for_reading, prepared
+from .reading import options_for_reading, prepared, reading_of
 from .writing import check_outputs, option_for_force
 
 MOST_QUICK = 20_000
@@ -99,6 +99,8 @@ class Seen(NamedTuple):
     recordings: Sequence[uc.Recording]
     policy: uc.Policy | None
     constraint: uc.LearntConstraint | None
+    roles: Mapping[str, Any]
+    """How files are read, as the policy or constraint remembers it."""
 
 
 def _seen(paths: Sequence[str | Path], reading: dict[str, Any]) -> Seen:
@@ -109,9 +111,10 @@ def _seen(paths: Sequence[str | Path], reading: dict[str, Any]) -> Seen:
         raise ReadError(f"{found}: holds no recording to look at; add some: unconstrain look {found} wipe_*.csv")
     policies = [one for one in models.values() if isinstance(one, uc.Policy)]
     constraints = [one for one in models.values() if isinstance(one, uc.LearntConstraint)]
-    found = prepared(recorded, reading, *(uc.storage.load_notes(path) for path in [*models][:1]))
+    notes = uc.storage.load_notes(next(iter(models))) if models else {}
+    found = prepared(recorded, reading, notes)
     refuse_warnings(reading["strict"])
-    return Seen(recorded, *found, next(iter(policies), None), next(iter(constraints), None))
+    return Seen(recorded, *found, next(iter(policies), None), next(iter(constraints), None), reading_of(**notes).roles)
 
 
 def _page(seen: Seen, surveys: Sequence[Any]) -> str:
@@ -123,7 +126,7 @@ def _page(seen: Seen, surveys: Sequence[Any]) -> str:
         _title(seen.paths),
         units=seen.recordings[0].units,
         marks=[marks_of(*each) for each in zip(seen.recordings, surveys, seen.demonstrations, strict=True)],
-        command=_to_fit(seen.paths, seen.recipe),
+        command=_to_fit(seen.paths, seen.recipe, seen.roles),
         policy=seen.policy,
         constraint=seen.constraint,
         free=_free(seen),
@@ -193,7 +196,7 @@ def _model(path: str | Path) -> Any:
     return None
 
 
-def _to_fit(paths: Sequence[str | Path], recipe: uc.Recipe) -> tuple[str, str]:
+def _to_fit(paths: Sequence[str | Path], recipe: uc.Recipe, roles: Mapping[str, Any]) -> tuple[str, str]:
     """What to type to learn from these files as they were read, before and after what is left out."""
     context = click.get_current_context()
     told = ["unconstrain", "fit", *map(str, paths)]
@@ -205,6 +208,8 @@ def _to_fit(paths: Sequence[str | Path], recipe: uc.Recipe) -> tuple[str, str]:
     for option in context.command.params:
         name = option.name or ""
         given = context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE
+        if isinstance(roles.get(name), str) and not given:
+            told += _option(option.opts[0], roles[name])
         if given and name not in ("files", "output", "force", "leave_out", "rrd", "robot", "tip"):
             value = context.params[name]
             for one in value if getattr(option, "multiple", False) else [value]:
