@@ -114,17 +114,18 @@ def _learnt(
 ) -> dict[str, uc.LearntConstraint]:
     """One for all, without a name; or one for each, by name, where one for all has doubts or is less simple."""
     states, actions, groups = uc.stack(demonstrations)
-    moves = None if surface else actions
+    samples = states, None if surface else actions, groups
     try:
-        shared = constraint.fit(states, moves, groups=groups).choice_
+        shared = constraint.fit(*samples).choice_
     except InvalidDataError:
-        each = constraint.differing(states, moves, groups)
+        each = constraint.differing(*samples)
         if not each:
             raise
     else:
-        each = constraint.differing(states, moves, groups) if shared.doubts or FEATURES.index(shared.name) > 1 else {}
-        form = max((FEATURES.index(one.choice_.name) for one in each.values()), default=0)
-        each = each if shared.doubts or form < FEATURES.index(shared.name) else {}
+        form = FEATURES.index(shared.name)
+        each = constraint.differing(*samples) if shared.doubts or form > 1 else {}
+        if not shared.doubts and any(FEATURES.index(one.choice_.name) >= form for one in each.values()):
+            each = {}
     return {demonstrations[int(str(number))].name: one for number, one in each.items()} or {"": constraint}
 
 
