@@ -147,8 +147,8 @@ def trial(
             "inconsistency": policy.with_learner(uc.Inconsistency()),
             PAPER: policy.with_learner(uc.Hybrid(settings.alpha)),
             "hybrid, auto": policy.with_learner(uc.Hybrid(alpha="auto")),
-            "noise-corrected": policy.with_learner(uc.NoiseCorrected()),
-            "likelihood": policy.with_learner(uc.Likelihood()),
+            "noise-corrected": _compared("noise-corrected", policy, uc.NoiseCorrected()),
+            "likelihood": _compared("likelihood", policy, uc.Likelihood()),
         }
         of_noise: dict[str, tuple[float, ...]] = {method: errors_of(one, test) for method, one in learnt.items()}
         of_noise[DEFAULT] = (*errors_of(policy, test), *_knowledge(policy, noisy, test))
@@ -352,6 +352,16 @@ def _best(policy: uc.Policy, test: Sequence[uc.Demonstration], found: Sequence[A
             best, least = judged.solution_, missed
     judged.solution_ = best
     return errors_of(judged, test)
+
+
+def _compared(name: str, policy: uc.Policy, learner: uc.Learner) -> uc.Policy:
+    """What a learner makes of the samples: that of the default learner's candidates, if it is among them."""
+    found = policy.solution_.candidates.get(name)
+    if found is None:
+        return policy.with_learner(learner)
+    own = policy.with_learner(uc.Direct())
+    own.solution_ = replace(policy.solution_, weights=found.weights, method=name)
+    return own
 
 
 def _policy(system: str) -> uc.Policy:
