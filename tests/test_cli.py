@@ -984,7 +984,7 @@ def test_tables_do_not_wrap_in_a_terminal_of_80_columns(folder):
         env=environment(TERM="xterm"),
         check=True,
     )
-    rows = [row for row in done.stdout.splitlines() if "swing_" in row]
+    rows = [row for row in done.stdout.splitlines() if row.startswith("swing_")]
     assert [len(row.split()) for row in rows] == [10] * 8
 
 

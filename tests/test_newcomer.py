@@ -99,6 +99,52 @@ def test_so_does_every_kind_of_file_and_with_that_column_they_are_the_strokes(on
     assert not any(one["code"] == "several-in-one" for each in found for one in each["warnings"])
 
 
+def test_what_comes_next_is_typed_as_this_was(tmp_path):
+    file = write(tmp_path / "alle.csv", f"Strich,{HEAD}", strokes(words, 6))
+    few = text(call("inspect", file))
+    assert "several-in-one, clock-gap" in few
+    assert "Next: --group Strich, which tells demonstrations apart." in few
+    shown = text(call("inspect", file, "--group", "Strich", "--state", "X,Y", "--by", "savgol", "--sort"))
+    then = "--state X,Y --by savgol --sort --group Strich -o policy.npz"
+    assert re.search(rf"Next: unconstrain fit .*alle\.csv {then}", shown)
+
+
+def test_many_files_are_not_all_said_again(folder):
+    each = sorted(folder.glob("*.csv"))
+    assert re.search(r"Next: unconstrain fit \S+w0\.csv \.\.\. -o policy\.npz", text(call("inspect", *each)))
+
+
+def test_a_file_of_a_constraint_says_which_mechanism_was_named(tmp_path):
+    rng = np.random.default_rng(0)
+    times = np.arange(0, 2, 0.02)
+    angles = 0.2 + 0.6 * (1 - np.cos(np.pi * times / 2))
+    arc = 0.8 * np.column_stack([np.cos(angles), np.sin(angles), 0 * angles]) + rng.normal(0, 3e-4, (len(times), 3))
+    door = write(tmp_path / "door.csv", "t [s],x [m],y [m],z [m]", np.column_stack([times, arc]))
+    told = json.loads(run("constraint", door, "-o", tmp_path / "c.npz", "--json"))
+    assert "a circle (hinge)" in told["mechanism"]
+    assert json.loads(run("info", tmp_path / "c.npz", "--json"))["mechanism"] == told["mechanism"]
+    assert "rollout --constraint follows" in run("constraint", door, "-o", tmp_path / "c.npz", "--force")
+
+
+def test_a_score_under_a_constraint_says_what_else_counts(folder, policy):
+    assert "Noise, and motion faster or slower" in text(call("score", policy, folder / "unseen", "--plane", "1,1"))
+    assert "Noise, and motion faster or slower" not in text(call("score", policy, folder / "unseen"))
+
+
+def test_diagnose_says_why_fit_may_be_content_and_what_its_columns_are(folder):
+    said = text(call("diagnose", folder / "w0.csv", folder / "w1.csv", folder / "w2.csv", "--model", "affine"))
+    assert said.startswith(("!", "✖"))
+    assert "'fit' and 'score' may still explain much" in said
+    assert "spread: how far it may be off" in said
+
+
+def test_what_sums_cannot_tell_is_said_without_words_of_this_house(folder):
+    policy = uc.LocallyLinearPolicy(learner="hybrid").fit_demonstrations(uc.prepare(uc.read(folder / "w[0-5].csv")))
+    with pytest.raises(uc.errors.UnconstrainError, match=r"^noise: .* learnt from sums,") as found:
+        policy.solution_.noise  # noqa: B018
+    assert "belief" not in str(found.value)
+
+
 def test_a_column_of_words_is_listed_and_is_no_state(tmp_path):
     file = write(tmp_path / "a.csv", f"Person,{HEAD}", [["Anna", *row] for row in stroke(0)])
     assert "--group can take demonstrations apart by: Person" in run("inspect", file)

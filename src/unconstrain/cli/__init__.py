@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import shlex
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -69,6 +70,7 @@ from .reading import (
     recipe_of,
     said_recipe,
     stream_of,
+    typed,
 )
 from .writing import check_name, check_outputs, option_for_force
 
@@ -134,7 +136,11 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
             used = f"fit uses {said_recipe(uc.preparation.decide(recipe, first[0])[0], first[0])}.\n"
         except UnconstrainError as error:
             needed = str(error)
-        say_surveys(surveys, needed)
+        told = [
+            shlex.join(files) if len(files) < 4 else f"{shlex.quote(files[0])} ...",
+            shlex.join(typed("files", "as_json", "strict")),
+        ]
+        say_surveys(surveys, needed, f"unconstrain fit {' '.join(filter(None, told))} -o policy.npz")
         click.echo(used, nl=False)
     refuse_warnings(reading["strict"])
 

@@ -83,8 +83,9 @@ def constraint(
         say_verdict(verdict)
         click.echo(f"Learnt from {said_recipe(recipe, first)}.")
         _say(learnt, "distance from it" if surface else "action", named)
+    notes = provenance(paths, recipe, first, **reading) | ({} if named is None else {"mechanism": named.found.summary})
     for name, place in outputs.items():
-        uc.save(learnt[name], place, provenance(paths, recipe, first, **reading))
+        uc.save(learnt[name], place, notes)
     written = {f"constraint of {name}" if name else "constraint": place for name, place in outputs.items()}
     if report is not None:
         _report(report, learnt, demonstrations, recipe.labels(first.units)[0], named)
@@ -278,6 +279,10 @@ def _say(learnt: Mapping[str, uc.LearntConstraint], what: str, named: Named | No
         click.echo("Each demonstration has its own: one constraint for all misses more where held out.")
     for sentence in named.sentences if named is not None else ():
         click.echo(sentence)
+    if named is not None:
+        click.echo(
+            "That names the positions; rollout --constraint follows the directions that were learnt, as said first."
+        )
     head, rows = table_of(learnt, named)
     if rows:
         print_table(head, rows)

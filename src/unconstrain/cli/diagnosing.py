@@ -88,6 +88,8 @@ def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequenc
         for one in shown
     ]  # fmt: skip
     print_table(head, rows)
+    click.echo("determined: share of the samples there at which three demonstrations or more tell the policy.")
+    click.echo("spread: how far it may be off at this one state, along 'leave free', as a share of a typical action.")
     free = sorted(found.movements, key=lambda one: -(one.free or 0.0))
     click.echo("\nMean probability that a sample was free, of the freest and the most constrained demonstrations:")
     ends = free if len(free) <= MOST_ROWS else [*free[: MOST_ROWS // 2], *free[-MOST_ROWS // 2 :]]

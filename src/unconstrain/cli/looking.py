@@ -17,7 +17,7 @@ from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainEr
 from ..base.files import write
 from .constraining import arm_of, known_arms
 from .printing import refuse_warnings, say_verdict
-from .reading import options_for_reading, prepared, reading_of
+from .reading import options_for_reading, prepared, reading_of, typed
 from .writing import check_outputs, option_for_force
 
 MOST_QUICK = 20_000
@@ -205,22 +205,9 @@ def _to_fit(paths: Sequence[str | Path], recipe: uc.Recipe, roles: Mapping[str, 
         told += (
             ["--by", recipe.differentiate or ""] if recipe.actions is None else ["--action", ",".join(recipe.actions)]
         )
+    given = typed("files", "output", "force", "leave_out", "rrd", "robot", "tip")
     for option in context.command.params:
-        name = option.name or ""
-        given = context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE
-        if isinstance(roles.get(name), str) and not given:
-            told += _option(option.opts[0], roles[name])
-        if given and name not in ("files", "output", "force", "leave_out", "rrd", "robot", "tip"):
-            value = context.params[name]
-            for one in value if getattr(option, "multiple", False) else [value]:
-                told += _option(option.opts[0], one)
-    return shlex.join(told), "-o policy.npz"
-
-
-def _option(name: str, value: Any) -> list[str]:
-    """One option as it is typed."""
-    if value is True:
-        return [name]
-    if isinstance(value, tuple):
-        return [name, ",".join(map(str, value))]
-    return [name, str(value)]
+        role = roles.get(option.name or "")
+        if isinstance(role, str) and option.opts[0] not in given:
+            told += [option.opts[0], role]
+    return shlex.join([*told, *given]), "-o policy.npz"

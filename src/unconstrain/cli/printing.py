@@ -88,9 +88,12 @@ def of_option(name: str) -> Iterator[None]:
         raise SettingError(f"{name}: {error}") from None
 
 
-def say_surveys(surveys: Sequence[Any], needed: str = "") -> None:
-    """Print what was found in recordings: a line for each, columns, what is not as it seems, what fit has to know."""
-    say_verdict(uc.evaluation.verdicts.of_surveys(surveys, needed))
+def say_surveys(surveys: Sequence[Any], needed: str, then: str) -> None:
+    """Print what was found in recordings: a line for each, columns, what is not as it seems, what fit has to know.
+
+    ``then`` is the command that comes next.
+    """
+    say_verdict(uc.evaluation.verdicts.of_surveys(surveys, needed, then))
     rows = [
         [
             found.name,

@@ -175,6 +175,22 @@ def reading_of(**options: Any) -> uc.readers.Reading:
     return uc.readers.Reading(**{name: value for name, value in options.items() if name in known})
 
 
+def typed(*without: str) -> list[str]:
+    """The options of this command as they were typed, but for some."""
+    context, told = click.get_current_context(), list[str]()
+    for option in context.command.params:
+        name = option.name or ""
+        if name in without or context.get_parameter_source(name) != click.core.ParameterSource.COMMANDLINE:
+            continue
+        value = context.params[name]
+        for one in value if getattr(option, "multiple", False) else [value]:
+            told += [
+                option.opts[0],
+                *([] if one is True else [",".join(map(str, one))] if isinstance(one, tuple) else [str(one)]),
+            ]
+    return told
+
+
 def stream_of(
     paths: Sequence[str | Path], speed_power: float, progress: Progress | None = None, **options: Any
 ) -> uc.Stream:

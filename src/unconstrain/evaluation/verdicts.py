@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import Enum
+from functools import partial
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -27,7 +28,10 @@ the second more than half, beyond which little but the rough direction is left."
 MOSTLY, PARTLY = 0.95, 0.7
 """Share of recorded states at which the policy is determined: of the rest, one in twenty is an edge."""
 
-MORE = "Record the task again, held in other ways; or tell demonstrations in one file apart with --group."
+MORE = (
+    "If one file holds several demonstrations, name the column that tells them apart with --group ('unconstrain "
+    "inspect' finds it); else record the task again, held in other ways."
+)
 """What helps against too few demonstrations."""
 
 SMALL = 0.1
@@ -68,11 +72,12 @@ class Verdict(NamedTuple):
 
     def lines(self) -> list[str]:
         """For a terminal of 80 columns."""
-        said = wrap(f"{self.mark.value} {self.said}", WIDTH, subsequent_indent="  ")
+        whole = partial(wrap, width=WIDTH, break_on_hyphens=False)  # options and paths can be copied
+        said = whole(f"{self.mark.value} {self.said}", subsequent_indent="  ")
         return said + [
             line
             for name, text in self.rest()
-            for line in wrap(f"{name}: {text}", WIDTH, initial_indent="  ", subsequent_indent="    ")
+            for line in whole(f"{name}: {text}", initial_indent="  ", subsequent_indent="    ")
         ]
 
 
@@ -126,6 +131,9 @@ def of_score(share: float, demonstrations: int, under: float | None = None, lear
     mark, word = _graded(share if under is None else min(share, under))
     few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
     known = "" if under is None else f", and {under:.0%} under the constraint given (1 − nCPE)"
+    counted = (
+        "Movement under other constraints. Noise, and motion faster or slower than learnt, count as missed in nCPE."
+    )
     if learnt:
         said = f"Explains {share:.0%} of the motion{known}, but it learnt from {learnt} of {_count(demonstrations)}: "
         then = "Hold some out of the fit (--leave-out, --episodes), and score these."
@@ -137,7 +145,7 @@ def of_score(share: float, demonstrations: int, under: float | None = None, lear
         "" if mark is Mark.BAD else "Movement like this, along the directions that were recorded.",
         "What constraints hid in these recordings, too: --plane or --constraint tells it."
         if under is None
-        else "Movement under other constraints.",
+        else counted,
         f"Score it under other constraints.{few}"
         if mark is Mark.GOOD
         else "'unconstrain diagnose' says what to record.",
@@ -160,6 +168,8 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
     if found.noise_share > 3 * SMALL:
         mark, said = Mark.DOUBTFUL, f"{said[:-1]}, though noise is {found.noise_share:.0%} of a typical action."
     trust = "" if mark is Mark.BAD else f"The policy at these states, to about {found.noise_share:.0%} of noise."
+    if mark is not Mark.GOOD:
+        doubt += " 'fit' and 'score' may still explain much: they judge along recorded motion, this judges across it."
     then = "Record what the list below says, the first first." if share < 1 else "Demonstrate where nobody was."
     return Verdict(mark, said, trust, doubt, then)
 
@@ -225,10 +235,14 @@ def of_early_end(why: str, seconds: float) -> Verdict:
     return Verdict(Mark.DOUBTFUL, f"{said}.", f"These {seconds:.2f} s.", "What would have come after.", then)
 
 
-def of_surveys(surveys: Sequence[Any], needed: str = "") -> Verdict:
-    """Judge recordings by what is not as it seems in them, and by what their columns do not tell, a sentence."""
+def of_surveys(surveys: Sequence[Any], needed: str = "", then: str = "unconstrain fit") -> Verdict:
+    """Judge recordings by what is not as it seems in them, and by what their columns do not tell, a sentence.
+
+    ``then`` is the command for recordings that are as they seem.
+    """
     warned = [found for found in surveys if found.warnings]
-    codes = ", ".join(dict.fromkeys(one.code for found in warned for one in found.warnings))
+    odd = sorted((one for found in warned for one in found.warnings), key=lambda one: one.code != "several-in-one")
+    codes = ", ".join(dict.fromkeys(one.code for one in odd))
     few = len(surveys) < ENOUGH
     fewer = f"{_count(len(surveys))}: 'fit' tells what was free from {ENOUGH} or more, held in different ways."
     if not warned and needed:
@@ -236,9 +250,12 @@ def of_surveys(surveys: Sequence[Any], needed: str = "") -> Verdict:
         return Verdict(Mark.DOUBTFUL, said, doubt=fewer if few else "", next=needed)
     if not warned:
         said = f"{_count(len(surveys))}, nothing odd: ready to learn from."
-        return Verdict(Mark.DOUBTFUL if few else Mark.GOOD, said, doubt=fewer if few else "", next="unconstrain fit")
+        return Verdict(Mark.DOUBTFUL if few else Mark.GOOD, said, doubt=fewer if few else "", next=then)
     said = f"{len(warned)} of {_count(len(surveys))} not as it should be: {codes}."
-    then = "Read the notes below; each names its cure." + (f" And fit needs to know more: {needed}" if needed else "")
+    first = f"--group {odd[0].column}, which tells demonstrations apart. " if odd[0].code == "several-in-one" else ""
+    then = f"{first}Read the notes below; each names its cure." + (
+        f" And fit needs to know more: {needed}" if needed else ""
+    )
     return Verdict(Mark.DOUBTFUL, said, doubt=fewer if few else "", next=then)
 
 

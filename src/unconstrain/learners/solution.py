@@ -191,7 +191,7 @@ class Solution(Shown):
 
     @property
     def believed(self) -> Belief:
-        """The belief.
+        """What is estimated beside the weights: noise, which samples were free, how far the policy may be off.
 
         Raises
         ------
@@ -200,7 +200,7 @@ class Solution(Shown):
         """
         if self.belief is None:
             raise MissingBeliefError(
-                f"belief: got a solution of {self.method or 'a learner'} from moments alone, which estimates none. "
+                f"noise: {self.method or 'this learner'} learnt from sums, which tell no noise and no free samples. "
                 "Fit with learner=Robust(), where it can see the samples."
             )
         return self.belief
