@@ -72,6 +72,7 @@ from .reading import (
     stream_of,
     typed,
 )
+from .replaying import replayed
 from .writing import check_name, check_outputs, option_for_force
 
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
@@ -266,8 +267,10 @@ def score(
     known = learnt_from(learnt, notes, recordings)
     count = None if known is None else len(known)
     verdict = uc.evaluation.verdicts.of_score(1.0 - whole["ninc"], len(demonstrations), under, count)
+    verdict, run = replayed(verdict, learnt, demonstrations, recipe, held, recordings[0].units)
     if as_json:
-        told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known, "verdict": verdict.to_json()}
+        told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known, "replayed": run}
+        told |= {"verdict": verdict.to_json()}
         click.echo(json.dumps(told, indent=2))
         return
     say_verdict(verdict)
@@ -343,7 +346,7 @@ def rollout(
     round_ = [_obstacle(given, len(start)) for given in obstacles]
     path, why, trouble = _as_far_as_it_goes(learnt, list(start), constraint=held, task=task, obstacles=round_, **how)
     named = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))
-    verdict = _supported(learnt, path, why, round_)
+    verdict = _supported(learnt, path, why, round_, "" if plane is None else " The plane passes through the start.")
     accelerations = named.actions or tuple(f"a{name}" for name in (named.states or ())[:places])
     columns = ["t", *(named.states or ()), *(accelerations if how["order"] == 2 else named.directions)]
     if output != "-":
@@ -352,9 +355,8 @@ def rollout(
         click.echo(_csv(columns, path), nl=False)
     if as_json:
         rows = None if output != "-" else _rows(path).tolist()
-        told = None if verdict is None else verdict.to_json()
-        click.echo(json.dumps({"columns": columns, "rows": rows, "output": output, "verdict": told}))
-    elif verdict is not None and (output != "-" or verdict.doubt):
+        click.echo(json.dumps({"columns": columns, "rows": rows, "output": output, "verdict": verdict.to_json()}))
+    elif output != "-" or verdict.doubt:
         say_verdict(verdict, err=output == "-")
     if trouble is not None:
         raise trouble
@@ -482,16 +484,19 @@ def _as_far_as_it_goes(policy: uc.Policy, start: list[float], **how: Any) -> tup
 
 
 def _supported(
-    policy: uc.Policy, path: Any, why: str, obstacles: Sequence[uc.motion.obstacles.Ellipsoid]
-) -> uc.evaluation.verdicts.Verdict | None:
-    """How near data is along a movement; None of an affine or polynomial policy, which has no support."""
+    policy: uc.Policy, path: Any, why: str, obstacles: Sequence[uc.motion.obstacles.Ellipsoid], held: str
+) -> uc.evaluation.verdicts.Verdict:
+    """How near data is along a movement, which an affine or polynomial policy does not know; then ``held``."""
     verdicts = uc.evaluation.verdicts
     try:
         ended = verdicts.of_early_end(why, float(path.times[-1])) if why else None
         untold = uc.evaluation.diagnosis.untold(policy, path)
         found = ended or verdicts.of_support(policy.support(path.states), path.times, untold)
     except SettingError:
-        return None
+        said = "How near demonstrations are cannot be told: this model has no support, it goes on everywhere."
+        then = "Compare it with what was demonstrated; 'unconstrain fit --model local' learns a policy that knows."
+        found = verdicts.Verdict(verdicts.Mark.DOUBTFUL, said, next=then)
+    found = found._replace(said=f"{found.said}{held}")
     if not obstacles:
         return found
     nearest = min((float(one(path.states)[0].min()), number) for number, one in enumerate(obstacles, start=1))

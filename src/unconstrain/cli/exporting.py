@@ -25,7 +25,8 @@ class Target(NamedTuple):
     next: str
 
 
-_NEXT_C = "Let it test itself where it will run: cc -std=c99 -D{NAME}_SELF_TEST {file} -lm -o test && ./test"
+_NEXT_C = "Stop the robot where {name}_support() is near 0. "
+_NEXT_C += "Let it test itself where it will run: cc -std=c99 -D{NAME}_SELF_TEST {file} -lm -o test && ./test"
 _NEXT_ONNX = "Run it on a recorded state, and compare with 'policy.predict'."
 _NEXT_ROS2 = "colcon build, then colcon test; let it run with the robot held still first."
 
@@ -75,11 +76,14 @@ def export(
     if output is not None:
         target, options = TARGETS[kind], {"name": name, "single": single, "notes": notes}
         getattr(learnt, target.method)(output, **{option: options[option] for option in target.takes})
-        called = (name or Path(output).stem).upper()
-        written[target.what], then = output, target.next.format(NAME=called, file=Path(output).name)
+        called = name or Path(output).stem
+        then = target.next.format(NAME=called.upper(), name=called, file=Path(output).name)
+        written[target.what] = output
     if header is not None:
         written["header"] = header
-    judged = verdict_of(learnt)._replace(doubt="States far from all data, where its support is near 0.", next=then)
+    judged = verdict_of(learnt)
+    far = "States far from all data, where its support is near 0."
+    judged = judged._replace(doubt=f"{far} {judged.doubt}".rstrip(), next=then)
     if not as_json:
         say_verdict(judged)
     say_written(written, {"verdict": judged.to_json()} if as_json else None)

@@ -128,7 +128,8 @@ def verdict_of(held: Any) -> uc.evaluation.verdicts.Verdict:
         mark = uc.evaluation.verdicts.Mark.BAD
         return uc.evaluation.verdicts.Verdict(mark, "Not fitted: it cannot predict.", next="unconstrain fit")
     told = _demonstrations(policy) or uc.evaluation.diagnosis.ENOUGH
-    return uc.evaluation.verdicts.of_explained(policy.held_out_score(), told)
+    shown = None if policy.solution_.belief is None else policy.solution_.determined_share
+    return uc.evaluation.verdicts.of_explained(policy.held_out_score(), told, shown)
 
 
 def _demonstrations(policy: uc.Policy) -> int | None:

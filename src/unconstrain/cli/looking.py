@@ -81,6 +81,8 @@ def look(
     odd = any(one.warnings for one in surveys)
     then = "Open the page; what it marks says what cures it." if odd else "Open the page."
     say_verdict(uc.evaluation.verdicts.of_surveys(surveys)._replace(next="" if live else then))
+    if seen.policy is not None:
+        click.echo(_open(seen.policy, seen.demonstrations))
     samples = sum(map(len, seen.demonstrations))
     click.echo(f"{counted(len(seen.demonstrations), 'demonstration')}, {counted(samples, 'sample')}")
     if not live:
@@ -131,6 +133,15 @@ def _page(seen: Seen, surveys: Sequence[Any]) -> str:
         constraint=seen.constraint,
         free=_free(seen),
     )
+
+
+def _open(policy: uc.Policy, demos: Sequence[uc.Demonstration]) -> str:
+    """Of the policy that is drawn, at how many of the recorded states no recording tells it."""
+    try:
+        share = uc.evaluation.diagnose(policy, demos).states_determined
+    except UnconstrainError:
+        return "policy: where recordings tell it is not known for this learner."
+    return f"policy: undetermined at {1 - share:.0%} of the recorded states ('unconstrain diagnose' says where)."
 
 
 def _free(seen: Seen) -> Any:

@@ -34,6 +34,9 @@ MORE = (
 )
 """What helps against too few demonstrations."""
 
+OTHERWISE = 1.2
+"""Size or pace of a roll-out over that demonstrated, or the inverse, from which on it is another movement."""
+
 SMALL = 0.1
 """An undetermined spread below this share of the typical action is negligible."""
 
@@ -227,6 +230,30 @@ def _of_open(open_: NDArray[np.bool_], most: float, seconds: Array) -> Verdict:
     said += f"policy in a direction that it takes: undetermined, by up to {most:.0%} of its typical action."
     trust = f"The first {since:.2f} s." if open_.argmax() else ""
     return Verdict(Mark.DOUBTFUL, said, trust, "Directions that are not determined there.", then)
+
+
+def of_replays(found: Verdict, extents: Array, paces: Array, apart: str) -> Verdict:
+    """Add to a verdict how a policy moves from the starts of demonstrations, held as they were.
+
+    ``extents`` and ``paces`` are size and turns of each run over those of its demonstration, NaN where there are none;
+    ``apart`` is how far the runs stray. Half of them may be off by :data:`OTHERWISE` either way, whatever the mean is.
+    """
+    measured = {"size": extents[np.isfinite(extents)], "pace": paces[np.isfinite(paces)]}
+    logs = {name: np.log(np.maximum(ratios, 1e-9)) for name, ratios in measured.items() if len(ratios)}
+    if not logs:
+        return found
+    told = ", ".join(f"{name} {np.exp(np.median(ratios)):.2f} times" for name, ratios in logs.items())
+    ran = f"un from the same starts: {told} the demonstrated, {apart} away on average"
+    off = {name: float(np.exp(np.median(np.abs(ratios)))) for name, ratios in logs.items()}
+    worst = max(off, key=lambda name: off[name])
+    if off[worst] <= OTHERWISE:
+        return found._replace(said=f"{found.said} R{ran}.")
+    return found._replace(
+        mark=Mark.BAD if found.mark is Mark.BAD else Mark.DOUBTFUL,
+        said=f"{found.said} But r{ran}: {worst} of half of them is off by {off[worst] - 1:.0%} or more.",
+        doubt=f"Its size or pace over time. {found.doubt}".rstrip(),
+        next="Look at it ('unconstrain look'); learn from more demonstrations, or with another --window or --model.",
+    )
 
 
 def of_early_end(why: str, seconds: float) -> Verdict:

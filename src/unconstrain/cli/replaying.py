@@ -1,0 +1,123 @@
+"""What a policy makes of demonstrations from their own starts, beside what was done."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import unconstrain as uc
+
+from ..base.errors import DivergedError
+from .progress import shown
+
+MOST, STEPS = 20, 2000
+"""Demonstrations, and steps of each, that are run at most: seconds."""
+
+FLAT = 0.1
+"""A demonstration is held along directions in which it spreads by less than this share of its longest."""
+
+
+class Replay(NamedTuple):
+    """One demonstration and a roll-out from its start, for as long as it lasted."""
+
+    extent: float
+    """Of the roll-out, root mean square distance from its middle, over that of the demonstration."""
+    pace: float
+    """Turns of the roll-out over those of the demonstration; NaN where that made less than one."""
+    apart: float
+    """Mean distance of the states of the roll-out to the nearest of the demonstration, unit of the states."""
+    held: bool
+    """Whether what held the demonstration is known: given, or seen as it is flat."""
+
+
+def replayed(
+    found: uc.evaluation.verdicts.Verdict,
+    policy: uc.Policy,
+    demos: Sequence[uc.Demonstration],
+    recipe: uc.Recipe,
+    held: Any,
+    units: Mapping[str, str],
+) -> tuple[uc.evaluation.verdicts.Verdict, dict[str, float | None] | None]:
+    """Judge by those whose constraint is known, too; and their medians, None where there are none."""
+    import numpy as np
+
+    runs = replays(policy, demos, recipe, held)
+    known = [one for one in runs if one.held]
+    if not known:
+        unknown = " Its size and pace over time: not compared, as what held these recordings is not known."
+        return (found._replace(doubt=found.doubt + unknown) if runs else found), None
+    extents, paces, apart = np.array([one[:3] for one in known]).T
+    unit = {units.get(name, "") for name in recipe.states or ()}
+    said = f"{np.median(apart):.3g} {unit.pop() if len(unit) == 1 else ''}".rstrip()
+    measured = {"extent": extents, "pace": paces[np.isfinite(paces)], "apart": apart}
+    medians = {name: float(np.median(values)) if len(values) else np.nan for name, values in measured.items()}
+    told = {name: value if np.isfinite(value) else None for name, value in medians.items()}
+    return uc.evaluation.verdicts.of_replays(found, extents, paces, said), told
+
+
+def replays(policy: uc.Policy, demos: Sequence[uc.Demonstration], recipe: uc.Recipe, held: Any = None) -> list[Replay]:
+    """Compare at most twenty demonstrations; none where actions are not known to be velocities of Euclidean states."""
+    import numpy as np
+
+    chosen = [one for one in demos if one.times is not None and len(one) > 2 and np.ptp(one.states, axis=0).any()]
+    if recipe.actions is not None or recipe.space != uc.spaces.Euclidean(policy.n_features_in_) or not chosen:
+        return []
+    chosen = [chosen[k] for k in np.linspace(0, len(chosen) - 1, min(len(chosen), MOST)).astype(int)]
+    clocks = [np.asarray(one.times, np.float64) for one in chosen]
+    lasted = [float(times[-1] - times[0]) for times in clocks]
+    dt = max(float(np.median(np.diff(clocks[0]))), max(lasted) / STEPS)
+    rows = [_normals(one.states) for one in chosen]
+    task = held.target if isinstance(held, uc.LearntConstraint) and held.task else None
+    starts, steps = np.array([one.states[0] for one in chosen]), round(max(lasted) / dt) + 1
+    with shown("running it from the same starts"):
+        try:
+            runs = uc.rollout(policy, starts, steps, dt, held or rows, task=task, least_support=0.0)
+        except DivergedError:
+            return [Replay(np.inf, np.nan, np.inf, True)]
+    cut = [run.states[: round(seconds / dt) + 1] for run, seconds in zip(runs, lasted, strict=True)]
+    known = [held is not None or bool(one.directions.any()) for one in rows]
+    return [_compared(one.states, run, is_held) for one, run, is_held in zip(chosen, cut, known, strict=True)]
+
+
+class _Rows:
+    """The same rows everywhere."""
+
+    def __init__(self, directions: Any) -> None:
+        self.directions = directions
+
+    def __call__(self, states: Any, times: Any) -> Any:
+        import numpy as np
+
+        return np.broadcast_to(self.directions, (len(states), *self.directions.shape))
+
+
+def _normals(states: Any) -> _Rows:
+    """Directions in which a demonstration hardly spreads, (n, n); rows of zeros for the others."""
+    import numpy as np
+
+    _, spread, axes = np.linalg.svd(states - states.mean(axis=0), full_matrices=False)
+    rows = np.zeros((states.shape[1],) * 2)
+    rows[: len(axes)] = axes * (spread < FLAT * spread[0])[:, None]
+    return _Rows(rows)
+
+
+def _compared(shown_: Any, run: Any, held: bool) -> Replay:
+    import numpy as np
+    from scipy.spatial import cKDTree
+
+    centre = shown_.mean(axis=0)
+    axes = np.linalg.svd(shown_ - centre, full_matrices=False)[2][:2]
+    size = [float(np.sqrt(one.var(axis=0).sum())) for one in (shown_, run)]
+    turns = [_turns((one - one.mean(axis=0)) @ axes.T) for one in (shown_, run)]
+    pace = turns[1] / turns[0] if abs(turns[0]) >= 1 else np.nan
+    return Replay(size[1] / size[0], float(pace), float(cKDTree(shown_).query(run)[0].mean()), held)
+
+
+def _turns(points: Any) -> float:
+    """How often points (T, 2) go round the origin."""
+    import numpy as np
+
+    if points.shape[1] < 2:
+        return 0.0
+    angles = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
+    return float((angles[-1] - angles[0]) / (2 * np.pi))
