@@ -694,7 +694,7 @@ def test_without_the_recording_the_rest_is_shown(monkeypatch):
 
     monkeypatch.setattr(constraints, "load_fingertip", missing)
     monkeypatch.setattr(constraints, "TASKS", {"constant": constraints.TASKS["constant"]})
-    found = constraints.run(constraints.Settings(trials=1, noise=(0.0,)))
+    found = constraints.run(constraints.Settings(trials=1, noise=(0.0,), mechanisms=1))
     assert "recorded" not in found.tables
     assert found.details == {}
     assert all(row["nppe"] < 1e-25 and row["noise_found"] is None for row in found.rows)
