@@ -311,3 +311,14 @@ def test_any_data_at_all_gives_a_policy_or_our_own_error(table):
     else:
         with pytest.raises(UnconstrainError, match=r"states: found .* at row \d, column \d"):
             policy.fit(table, table)
+
+
+@pytest.mark.parametrize("learner", [uc.Robust(), uc.Likelihood()], ids=["robust", "likelihood"])
+@pytest.mark.parametrize("scale", [1e-300, 1e-170])
+def test_a_batch_beside_which_the_first_is_nothing_is_refused_in_words(learner, scale):
+    states = np.random.default_rng(0).normal(size=(20, 2))
+    policy = uc.ParametricPolicy(uc.Affine(), learner).fit(states, scale * states)
+    before = policy.predict(states)
+    with pytest.raises(InvalidDataError, match="one unit for all batches"):
+        policy.partial_fit(states, -1e29 * states)
+    assert_array_equal(policy.predict(states), before)

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array, beside, is_foreign, power_of_two
+from ..base.arrays import Array, beside, is_foreign, namespace, power_of_two
 from ..base.display import Shown, counted
 from ..base.errors import InvalidDataError, SettingError
 from ..base.foreign import MOST_NUMBERS
@@ -31,6 +31,9 @@ AT_REST = 1e-12
 
 _SPREAD = 200
 """Weights from which on folds are summed in threads: with fewer, steps are short and threads mostly wait."""
+
+LARGEST_IN_UNITS = 1e70
+"""Actions and weights of so many times those seen first are refused: fourth powers would not be finite."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,7 +108,7 @@ class Training(Shown):
         Raises
         ------
         InvalidDataError
-            If the sums of all folds would have more numbers than go into memory.
+            If the sums of all folds would have more numbers than go into memory, or are beyond the finite numbers.
         SettingError
             If demonstrations are held out and a batch does not name them.
         """
@@ -121,7 +124,9 @@ class Training(Shown):
                     split = split.seeing(block.groups)
                     _add(self._in_units(block), self.model, split, sums, threads)
         further = FoldedMoments(tuple(each.moments.on_host() for each in sums), self.gathered.held_out)
-        return replace(self, split=split, gathered=self.gathered + further, kept=kept)
+        gathered = self.gathered + further
+        _check_range(np.inf, *(sums for part in gathered.parts for sums in (part.energy, part.consistent)))
+        return replace(self, split=split, gathered=gathered, kept=kept)
 
     def __add__(self, other: Training) -> Training:
         """Two parts of the same data, begun alike; this one's samples come first."""
@@ -215,7 +220,9 @@ class Training(Shown):
 
     def _in_units(self, batch: Batch) -> Batch:
         noise = None if batch.noise is None else batch.noise / self.action_unit
-        actions, weights = batch.actions / self.action_unit, batch.counts / self.weight_unit
+        with np.errstate(over="ignore"):
+            actions, weights = batch.actions / self.action_unit, batch.counts / self.weight_unit
+        _check_range(LARGEST_IN_UNITS, actions, weights)
         return batch._replace(actions=actions, weights=weights, noise=noise)
 
     def _in_coordinates(self, batch: Batch) -> Batch:
@@ -253,6 +260,15 @@ def _check_size(folds: int, models: int, d: int, p: int) -> None:
         raise InvalidDataError(
             f"{counted(d, 'action')} and {counted(p, 'feature')} in {counted(models, 'model')} make sums of "
             f"{8e-9 * numbers:,.0f} GB. Take fewer columns as states and actions, fewer features, or Folds(2)."
+        )
+
+
+def _check_range(largest: float, *tables: Array) -> None:
+    """Refuse what is not smaller, in the units of the first samples."""
+    if not all(bool(namespace(table).all(namespace(table).abs(table) < largest)) for table in tables):
+        raise InvalidDataError(
+            "these samples are beyond all numbers beside the first, as their actions or weights are so much larger. "
+            "Take one unit for all batches, in which they are nearer to 1."
         )
 
 

@@ -17,8 +17,10 @@ the policies learnt without each fold. bias_k compares the candidate with
 others of less bias, j, as Goldenshluger and Lepski do (*Annals of Statistics*
 39(3), 2011):
 
-    bias_k = max_j (E ‖π̃_k − π̃_j‖² − variance of π̃_k − π̃_j)₊
+    bias_k = max_j E ‖π̃_k − π̃_j‖² − half the variance of π̃_k − π̃_j
 
+over those j from which it is farther than by chance, E ‖π̃_k − π̃_j‖² being more
+than that variance.
 Softened hybrids (eq. 6 with ``E_i + s E_2``) have the less bias the smaller
 their softness s; s is infinite for direct regression, and that of their prior
 for learners that minimise another error of consistency beside a prior of the
@@ -29,9 +31,10 @@ as soft as direct regression; otherwise its softness is zero. Whoever knows the
 Jacobian of the constraints has less bias than all, and a softness of −1. A
 candidate j that is less consistent than k where held out, along the actions,
 shows no bias of k: consistency is what it was learnt by, so it fits chance.
-Nor does one that is so by the residuals weighted by ‖u‖², as under noise
-alone. Whoever knows the Jacobian is a candidate only if it is as consistent as
-the best of the others, and is compared no more.
+Nor does one whose own variance is many times the motion: where nothing was
+constrained, hard hybrids follow rounding. Whoever knows the Jacobian is a
+candidate only if it is as consistent as the best of the others, and is compared
+no more.
 
 Residuals have the variance ``‖π‖² (σ² / ‖u‖² + κ²)`` under any constraint:
 noise of variance σ² turns the direction of a slow action, and people vary by
@@ -57,9 +60,11 @@ from ...training import Samples
 from ..solution import Judged
 from .candidate import Candidate
 from .constants import (
+    BEYOND_CHANCE,
     COMPARED_STATES,
     LEAST_DEMONSTRATIONS,
     LEAST_MISFIT,
+    MOST_VARIANCE,
     NEGLIGIBLE_LOSS,
     NEGLIGIBLE_RATIO,
     REFUTED,
@@ -166,13 +171,6 @@ class Comparison:
         return np.asarray(self._samples.counts / (1.0 + self._leverage) / (1.0 + noise))
 
     @cached_property
-    def _losses_of_noise(self) -> Array:
-        """Share of the motion in the held-out residuals, both weighted by ‖u‖², by demonstration: (K, G)."""
-        squares = self._lengths**2
-        weights = self._samples.counts * squares
-        return self._by_demonstration(weights, self._residuals**2) / (weights @ squares)
-
-    @cached_property
     def _corrected_losses(self) -> Array:
         """Noise-corrected inconsistency of the held-out predictions, by demonstration: (K, G)."""
         values = [corrected_squares(self._samples, policy, self.noise) for policy in self._held_out]
@@ -223,28 +221,30 @@ class Comparison:
         for k, j in combinations(range(len(own)), 2):
             shown = [one for one, by in ((k, j), (j, k)) if self._may_show(by, one)]
             if shown:
-                variance = SHARE_OF_JACKKNIFE * _jackknife(centred[k] - centred[j])
-                bias[shown] = np.maximum(bias[shown], float(((own[k] - own[j]) ** 2).sum()) - variance)
+                apart, variance = float(((own[k] - own[j]) ** 2).sum()), _jackknife(centred[k] - centred[j])
+                if apart > variance:
+                    bias[shown] = np.maximum(bias[shown], apart - SHARE_OF_JACKKNIFE * variance)
         return bias
 
     def _may_show(self, one: int, other: int) -> bool:
-        """Whether the first has less bias than the second, or as little as any, and is not refuted by it.
+        """Whether the first has less bias than the second, or as little as any, is stable, and not refuted by it.
 
         Whoever knows more of the constraints than the second was compared before, see :attr:`as_consistent`.
         """
         mine, its = self._candidates[one].softness, self._candidates[other].softness
-        return mine < 0.0 <= its or ((mine < its or mine == its <= 0.0) and not self._refuted[one, other])
+        stable = self._variance[one] < MOST_VARIANCE * self._samples.energy
+        return mine < 0.0 <= its or (
+            (mine < its or mine == its <= 0.0) and bool(stable) and not self._refuted[one, other]
+        )
 
     @cached_property
     def _refuted(self) -> NDArray[np.bool_]:
         """Whether each is less consistent than each other where held out, (K, K).
 
-        With the weights of the loss, or with ‖u‖², which noise calls for and people who vary do not. Differences that
-        are less than any model's misfit say nothing unless one loss is a multiple of the other.
+        Differences that are less than any model's misfit say nothing unless they are beyond chance, or one loss is a
+        multiple of the other.
         """
-        return np.asarray(
-            _less_consistent(self._losses / self._samples.energy) | _less_consistent(self._losses_of_noise)
-        )
+        return np.asarray(_less_consistent(self._losses / self._samples.energy))
 
     @cached_property
     def _predictions(self) -> tuple[Array, Array]:
@@ -285,10 +285,11 @@ def leverage(samples: Samples) -> Array:
 
 
 def _less_consistent(losses: Array) -> NDArray[np.bool_]:
-    """Whether each candidate's loss (K, G) is larger than each other's, and not negligibly, (K, K)."""
+    """Whether each candidate's loss (K, G) is larger than each other's, and not negligibly or beyond chance, (K, K)."""
+    gap, error = _gaps(losses)
     whole = losses.sum(axis=1)
-    gap = whole[:, None] - whole
-    return np.asarray((gap > NEGLIGIBLE_LOSS) | (whole[:, None] > NEGLIGIBLE_RATIO * np.maximum(whole, 1e-9)))
+    times = whole[:, None] > NEGLIGIBLE_RATIO * np.maximum(whole, 1e-9)
+    return np.asarray((gap > NEGLIGIBLE_LOSS) | times | (gap > BEYOND_CHANCE * np.maximum(error, TINY)))
 
 
 def _gaps(losses: Array) -> tuple[Array, Array]:

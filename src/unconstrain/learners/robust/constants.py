@@ -129,11 +129,26 @@ On those 726 data sets the mean was 1.233 without, 1.224 with four and 1.222 wit
 nearly dependent features gained. With two, free movements without noise were learnt by the most unstable candidate.
 """
 
+BEYOND_CHANCE = 2.0
+"""Or unless it is larger by more than so many standard errors, however little that is.
+
+On the 230 data sets of :data:`MOST_VARIANCE` the mean was 1.190 without, 1.185 with two or three and 1.189 with one,
+and of free movements without noise 1.50, 1.08 and 1.08 on the limit cycle.
+"""
+
 TIED = 0.5
 """Softened candidates are as good as the best of them if their risk is within so many such standard errors of it.
 
 The same mean with none, a half and one: 1.078, 1.077, 1.078. Single recorded sets are better with a half. With what
 demonstrations show that were held all the time, over 32 kinds (345 data sets): 1.163 with none, 1.162 with a half.
+"""
+
+MOST_VARIANCE = 20.0
+"""Candidates whose variance is more than so many times the mean squared action show no bias of others.
+
+On 229 data sets of 59 kinds, among them what nothing constrains, without noise, the geometric mean of the squared
+error over that of the best candidate was 1.26 without, 1.18 with 20 and with 10, and the worst 140,000 and 10; the arm
+with six rows held is worse with 10. All with a distance of more than its variance, which without it are 1.21 with 20.
 """
 
 SHARE_OF_JACKKNIFE = 0.5
