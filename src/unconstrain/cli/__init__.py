@@ -356,7 +356,7 @@ def rollout(
     if as_json:
         rows = None if output != "-" else _rows(path).tolist()
         click.echo(json.dumps({"columns": columns, "rows": rows, "output": output, "verdict": verdict.to_json()}))
-    elif output != "-" or verdict.doubt:
+    elif trouble is None and (output != "-" or verdict.doubt):
         say_verdict(verdict, err=output == "-")
     if trouble is not None:
         raise trouble
