@@ -25,6 +25,7 @@ from seen import below
 from unconstrain import cli, storage
 from unconstrain.base.errors import MissingExtraError
 from unconstrain.cli import fitting
+from unconstrain.evaluation.verdicts import WITHOUT_SUPPORT
 from unconstrain.paper import experiments
 from unconstrain.paper import pages as report
 from unconstrain.paper.experiments import table1, washing
@@ -585,7 +586,7 @@ def test_rollout_writes_what_it_would_print(policy, tmp_path):
     printed = run("rollout", policy, "--start", "0.5,0", "--steps", 5)
     assert run("rollout", policy, "--start", "0.5,0", "--steps", 5, "-o", "-") == printed
     said = run("rollout", policy, "--start", "0.5,0", "--steps", 5, "-o", tmp_path / "path.csv")
-    assert said.endswith(f"\nmovement: {tmp_path / 'path.csv'}\n")
+    assert said == "\n".join([*WITHOUT_SUPPORT.lines(), "", f"movement: {tmp_path / 'path.csv'}", ""])
     assert (tmp_path / "path.csv").read_text() == printed
 
 
@@ -1069,7 +1070,9 @@ def test_an_interrupted_run_goes_on_where_it_stopped(table1_of_two, tmp_path, mo
     kept = tmp_path / ".table1.trials"
     assert (ended.code, ended.out) == (130, "")
     said = f"Error: interrupted. What was finished is kept in {kept}; the same command goes on from there.\n"
-    assert ended.err.endswith(said)  # after progress, where it took long
+    *progress, last = ended.err.splitlines(keepends=True)
+    assert last == said
+    assert all(re.fullmatch(r"table1: \d of 4 \.\.\. \(\d+ s\)\n", line) for line in progress)  # where it took long
     assert kept.exists()
     assert not (tmp_path / "table1.json").exists()
     monkeypatch.setattr(table1, "trial", lambda *args: calls.append(args) or whole(*args))

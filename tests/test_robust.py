@@ -511,9 +511,8 @@ def test_what_takes_minutes_is_said_with_what_takes_seconds(monkeypatch):
 
 
 def test_a_candidate_that_follows_rounding_is_not_taken_where_nothing_was_constrained():
-    seed = np.random.SeedSequence(1).spawn(8)[6]
-    name = sum(ord(letter) * (place + 1) for place, letter in enumerate("pendulum none"))
-    demos, test = regimes.demonstrate("pendulum", "none", np.random.default_rng([name, *seed.generate_state(4)]))
+    numbers = regimes.numbers_of("pendulum", "none", np.random.SeedSequence(1).spawn(8)[6])
+    demos, test = regimes.demonstrate("pendulum", "none", numbers)
     policy = regimes._policy("pendulum").set_params(learner=uc.Robust()).fit_demonstrations(demos)
     assert uc.nupe(policy, test) < 10 * uc.nupe(policy.with_learner(uc.Direct()), test)
     unstable = [one for one in policy.solution_.candidates.values() if one.variance > 20.0]

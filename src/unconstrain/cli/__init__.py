@@ -269,9 +269,8 @@ def score(
     verdict = uc.evaluation.verdicts.of_score(1.0 - whole["ninc"], len(demonstrations), under, count)
     verdict, run = replayed(verdict, learnt, demonstrations, recipe, held, recordings[0].units)
     if as_json:
-        told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known, "replayed": run}
-        told |= {"verdict": verdict.to_json()}
-        click.echo(json.dumps(told, indent=2))
+        told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known}
+        click.echo(json.dumps({**told, "replayed": run, "verdict": verdict.to_json()}, indent=2))
         return
     say_verdict(verdict)
     rows.append(whole)
@@ -493,9 +492,7 @@ def _supported(
         untold = uc.evaluation.diagnosis.untold(policy, path)
         found = ended or verdicts.of_support(policy.support(path.states), path.times, untold)
     except SettingError:
-        said = "How near demonstrations are cannot be told: this model has no support, it goes on everywhere."
-        then = "Compare it with what was demonstrated; 'unconstrain fit --model local' learns a policy that knows."
-        found = verdicts.Verdict(verdicts.Mark.DOUBTFUL, said, next=then)
+        found = verdicts.WITHOUT_SUPPORT
     found = found._replace(said=f"{found.said}{held}")
     if not obstacles:
         return found

@@ -277,9 +277,9 @@ def _say(learnt: Mapping[str, uc.LearntConstraint], what: str, named: Named | No
         _say_one(learnt[""], what)
     else:
         click.echo("Each demonstration has its own: one constraint for all misses more where held out.")
-    for sentence in named.sentences if named is not None else ():
-        click.echo(sentence)
     if named is not None:
+        for sentence in named.sentences:
+            click.echo(sentence)
         click.echo(
             "That names the positions; rollout --constraint follows the directions that were learnt, as said first."
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import unconstrain as uc
@@ -66,49 +67,46 @@ def replays(policy: uc.Policy, demos: Sequence[uc.Demonstration], recipe: uc.Rec
     clocks = [np.asarray(one.times, np.float64) for one in chosen]
     lasted = [float(times[-1] - times[0]) for times in clocks]
     dt = max(float(np.median(np.diff(clocks[0]))), max(lasted) / STEPS)
-    rows = [_normals(one.states) for one in chosen]
+    shapes = [_spread(one.states) for one in chosen]
+    normals = [axes * (spread < FLAT * spread[0])[:, None] for spread, axes in shapes]
     task = held.target if isinstance(held, uc.LearntConstraint) and held.task else None
     starts, steps = np.array([one.states[0] for one in chosen]), round(max(lasted) / dt) + 1
     with shown("running it from the same starts"):
         try:
-            runs = uc.rollout(policy, starts, steps, dt, held or rows, task=task, least_support=0.0)
+            own = [partial(_same, rows) for rows in normals] if held is None else held
+            runs = uc.rollout(policy, starts, steps, dt, own, task=task, least_support=0.0)
         except DivergedError:
             return [Replay(np.inf, np.nan, np.inf, True)]
     cut = [run.states[: round(seconds / dt) + 1] for run, seconds in zip(runs, lasted, strict=True)]
-    known = [held is not None or bool(one.directions.any()) for one in rows]
-    return [_compared(one.states, run, is_held) for one, run, is_held in zip(chosen, cut, known, strict=True)]
+    return [
+        _compared(one.states, run, axes[:2], held is not None or bool(rows.any()))
+        for one, run, (_, axes), rows in zip(chosen, cut, shapes, normals, strict=True)
+    ]
 
 
-class _Rows:
-    """The same rows everywhere."""
+def _same(rows: Any, states: Any, _times: Any) -> Any:
+    """A constraint of the same rows everywhere."""
+    import numpy as np
 
-    def __init__(self, directions: Any) -> None:
-        self.directions = directions
-
-    def __call__(self, states: Any, times: Any) -> Any:
-        import numpy as np
-
-        return np.broadcast_to(self.directions, (len(states), *self.directions.shape))
+    return np.broadcast_to(rows, (len(states), *rows.shape))
 
 
-def _normals(states: Any) -> _Rows:
-    """Directions in which a demonstration hardly spreads, (n, n); rows of zeros for the others."""
+def _spread(states: Any) -> tuple[Any, Any]:
+    """How far states (T, n) spread, most first (n,), and along which directions, in rows (n, n); zeros beyond T."""
     import numpy as np
 
     _, spread, axes = np.linalg.svd(states - states.mean(axis=0), full_matrices=False)
-    rows = np.zeros((states.shape[1],) * 2)
-    rows[: len(axes)] = axes * (spread < FLAT * spread[0])[:, None]
-    return _Rows(rows)
+    beyond = states.shape[1] - len(axes)
+    return np.pad(spread, (0, beyond)), np.pad(axes, ((0, beyond), (0, 0)))
 
 
-def _compared(shown_: Any, run: Any, held: bool) -> Replay:
+def _compared(shown_: Any, run: Any, plane: Any, held: bool) -> Replay:
+    """As seen along two directions in rows, (2, n)."""
     import numpy as np
     from scipy.spatial import cKDTree
 
-    centre = shown_.mean(axis=0)
-    axes = np.linalg.svd(shown_ - centre, full_matrices=False)[2][:2]
     size = [float(np.sqrt(one.var(axis=0).sum())) for one in (shown_, run)]
-    turns = [_turns((one - one.mean(axis=0)) @ axes.T) for one in (shown_, run)]
+    turns = [_turns((one - one.mean(axis=0)) @ plane.T) for one in (shown_, run)]
     pace = turns[1] / turns[0] if abs(turns[0]) >= 1 else np.nan
     return Replay(size[1] / size[0], float(pace), float(cKDTree(shown_).query(run)[0].mean()), held)
 

@@ -199,6 +199,14 @@ def of_constraint(learnt: LearntConstraint, *others: LearntConstraint) -> Verdic
     return Verdict(mark, said, "What was held, near recorded states.", f"{doubt}. {still}" if doubt else still, then)
 
 
+WITHOUT_SUPPORT = Verdict(
+    Mark.DOUBTFUL,
+    "How near demonstrations are cannot be told: this model has no support, it goes on everywhere.",
+    next="Compare it with what was demonstrated; 'unconstrain fit --model local' learns a policy that knows.",
+)
+"""Of a movement of an affine or polynomial policy."""
+
+
 def of_support(support: Array, times: Array | None, unknown: Array | None = None) -> Verdict:
     """Judge a movement of a policy by how near data is along it, (T,) each; times are steps where not known.
 

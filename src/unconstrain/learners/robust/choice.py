@@ -21,6 +21,7 @@ others of less bias, j, as Goldenshluger and Lepski do (*Annals of Statistics*
 
 over those j from which it is farther than by chance, E ‖π̃_k − π̃_j‖² being more
 than that variance.
+
 Softened hybrids (eq. 6 with ``E_i + s E_2``) have the less bias the smaller
 their softness s; s is infinite for direct regression, and that of their prior
 for learners that minimise another error of consistency beside a prior of the
@@ -244,7 +245,7 @@ class Comparison:
         Differences that are less than any model's misfit say nothing unless they are beyond chance, or one loss is a
         multiple of the other.
         """
-        return np.asarray(_less_consistent(self._losses / self._samples.energy))
+        return _less_consistent(self._losses / self._samples.energy)
 
     @cached_property
     def _predictions(self) -> tuple[Array, Array]:

@@ -7,6 +7,7 @@ actions without noise. No learner that is judged here may take differences of st
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -135,8 +136,7 @@ def trial(
     settings: Settings, system: str, constraint: str, seed: np.random.SeedSequence
 ) -> list[dict[str, tuple[float, ...]]]:
     """Learn from one data set; for each noise level, what is found of each method, see :data:`_COLUMNS`."""
-    name = sum(ord(letter) * (place + 1) for place, letter in enumerate(f"{system} {constraint}"))
-    rng = np.random.default_rng([name, *seed.generate_state(4)])
+    rng = numbers_of(system, constraint, seed)
     training, test = demonstrate(system, constraint, rng)
     found = []
     for noise in settings.noise:
@@ -159,6 +159,12 @@ def trial(
         of_noise[KNOWN] = _knowing(policy, noisy, test)
         found.append(of_noise)
     return found
+
+
+def numbers_of(system: str, constraint: str, seed: np.random.SeedSequence) -> np.random.Generator:
+    """The random numbers of one data set of a regime."""
+    name = sum(ord(letter) * (place + 1) for place, letter in enumerate(f"{system} {constraint}"))
+    return np.random.default_rng([name, *seed.generate_state(4)])
 
 
 def demonstrate(
@@ -359,7 +365,7 @@ def _compared(name: str, policy: uc.Policy, learner: uc.Learner) -> uc.Policy:
     found = policy.solution_.candidates.get(name)
     if found is None:
         return policy.with_learner(learner)
-    own = policy.with_learner(uc.Direct())
+    own = copy(policy)
     own.solution_ = replace(policy.solution_, weights=found.weights, method=name)
     return own
 
