@@ -78,6 +78,13 @@ def test_ovals_of_another_size_or_pace_are_no_good_however_much_they_explain(fol
     assert words in verdict.said
 
 
+def test_a_policy_that_leaves_the_finite_numbers_does_not_pass_in_silence(folder):
+    verdict, found = judged(folder, pace=-500.0)
+    assert found is None
+    assert verdict.mark is Mark.DOUBTFUL
+    assert "But run from the same starts it leaves the finite numbers." in verdict.said
+
+
 def test_a_score_says_that_what_was_learnt_is_too_slow(folder):
     found = score(folder, "slow")
     assert found["replayed"]["pace"] == pytest.approx(0.7, rel=0.15)

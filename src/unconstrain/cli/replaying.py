@@ -42,7 +42,10 @@ def replayed(
     """Judge by those whose constraint is known, too; and their medians, None where there are none."""
     import numpy as np
 
-    runs = replays(policy, demos, recipe, held)
+    try:
+        runs = replays(policy, demos, recipe, held)
+    except DivergedError:
+        return uc.evaluation.verdicts.of_divergence(found), None
     known = [one for one in runs if one.held]
     if not known:
         unknown = " Its size and pace over time: not compared, as what held these recordings is not known."
@@ -57,7 +60,13 @@ def replayed(
 
 
 def replays(policy: uc.Policy, demos: Sequence[uc.Demonstration], recipe: uc.Recipe, held: Any = None) -> list[Replay]:
-    """Compare at most twenty demonstrations; none where actions are not known to be velocities of Euclidean states."""
+    """Compare at most twenty demonstrations; none where actions are not known to be velocities of Euclidean states.
+
+    Raises
+    ------
+    DivergedError
+        If a run leaves the finite numbers.
+    """
     import numpy as np
 
     chosen = [one for one in demos if one.times is not None and len(one) > 2 and np.ptp(one.states, axis=0).any()]
@@ -72,11 +81,8 @@ def replays(policy: uc.Policy, demos: Sequence[uc.Demonstration], recipe: uc.Rec
     task = held.target if isinstance(held, uc.LearntConstraint) and held.task else None
     starts, steps = np.array([one.states[0] for one in chosen]), round(max(lasted) / dt) + 1
     with shown("running it from the same starts"):
-        try:
-            own = [partial(_same, rows) for rows in normals] if held is None else held
-            runs = uc.rollout(policy, starts, steps, dt, own, task=task, least_support=0.0)
-        except DivergedError:
-            return [Replay(np.inf, np.nan, np.inf, True)]
+        own = [partial(_same, rows) for rows in normals] if held is None else held
+        runs = uc.rollout(policy, starts, steps, dt, own, task=task, least_support=0.0)
     cut = [run.states[: round(seconds / dt) + 1] for run, seconds in zip(runs, lasted, strict=True)]
     return [
         _compared(one.states, run, axes[:2], held is not None or bool(rows.any()))

@@ -256,9 +256,18 @@ def of_replays(found: Verdict, extents: Array, paces: Array, apart: str) -> Verd
     worst = max(off, key=lambda name: off[name])
     if off[worst] <= OTHERWISE:
         return found._replace(said=f"{found.said} R{ran}.")
+    return _strays(found, f"r{ran}: {worst} of half of them is off by {off[worst] - 1:.0%} or more")
+
+
+def of_divergence(found: Verdict) -> Verdict:
+    """Add to a verdict that a policy leaves the finite numbers where demonstrations start."""
+    return _strays(found, "run from the same starts it leaves the finite numbers")
+
+
+def _strays(found: Verdict, how: str) -> Verdict:
     return found._replace(
         mark=Mark.BAD if found.mark is Mark.BAD else Mark.DOUBTFUL,
-        said=f"{found.said} But r{ran}: {worst} of half of them is off by {off[worst] - 1:.0%} or more.",
+        said=f"{found.said} But {how}.",
         doubt=f"Its size or pace over time. {found.doubt}".rstrip(),
         next="Look at it ('unconstrain look'); learn from more demonstrations, or with another --window or --model.",
     )
