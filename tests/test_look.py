@@ -1,5 +1,8 @@
 """The page of demonstrations: in space, in time, with a policy and a constraint; in Chromium."""
 
+import json
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -27,6 +30,15 @@ def wipes(count=4, samples=120, dimensions=3):
         table = np.column_stack([time, *columns[:dimensions]])
         files.append(np.delete(table, slice(60, 80), axis=0) if index == 1 else table)
     return files
+
+
+def bent():
+    """Ovals on a plate that is bent along its middle: one half is always level, the other in each at another tilt."""
+    rng, times = np.random.default_rng(0), np.arange(0, 8, 0.02)
+    for tilt in np.linspace(-1.0, 1.0, 6):
+        x, y = 0.8 * np.cos(1.5 * times + tilt), 0.4 * np.sin(1.5 * times + tilt)
+        track = np.column_stack([x, y, tilt * np.maximum(x, 0.0)])
+        yield np.column_stack([times, track + 1e-3 * rng.standard_normal(track.shape)])
 
 
 @pytest.fixture(scope="module")
@@ -113,6 +125,51 @@ def test_the_roll_out_in_the_page_is_that_of_python(folder, page):
     along = np.column_stack([np.interp(expected.times[::4], times, column) for column in track.T])
     assert_allclose(along, expected.states[::4], atol=0.03)
     assert_allclose((track - track[0]) @ plane.normal, 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "policy",
+    [uc.LocallyLinearPolicy(), uc.ParametricPolicy(uc.KMeansRBF(6)), uc.ParametricPolicy(uc.Polynomial(2))],
+    ids=["local", "rbf", "quadratic"],
+)
+def test_what_no_recording_tells_is_what_python_says(browser, tmp_path, policy):
+    demos = [uc.Demonstration(one[:, 1:], np.gradient(one[:, 1:], one[:, 0], axis=0), one[:, 0]) for one in bent()]
+    policy.learner = uc.NoiseCorrected()
+    policy.fit_demonstrations(demos)
+    path, states = tmp_path / "look.html", demos[0].states[::20] * 1.3
+    path.write_text(look_page(demos, NAMES, "told", policy=policy), "utf-8")
+    way = np.array([0.6, 0.0, 0.8])
+    left = np.broadcast_to(np.eye(3) - np.outer(way, way), (len(states), 3, 3))
+    for page in opened(browser, path):
+        for normal, projections in ((None, None), (way.tolist(), left)):
+            script = "return arguments[0].map((state) => untold.at(state, arguments[1]))"
+            found = page.execute_script(script, states.tolist(), normal)
+            expected = uc.evaluation.diagnosis.untold_at(policy, states, 1.0, projections)
+            assert_allclose(found, expected, rtol=1e-3)
+            assert any(expected)
+
+
+def test_commands_and_pages_say_the_same_share_of_the_same_files(browser, tmp_path):
+    for k, table in enumerate(bent()):
+        np.savetxt(tmp_path / f"{k}.csv", table, delimiter=",", header="t,x,y,z", comments="")
+    files = sorted(tmp_path.glob("?.csv"))
+    run("fit", *files, "--state", "x,y,z", "--differentiate", "-o", tmp_path / "p.npz")
+    looked = call("look", *files, tmp_path / "p.npz", "-o", tmp_path / "look.html").out
+    share = re.search(r"at (\d+%) of the recorded states no recording tells the policy", " ".join(looked.split()))[1]
+    determined = json.loads(run("diagnose", *files, "--state", "x,y,z", "--differentiate", "--json"))[
+        "states_determined"
+    ]
+    assert share == f"{1 - determined:.0%}"
+    for told in (run("info", tmp_path / "p.npz"), run("export", tmp_path / "p.npz", "-o", tmp_path / "p.c")):
+        assert f"at {share} of the recorded states no recording tells the policy" in " ".join(told.split())
+    start = ",".join(map(str, np.loadtxt(files[0], delimiter=",", skiprows=1)[0, 1:]))
+    how = ("--start", start, "--dt", 0.02, "--steps", 400, "--method", "rk4", "-o", tmp_path / "path.csv")
+    rolled = " ".join(run("rollout", tmp_path / "p.npz", *how).split())
+    for page in opened(browser, tmp_path / "look.html"):
+        said = text(page, "policy-says").replace(" %", "%")
+    shares = [re.search(r"(\d+)% of the time", one) for one in (rolled, said)]
+    assert 5 < int(shares[0][1]) < 95
+    assert abs(int(shares[0][1]) - int(shares[1][1])) <= 2
 
 
 def test_the_start_is_dragged_and_the_scene_is_turned(page):

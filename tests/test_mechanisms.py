@@ -1,5 +1,6 @@
 """Mechanisms with names: found in movements, with odds and intervals that can be trusted."""
 
+import json
 import re
 
 import numpy as np
@@ -10,6 +11,7 @@ import unconstrain as uc
 from recorded import DATA, needs_rim
 from unconstrain.base.errors import InvalidDataError
 from unconstrain.constraints import identify
+from unconstrain.constraints.mechanisms import restored
 from unconstrain.constraints.mechanisms.kinds import Circle, Cylinder, Line, Plane, Point, Screw, Sphere
 from unconstrain.constraints.mechanisms.mechanism import frame_of, on_one_side
 from unconstrain.constraints.mechanisms.tied import Hinge, Slider, TurningScrew
@@ -42,6 +44,21 @@ def arc(degrees, samples=400, radius=0.71, seed=0):
     angle = np.radians(degrees) / 2 * np.sin(np.linspace(0, 7, samples))
     exact = [0.41, -0.12] + radius * np.column_stack([np.cos(angle), np.sin(angle)])
     return exact + noise(exact.shape, seed)
+
+
+@pytest.mark.parametrize("mechanism", PLACED.values(), ids=PLACED)
+def test_a_mechanism_is_the_same_after_a_way_through_a_file(mechanism):
+    again = restored(json.loads(json.dumps(mechanism.numbers())))
+    states = AT + noise((20, 3), size=1.0)
+    assert type(again) is type(mechanism)
+    assert_allclose(again(states, np.zeros(20)), mechanism(states, np.zeros(20)), atol=1e-15)
+    assert again.rank == np.linalg.matrix_rank(mechanism(states[:1], np.zeros(1))[0])
+
+
+@pytest.mark.parametrize("change", [{"kind": "door"}, {"centre": "here"}, {"radius": None}, {"frame": [[1], [2, 3]]}])
+def test_what_is_no_mechanism_is_refused(change):
+    with pytest.raises(InvalidDataError, match="is none that 'unconstrain constraint' wrote"):
+        restored(PLACED["Circle"].numbers() | change)
 
 
 @pytest.mark.parametrize("mechanism", PLACED.values(), ids=PLACED)

@@ -1,14 +1,17 @@
 """What a newcomer is told about how a policy moves: size and pace beside what was demonstrated, planes, support."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 
 import unconstrain as uc
+from seen import opened
 from test_cli import run, write
-from unconstrain.cli.replaying import replayed
 from unconstrain.evaluation.verdicts import Mark, Verdict, of_replays
+from unconstrain.pages.fit import policy_page
+from unconstrain.pages.replays import replayed
 
 MM = dict.fromkeys("xyz", "mm")
 HEAD = "t [s],x [mm],y [mm],z [mm]"
@@ -58,7 +61,7 @@ def score(folder, name):
 def judged(folder, **how):
     recipe = uc.Recipe(states=("x", "y", "z"), differentiate="savgol")
     demos = uc.prepare(uc.read(str(folder / "held_*.csv")), recipe)
-    return replayed(Verdict(Mark.GOOD, "Explains 98% of it: good."), Ovals(**how), demos, recipe, None, MM)
+    return replayed(Verdict(Mark.GOOD, "Explains 98% of it: good."), Ovals(**how), demos, recipe, None, MM)[:2]
 
 
 NEARLY = [{}, {"size": 1.1}, {"pace": 0.9}]
@@ -76,6 +79,27 @@ def test_ovals_of_another_size_or_pace_are_no_good_however_much_they_explain(fol
     assert found["pace"] == pytest.approx(how.get("pace", 1.0), **near)
     assert verdict.mark is mark
     assert words in verdict.said
+
+
+@pytest.mark.parametrize("size", [1.0, 1.4])
+def test_the_page_of_a_fit_shows_and_says_how_large_its_ovals_are(folder, browser, tmp_path, size):
+    recipe = uc.Recipe(states=("x", "y", "z"), differentiate="savgol")
+    demos = uc.prepare(uc.read(str(folder / "held_*.csv")), recipe)
+    policy = uc.load(folder / "same.npz")
+    policy.predict = Ovals(size=size)
+    page = policy_page(policy, demos, "Ovals", recipe, MM)
+    assert len(page) <= 300_000
+    assert "replays" in [one["id"] for one in opened(browser, page, tmp_path)]
+    above = browser.find_element("xpath", "//h2[.='From where demonstrations start']/following-sibling::p").text
+    assert float(re.search(r"size ([\d.]+) times", above)[1]) == pytest.approx(size, abs=0.1)
+    assert " mm away on average" in above
+    assert "no motion along directions" in browser.find_element("id", "replays").text
+    sign = browser.find_element("css selector", ".verdict").text[0]
+    assert sign == ("✔" if size == 1.0 else "!")
+    box = "const all = [...document.querySelectorAll(`#replays svg [data-key=${arguments[0]}]`)].map(g => g.getBBox());"
+    box += "return Math.max(...all.map(b => b.x + b.width)) - Math.min(...all.map(b => b.x));"
+    done, run_ = (browser.execute_script(box, key) for key in ("training", "hybrid"))
+    assert run_ / done == pytest.approx(size, abs=0.15)
 
 
 def test_a_policy_that_leaves_the_finite_numbers_does_not_pass_in_silence(folder):
@@ -113,3 +137,82 @@ def test_strokes_that_are_too_large_are_not_outweighed_by_others_that_are_too_sm
     assert found.mark is Mark.DOUBTFUL
     assert "size 1.00 times" in found.said
     assert "size of half of them is off by 50% or more" in found.said
+
+
+DOOR = "t [s],x [m],y [m],z [m]"
+
+
+def swing(number, begin=0.2):
+    """Times and positions of a door's handle, 0.8 m from its hinge, with 0.4 mm of noise."""
+    rng, times = np.random.default_rng(number), np.arange(0, 4, 0.02)
+    angles = begin + 0.9 * (1 - np.cos(np.pi * times / 4))
+    arc = np.column_stack([0.8 * np.cos(angles), 0.8 * np.sin(angles), 0 * angles + 0.9])
+    return np.column_stack([times, arc + rng.normal(0, 4e-4, arc.shape)])
+
+
+@pytest.fixture(scope="module")
+def door(tmp_path_factory):
+    """Three swings, the constraint that was learnt, and a policy; what was said."""
+    place = tmp_path_factory.mktemp("door")
+    files = [write(place / f"{k}.csv", DOOR, swing(k, 0.2 * k)) for k in range(3)]
+    columns = ("--state", "x,y,z", "--differentiate")
+    said = run("constraint", *files, *columns, "-o", place / "c.npz", "--report", place / "c.html")
+    run("fit", *files, *columns, "--learner", "hybrid", "-o", place / "p.npz")
+    return place, " ".join(said.split())
+
+
+def test_a_hinge_holds_two_directions_wherever_it_is_spoken_of(door):
+    place, said = door
+    assert said.startswith("✔ 1 of 3 directions were held")
+    for told in (said, " ".join(run("info", place / "c.npz").split()), (place / "c.html").read_text("utf-8")):
+        assert "The positions keep to a circle (hinge), 2 of 3 held: the first counts what" in told
+        assert "Mechanism: a circle (hinge) about" in told or "mechanism a circle (hinge) about" in told
+
+
+def test_a_roll_out_keeps_to_the_mechanism_that_was_named(door, tmp_path):
+    place, said = door
+    assert "rollout --constraint and score --constraint hold to that mechanism" in said
+    start = swing(0)[0, 1:]
+    how = ("--start", ",".join(map(str, start)), "--method", "rk4", "-o", tmp_path / "path.csv")
+    told = run("rollout", place / "p.npz", "--constraint", place / "c.npz", *how)
+    assert "A circle (hinge) passes through the start." in " ".join(told.split())
+    path = np.loadtxt(tmp_path / "path.csv", delimiter=",", skiprows=1)[:, 1:4]
+    assert np.ptp(np.arctan2(path[:, 1], path[:, 0])) > 0.5
+    np.testing.assert_allclose(np.hypot(path[:, 0], path[:, 1]), np.hypot(*start[:2]), atol=1e-3)
+    np.testing.assert_allclose(path[:, 2], start[2], atol=2e-3)
+
+
+def test_one_swing_may_be_a_habit_and_then_the_directions_learnt_are_followed(door, tmp_path):
+    place, _ = door
+    said = run("constraint", place / "0.csv", "--state", "x,y,z", "--differentiate", "-o", tmp_path / "c.npz")
+    assert "positions may keep to a circle (hinge), 2 of 3 held" in " ".join(said.split())
+    assert "rollout --constraint follows the directions that were learnt" in said
+    assert "held by" not in uc.storage.load_notes(tmp_path / "c.npz")
+
+
+def test_the_file_of_one_demonstration_says_so_and_is_drawn_on_it_alone(tmp_path):
+    tilted = [oval(k) @ (np.eye(4) + (k - 1) * np.outer([0, 0.5, 0, 0], [0, 0, 0, 1])) for k in range(3)]
+    files = [write(tmp_path / f"wipe_{k}.csv", HEAD, one) for k, one in enumerate(tilted)]
+    run("constraint", *files, "--state", "x,y,z", "--differentiate", "-o", tmp_path / "plate.npz")
+    told = json.loads(run("info", tmp_path / "plate_wipe_1.npz", "--json"))
+    assert told["of"] == ["wipe_1"]
+    assert told["mechanism"].startswith("a plane through")
+    one = tmp_path / "look.html"
+    assert "constraint: of wipe_1, and drawn there alone" in run(
+        "look", *files, tmp_path / "plate_wipe_1.npz", "-o", one
+    )
+    shown = json.loads(re.search(r"const shown = (.*);\n", one.read_text("utf-8"))[1])
+    places = np.array([one["at"] for one in shown["patches"]])
+    recorded = uc.prepare(uc.read(files[1]), uc.Recipe(states=("x", "y", "z"), differentiate="savgol"))[0].states
+    assert np.abs(places[:, None] - recorded).max(axis=2).min(axis=1).max() < 1e-9
+    run("look", files[0], files[2], tmp_path / "plate_wipe_1.npz", "-o", one, "--force")
+    assert json.loads(re.search(r"const shown = (.*);\n", one.read_text("utf-8"))[1])["patches"] == []
+
+
+def test_a_policy_of_some_strokes_says_of_which(folder, tmp_path):
+    files = sorted(folder.glob("held_*.csv"))
+    columns = ("--state", "x,y,z", "--differentiate", "--learner", "hybrid")
+    run("fit", *files[:2], *columns, "-o", tmp_path / "p.npz")
+    assert json.loads(run("info", tmp_path / "p.npz", "--json"))["learnt from"] == ["held_3", "held_4"]
+    said = run("look", *files, tmp_path / "p.npz", "-o", tmp_path / "look.html")
+    assert "policy: learnt from 2 of these 3 demonstrations, held_3, held_4." in said

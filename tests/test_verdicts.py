@@ -70,8 +70,8 @@ class TestMarks:
         assert found.mark is Mark.DOUBTFUL
         assert "no verdict" in found.said
         assert not any(word in found.said for word in ("good", "fair", "poor"))
-        assert "shown by" not in verdicts.of_explained(share, count, 0.5).doubt
-        assert "50% of the weight directions are shown by fewer" in verdicts.of_explained(share, 3, 0.5).doubt
+        assert "of the recorded states" not in verdicts.of_explained(share, count, 0.5).doubt
+        assert "at 50% of the recorded states no recording tells" in verdicts.of_explained(share, 3, 0.5).doubt
 
     @given(st.text(max_size=300), st.text(max_size=300))
     def test_lines_fit_a_terminal_and_say_everything(self, said, trust):

@@ -42,7 +42,7 @@ from .fitting import (
     options_for_model,
     policy_of,
 )
-from .informing import info, learnt_from, provenance
+from .informing import TOLD, info, learnt_from, provenance
 from .looking import look, play
 from .printing import (
     Group,
@@ -72,7 +72,6 @@ from .reading import (
     stream_of,
     typed,
 )
-from .replaying import replayed
 from .writing import check_name, check_outputs, option_for_force
 
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
@@ -216,7 +215,8 @@ def fit(
         say_scale(fitted, stream.recipe)
         say_fit(fitted, stream, judged, learner, verbose)
     refuse_warnings(reading["strict"])
-    uc.save(fitted, output, provenance(paths, stream.recipe, stream.first, **reading))
+    told = {TOLD: uc.evaluation.diagnosis.states_told(fitted)}
+    uc.save(fitted, output, provenance(paths, stream.recipe, stream.first, **reading) | told)
     written = {"policy": output} | _reported(fitted, stream, report, Path(output).stem)
     say_written(written, judged.to_json() if as_json else None)
 
@@ -228,7 +228,7 @@ def _reported(policy: uc.Policy, stream: uc.Stream, report: str | None, title: s
     from ..pages.fit import policy_page
 
     with shown("drawing"):
-        write(report, policy_page(policy, stream.beginning(), title, *stream.recipe.labels(stream.first.units)))
+        write(report, policy_page(policy, stream.beginning(), title, stream.recipe, stream.first.units))
     return {"report": report}
 
 
@@ -249,6 +249,8 @@ def score(
 
     They are read and prepared as the training data of the policy was, but for what options say.
     """
+    from ..pages.fit import replayed
+
     learnt, notes = fitted_policy(policy), uc.storage.load_notes(policy)
     demonstrations, recipe, recordings = prepared(files, reading, notes)
     refuse_warnings(reading["strict"])
@@ -267,12 +269,13 @@ def score(
     known = learnt_from(learnt, notes, recordings)
     count = None if known is None else len(known)
     verdict = uc.evaluation.verdicts.of_score(1.0 - whole["ninc"], len(demonstrations), under, count)
-    verdict, run = replayed(verdict, learnt, demonstrations, recipe, held, recordings[0].units)
+    with shown("running it from the same starts"):
+        found = replayed(verdict, learnt, demonstrations, recipe, held, recordings[0].units)
     if as_json:
         told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known}
-        click.echo(json.dumps({**told, "replayed": run, "verdict": verdict.to_json()}, indent=2))
+        click.echo(json.dumps({**told, "replayed": found.medians, "verdict": found.verdict.to_json()}, indent=2))
         return
-    say_verdict(verdict)
+    say_verdict(found.verdict)
     rows.append(whole)
     head = ["demonstration", "samples", "normalised inconsistency", *([] if held is None else ["nPOE", "nCPE"])]
     print_table(head, [[str(v) if not isinstance(v, float) else f"{v:.4g}" for v in one.values()] for one in rows])
@@ -345,7 +348,9 @@ def rollout(
     round_ = [_obstacle(given, len(start)) for given in obstacles]
     path, why, trouble = _as_far_as_it_goes(learnt, list(start), constraint=held, task=task, obstacles=round_, **how)
     named = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))
-    verdict = _supported(learnt, path, why, round_, "" if plane is None else " The plane passes through the start.")
+    kept = "the plane" if plane is not None else getattr(held, "title", "")
+    through = f" {kept[:1].upper()}{kept[1:]} passes through the start." if kept else ""
+    verdict = _supported(learnt, path, why, round_, through)
     accelerations = named.actions or tuple(f"a{name}" for name in (named.states or ())[:places])
     columns = ["t", *(named.states or ()), *(accelerations if how["order"] == 2 else named.directions)]
     if output != "-":

@@ -15,7 +15,7 @@ import unconstrain as uc
 from ..base.display import bare, listed
 from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
-from .informing import provenance
+from .informing import HELD_BY, OF, provenance
 from .printing import of_option, option_for_json, print_table, refuse_warnings, say_verdict, say_written
 from .progress import shown
 from .reading import numbers, options_for_reading, prepared, said_recipe
@@ -26,6 +26,9 @@ MOST_POSITIONS = 4000
 
 LENGTHS = ("", "m", "mm", "cm", "um", "km", "in", "ft")
 """Units of positions, and none."""
+
+FOLLOWED = "rollout --constraint and score --constraint hold to that mechanism, in parallel through the start."
+NOT_FOLLOWED = "rollout --constraint follows the directions that were learnt, as said first."
 
 FEATURES = ("auto", "constant", "affine", "quadratic", "rbf")
 
@@ -77,20 +80,33 @@ def constraint(
         click.echo(f"Note: {', '.join(recipe.angles)} as unwrapped: a turn more is another state to it.", err=True)
     outputs = {name: _of_demonstration(output, name) for name in learnt}
     check_outputs([place for name, place in outputs.items() if name], (*paths, jacobian), force)
-    verdict = uc.evaluation.verdicts.of_constraint(*learnt.values())
     named = mechanism_of(demonstrations, recipe, first) if jacobian is None else None
+    verdict = _judged(learnt, named)
     if not as_json:
         say_verdict(verdict)
         click.echo(f"Learnt from {said_recipe(recipe, first)}.")
         _say(learnt, "distance from it" if surface else "action", named)
-    notes = provenance(paths, recipe, first, **reading) | ({} if named is None else {"mechanism": named.found.summary})
+    notes = provenance(paths, recipe, first, **reading)
     for name, place in outputs.items():
-        uc.save(learnt[name], place, notes)
+        uc.save(learnt[name], place, notes | _of(name, named))
     written = {f"constraint of {name}" if name else "constraint": place for name, place in outputs.items()}
     if report is not None:
-        _report(report, learnt, demonstrations, recipe.labels(first.units)[0], named)
+        _report(report, learnt, demonstrations, recipe.labels(first.units)[0], named, verdict)
         written["report"] = report
     say_written(written, _told(learnt, verdict, named) if as_json else None)
+
+
+def _of(name: str, named: Named | None) -> dict[str, Any]:
+    """What a file notes of the demonstration that it is of, and of the mechanism."""
+    return ({OF: [name]} if name else {}) | ({} if named is None else named.notes(name))
+
+
+def _judged(learnt: Mapping[str, uc.LearntConstraint], named: Named | None) -> uc.evaluation.verdicts.Verdict:
+    """What was learnt, and what it is by name where that holds more."""
+    found, rank = uc.evaluation.verdicts.of_constraint(*learnt.values()), max(one.rank_ for one in learnt.values())
+    if named is None:
+        return found
+    return uc.evaluation.verdicts.of_mechanism(found, rank, named.found.mechanism, named.sure)
 
 
 def _report(
@@ -99,6 +115,7 @@ def _report(
     demonstrations: Sequence[uc.Demonstration],
     columns: Sequence[str],
     named: Named | None,
+    verdict: uc.evaluation.verdicts.Verdict,
 ) -> None:
     from ..pages.constraint import constraint_page
 
@@ -106,7 +123,7 @@ def _report(
     every = list(learnt.values())
     write(
         place,
-        constraint_page(every, demonstrations, Path(place).stem, columns, said, table_of(learnt, named, whole=True)),
+        constraint_page(every, demonstrations, Path(place).stem, columns, said, table_of(learnt, named, True), verdict),
     )
 
 
@@ -195,10 +212,11 @@ def held_of(
     found = learnt.choice_.columns, learnt.choice_.actions
     if found != (states, actions):
         raise SettingError(f"{path}: holds {found[1]} actions at {found[0]} states, expected {actions} at {states}.")
-    own = uc.Recipe.from_dict(uc.storage.load_notes(path).get("recipe", {}))
+    notes = uc.storage.load_notes(path)
+    own = uc.Recipe.from_dict(notes.get("recipe", {}))
     if own.states and recipe.states and (own.states, own.centre) != (recipe.states, recipe.centre):
         raise SettingError(f"{path}: is of {_said_states(own)}, expected {_said_states(recipe)}, as the policy.")
-    return learnt
+    return learnt if learnt.task or HELD_BY not in notes else uc.constraints.mechanisms.restored(notes[HELD_BY])
 
 
 def _said_states(recipe: uc.Recipe) -> str:
@@ -225,6 +243,18 @@ class Named(NamedTuple):
     names: list[str]
     up: str
     """The last column."""
+
+    @property
+    def sure(self) -> bool:
+        """Whether a movement can be held by it."""
+        return bool(self.found.decided and not self.found.doubt and self.found.mechanism.rank)
+
+    def notes(self, name: str) -> dict[str, Any]:
+        """What goes into the file of one demonstration, or of all together: words, and numbers where it is sure."""
+        mechanisms = self.found.candidates[0].mechanisms
+        own = mechanisms[self.names.index(name)] if name and len(mechanisms) > 1 else mechanisms[0]
+        told = {"mechanism": dict(self.each).get(name, self.found.summary)}
+        return told | ({HELD_BY: own.numbers()} if self.sure and (name or len(mechanisms) == 1) else {})
 
     @property
     def each(self) -> list[tuple[str, str]]:
@@ -280,9 +310,7 @@ def _say(learnt: Mapping[str, uc.LearntConstraint], what: str, named: Named | No
     if named is not None:
         for sentence in named.sentences:
             click.echo(sentence)
-        click.echo(
-            "That names the positions; rollout --constraint follows the directions that were learnt, as said first."
-        )
+        click.echo(FOLLOWED if named.sure else "That names the positions; " + NOT_FOLLOWED)
     head, rows = table_of(learnt, named)
     if rows:
         print_table(head, rows)

@@ -81,7 +81,7 @@ def export(
         written[target.what] = output
     if header is not None:
         written["header"] = header
-    judged = verdict_of(learnt)
+    judged = verdict_of(learnt, notes)
     far = "States far from all data, where its support is near 0."
     judged = judged._replace(doubt=f"{far} {judged.doubt}".rstrip(), next=then)
     if not as_json:

@@ -18,6 +18,12 @@ from ..base.errors import ModelFileError
 from .printing import print_table, say_verdict
 from .reading import innermost, reading_of
 
+TOLD = "states that recordings tell"
+"""Note of the share of the recorded states at which recordings tell a policy."""
+
+OF, HELD_BY = "of", "held by"
+"""Notes of a constraint: the demonstrations that it is of, where not of all; the numbers of the mechanism named."""
+
 ENDS = 2**16
 """Bytes at either end of a file by which it is known again."""
 
@@ -65,9 +71,9 @@ def info(file: str, as_json: bool) -> None:
     held, notes = _loaded(file), uc.storage.load_notes(file)
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held), **_rest(notes)}
     if as_json:
-        click.echo(json.dumps(told | {"verdict": verdict_of(held).to_json()}, indent=2))
+        click.echo(json.dumps(told | {"verdict": verdict_of(held, notes).to_json()}, indent=2))
         return
-    say_verdict(verdict_of(held))
+    say_verdict(verdict_of(held, notes))
     print_table(["", ""], [[name, _said(value)] for name, value in told.items() if value not in (None, [], {}, "")])
 
 
@@ -106,6 +112,7 @@ def _of(held: Any) -> dict[str, Any]:
         return {"fitted": False}
     return {
         "demonstrations": _demonstrations(policy),
+        "learnt from": sorted(str(name).partition("/")[2] or str(name) for name in policy.training_.split.fold_of),
         "learner": type(policy.learner).__name__ if not isinstance(policy.learner, str) else policy.learner,
         "learnt as": solution.method,
         "model": f"{len(solution.weights)} local models" if len(solution.weights) > 1 else str(policy.features_),
@@ -116,19 +123,21 @@ def _of(held: Any) -> dict[str, Any]:
 
 
 def _rest(notes: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in notes.items() if name not in ("recipe", "units", "digests")}
+    return {name: value for name, value in notes.items() if name not in ("recipe", "units", "digests", HELD_BY)}
 
 
-def verdict_of(held: Any) -> uc.evaluation.verdicts.Verdict:
-    """Judge a policy, constraint or guided policy by what it explained where held out."""
+def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:
+    """Judge a policy, constraint or guided policy by what it explained where held out, and what ``fit`` wrote down."""
     if isinstance(held, uc.LearntConstraint):
-        return uc.evaluation.verdicts.of_constraint(held)
+        found, numbers = uc.evaluation.verdicts.of_constraint(held), notes.get(HELD_BY)
+        named = numbers and uc.constraints.mechanisms.restored(numbers)
+        return uc.evaluation.verdicts.of_mechanism(found, held.rank_, named, sure=True) if named else found
     policy = innermost(held)
     if not hasattr(policy, "solution_"):
         mark = uc.evaluation.verdicts.Mark.BAD
         return uc.evaluation.verdicts.Verdict(mark, "Not fitted: it cannot predict.", next="unconstrain fit")
     told = _demonstrations(policy) or uc.evaluation.diagnosis.ENOUGH
-    shown = None if policy.solution_.belief is None else policy.solution_.determined_share
+    shown = notes[TOLD] if isinstance(notes.get(TOLD), float) else None
     return uc.evaluation.verdicts.of_explained(policy.held_out_score(), told, shown)
 
 

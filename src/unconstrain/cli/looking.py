@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,10 +12,11 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import counted
+from ..base.display import counted, listed
 from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainError
 from ..base.files import write
 from .constraining import arm_of, known_arms
+from .informing import OF, learnt_from
 from .printing import refuse_warnings, say_verdict
 from .reading import options_for_reading, prepared, reading_of, typed
 from .writing import check_outputs, option_for_force
@@ -81,8 +82,8 @@ def look(
     odd = any(one.warnings for one in surveys)
     then = "Open the page; what it marks says what cures it." if odd else "Open the page."
     say_verdict(uc.evaluation.verdicts.of_surveys(surveys)._replace(next="" if live else then))
-    if seen.policy is not None:
-        click.echo(_open(seen.policy, seen.demonstrations))
+    for line in _about(seen):
+        click.echo(line)
     samples = sum(map(len, seen.demonstrations))
     click.echo(f"{counted(len(seen.demonstrations), 'demonstration')}, {counted(samples, 'sample')}")
     if not live:
@@ -103,6 +104,13 @@ class Seen(NamedTuple):
     constraint: uc.LearntConstraint | None
     roles: Mapping[str, Any]
     """How files are read, as the policy or constraint remembers it."""
+    notes: Mapping[str, Any]
+
+    @property
+    def held(self) -> Sequence[uc.Demonstration]:
+        """Those that the constraint is of."""
+        of = self.notes.get(OF)
+        return [one for one in self.demonstrations if of is None or one.name in of]
 
 
 def _seen(paths: Sequence[str | Path], reading: dict[str, Any]) -> Seen:
@@ -113,10 +121,14 @@ def _seen(paths: Sequence[str | Path], reading: dict[str, Any]) -> Seen:
         raise ReadError(f"{found}: holds no recording to look at; add some: unconstrain look {found} wipe_*.csv")
     policies = [one for one in models.values() if isinstance(one, uc.Policy)]
     constraints = [one for one in models.values() if isinstance(one, uc.LearntConstraint)]
-    notes = uc.storage.load_notes(next(iter(models))) if models else {}
+    notes: dict[str, Any] = {}
+    for path in sorted(models, key=lambda path: isinstance(models[path], uc.Policy)):
+        notes |= uc.storage.load_notes(path)  # a policy's last: they hold
     found = prepared(recorded, reading, notes)
     refuse_warnings(reading["strict"])
-    return Seen(recorded, *found, next(iter(policies), None), next(iter(constraints), None), reading_of(**notes).roles)
+    return Seen(
+        recorded, *found, next(iter(policies), None), next(iter(constraints), None), reading_of(**notes).roles, notes
+    )
 
 
 def _page(seen: Seen, surveys: Sequence[Any]) -> str:
@@ -130,9 +142,23 @@ def _page(seen: Seen, surveys: Sequence[Any]) -> str:
         marks=[marks_of(*each) for each in zip(seen.recordings, surveys, seen.demonstrations, strict=True)],
         command=_to_fit(seen.paths, seen.recipe, seen.roles),
         policy=seen.policy,
-        constraint=seen.constraint,
+        constraint=seen.constraint if seen.held else None,
+        held=seen.held,
         free=_free(seen),
     )
+
+
+def _about(seen: Seen) -> Iterator[str]:
+    """What the policy and the constraint that are drawn are of."""
+    count = len(seen.demonstrations)
+    if seen.policy is not None:
+        known = learnt_from(seen.policy, seen.notes, seen.recordings)
+        if known is not None and len(known) < count:
+            yield f"policy: learnt from {len(known)} of these {counted(count, 'demonstration')}, {listed(known, 4)}."
+        yield _open(seen.policy, seen.demonstrations)
+    if seen.constraint is not None and len(seen.held) < count:
+        of = listed(seen.notes[OF], 4)
+        yield f"constraint: of {of}, and drawn there alone; others may have been held in other ways."
 
 
 def _open(policy: uc.Policy, demos: Sequence[uc.Demonstration]) -> str:
@@ -141,7 +167,7 @@ def _open(policy: uc.Policy, demos: Sequence[uc.Demonstration]) -> str:
         share = uc.evaluation.diagnose(policy, demos).states_determined
     except UnconstrainError:
         return "policy: where recordings tell it is not known for this learner."
-    return f"policy: undetermined at {1 - share:.0%} of the recorded states ('unconstrain diagnose' says where)."
+    return f"policy: {uc.evaluation.verdicts.of_untold(1 - share)} ('unconstrain diagnose' says where)."
 
 
 def _free(seen: Seen) -> Any:

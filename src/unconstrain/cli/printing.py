@@ -157,8 +157,7 @@ def judge_fit(policy: uc.Policy, stream: uc.Stream, on_cluster: bool) -> Judged:
     """Walk through the demonstrations once more; on a cluster only the sums are there."""
     held_out, nan = policy.held_out_score(), float("nan")
     count, samples, missed = (len(stream.paths), 0, nan) if on_cluster else _walked(policy, stream)
-    belief = policy.solution_.belief
-    told = None if belief is None else policy.solution_.determined_share
+    told = uc.evaluation.diagnosis.states_told(policy)
     return Judged(uc.evaluation.verdicts.of_explained(held_out, count, told), count, samples, 1.0 - missed, held_out)
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
+from ..base.arrays import Array, on_host
 from ..base.errors import InvalidDataError, MissingBeliefError
 from ..learners import Solution, robust
 from ..models import Scale, choose_variance, cover
@@ -234,7 +234,7 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
     undetermined, from_noise = (
         np.linalg.norm(one, axis=1) / typical for one in (spread.undetermined, spread.from_noise)
     )
-    known = (undetermined < from_noise) | (undetermined < SMALL)
+    known = untold_at(policy, states, typical) <= SMALL
     models, d, _ = solution.weights.shape
     free = solution.free if len(solution.free) == len(states) else None
     return Diagnosis(
@@ -259,22 +259,42 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
 
 
 def untold(policy: Policy, movement: Demonstration) -> Array | None:
-    """What no recording tells of each action of a roll-out, in the directions that its constraint left, shape (T,).
+    """:func:`untold_at` along a roll-out, in the directions that its constraint left, shape (T,).
 
-    A standard deviation, as a share of the typical action there; nothing where noise is more. None where the policy
-    does not know.
+    None where the policy does not know, or does nothing.
     """
     if movement.truth is None or not movement.truth.policy.any():
         return None
-    free, typical = movement.truth.projections, float(np.sqrt((movement.truth.policy**2).sum(axis=1).mean()))
+    typical = float(np.sqrt((movement.truth.policy**2).sum(axis=1).mean()))
     try:
-        variances = np.trace(free @ policy.covariances(movement.states) @ free, axis1=1, axis2=2)
+        return untold_at(policy, movement.states, typical, movement.truth.projections)
     except MissingBeliefError:
         return None
-    noise = np.linalg.norm(policy.uncertainty(movement.states).from_noise, axis=1)
-    spread = np.sqrt(np.maximum(variances, 0.0))
-    told: Array = np.where(spread < noise, 0.0, spread) / typical
+
+
+def untold_at(policy: Policy, states: Array, typical: float, left: Array | None = None) -> Array:
+    """What no recording tells of the policy at N states, shape (N,).
+
+    A standard deviation, as a share of the typical length of actions, in all directions or in those that projections
+    ``left`` (N, d, d) leave; zero where noise is more. Above :data:`SMALL` no recording tells the policy there.
+    """
+    spread = policy.uncertainty(states)
+    noise, open_ = (np.linalg.norm(one, axis=1) for one in (spread.from_noise, spread.undetermined))
+    if left is not None:
+        variances = np.trace(left @ policy.covariances(states) @ left, axis1=1, axis2=2)
+        open_ = np.sqrt(np.maximum(variances, 0.0))
+    told: Array = np.where(open_ < noise, 0.0, open_) / typical
     return told
+
+
+def states_told(policy: Policy) -> float | None:
+    """Share of the states from which a policy has just learnt at which recordings tell it; None where not known."""
+    kept = policy.training_.kept
+    if kept is None or policy.solution_.belief is None or policy.n_outputs_ == 1:
+        return None
+    states, actions = map(on_host, kept.whole[:2])
+    typical = float(np.sqrt((actions**2).sum(axis=1).mean()))
+    return float((untold_at(policy.in_own_units(), states, typical) <= SMALL).mean()) if typical else None
 
 
 def _typical(actions: Array, solution: Solution) -> float:
@@ -295,7 +315,7 @@ def _typical(actions: Array, solution: Solution) -> float:
 
 
 def _regions(
-    policy: Policy, demos: list[Demonstration], undetermined: Array, known: Array, typical: float
+    policy: Policy, demos: list[Demonstration], undetermined: Array, known: NDArray[np.bool_], typical: float
 ) -> tuple[Region, ...]:
     states, actions, groups = stack(demos)
     embedding = policy.training_.model.embedding
@@ -338,7 +358,7 @@ def _least_determined(policy: Policy, states: Array) -> tuple[Array, Array]:
 
 
 def _movements(
-    demos: list[Demonstration], undetermined: Array, known: Array, free: Array | None
+    demos: list[Demonstration], undetermined: Array, known: NDArray[np.bool_], free: Array | None
 ) -> tuple[Movement, ...]:
     ends = np.cumsum([len(demo) for demo in demos])
     rows = [slice(end - len(demo), end) for end, demo in zip(ends, demos, strict=True)]

@@ -90,6 +90,11 @@ def _graded(share: float, good: float = GOOD, fair: float = FAIR) -> tuple[Mark,
     return (Mark.DOUBTFUL, "fair") if share >= fair else (Mark.BAD, "poor")
 
 
+def of_untold(share: float) -> str:
+    """Say at which share of the recorded states the policy is not determined."""
+    return f"at {share:.0%} of the recorded states no recording tells the policy in some direction"
+
+
 def of_explained(
     share: float, demonstrations: int, determined: float | None = None, what: str = "held-out motion"
 ) -> Verdict:
@@ -102,14 +107,13 @@ def of_explained(
     demonstrations : int
         Fewer than three give no verdict.
     determined : float, optional
-        Share of the weight directions that three demonstrations or more show.
+        Share of the recorded states at which recordings tell the policy.
     what : str
         The motion.
     """
     across = "What constraints hid: no recording shows it, so no score does."
     if determined is not None and determined < MOSTLY and demonstrations >= ENOUGH:
-        across = f"Across the motion: {1 - determined:.0%} of the weight directions are shown by fewer than {ENOUGH} "
-        across += "demonstrations; 'unconstrain diagnose' says where."
+        across = f"Across the motion: {of_untold(1 - determined)}; 'unconstrain diagnose' says where."
     if demonstrations < ENOUGH or not np.isfinite(share):
         seen = f"explains {share:.0%} of {what}, but " if np.isfinite(share) else ""
         few = f"{seen}no verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
@@ -197,6 +201,16 @@ def of_constraint(learnt: LearntConstraint, *others: LearntConstraint) -> Verdic
     doubt = "; ".join(text.rstrip(".") for text in choice.doubts)
     still = "A direction in which nobody wanted to move looks held, too."
     return Verdict(mark, said, "What was held, near recorded states.", f"{doubt}. {still}" if doubt else still, then)
+
+
+def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool) -> Verdict:
+    """Add to a verdict on a constraint of some rank that positions keep to a mechanism, where that holds more."""
+    if named.rank <= rank:
+        return found
+    keep = f"The positions {'' if sure else 'may '}keep to {named.title}, {named.rank} of {len(named.centre)} held"
+    counted = "the first counts what velocities show by the features taken, positions show what turns as they go, too."
+    then = "Use it with 'unconstrain rollout --constraint', which follows the mechanism." if sure else found.next
+    return found._replace(said=f"{found.said} {keep}: {counted}", next=then)
 
 
 WITHOUT_SUPPORT = Verdict(

@@ -31,6 +31,7 @@ def constraint_page(
     columns: Sequence[str] | None = None,
     mechanism: Sequence[str] = (),
     each: tuple[Sequence[str], Sequence[Sequence[str]]] = ((), ()),
+    verdict: verdicts.Verdict | None = None,
 ) -> str:
     """Make the page of a learnt constraint.
 
@@ -48,6 +49,8 @@ def constraint_page(
         What may have held them, in sentences.
     each : pair of sequences, optional
         Head and rows of a table: what held each demonstration, where they differ.
+    verdict : Verdict, optional
+        By default on what was learnt alone.
 
     Returns
     -------
@@ -66,7 +69,7 @@ def constraint_page(
     doubts = list(dict.fromkeys(doubt for one in learnt for doubt in one.choice_.doubts)) if len(learnt) == 1 else []
     return html.document(
         title,
-        verdicts.of_constraint(*learnt),
+        verdict or verdicts.of_constraint(*learnt),
         html.words("constraint_lead"),
         *_named(mechanism, each),
         *(

@@ -15,7 +15,7 @@ from . import figures, html
 if TYPE_CHECKING:
     from ..policies import Policy
 
-MOST_POINTS = 4000
+MOST_POINTS = 2000
 MOST_REGIONS = 8
 MOST_MOVEMENTS = 60
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import is_dataclass
 from typing import TYPE_CHECKING
@@ -11,20 +11,24 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InvalidDataError, SettingError
-from ..evaluation import ncpe, ninconsistency, nupe, verdicts
+from ..evaluation import diagnosis, ncpe, ninconsistency, nupe, verdicts
 from ..learners import named
 from ..motion import rollout
-from ..recordings import Demonstration, stack
+from ..recordings import Demonstration, Recipe, stack
 from ..risks import action_projection, project
 from . import figures, html
 from .diagnosis import unknown
+from .replays import FLAT, Replay
+from .replays import replayed as replayed
 
 if TYPE_CHECKING:
     from ..policies import Policy
 
 MOST_PANELS = 4
 MOST_ROWS = 30
-MOST_POINTS = 2000
+MOST_POINTS = 300
+"""Of one line of a picture."""
+
 ARROWS = 15
 
 FOLDS, MOST_REFITTED = 5, 5000
@@ -38,8 +42,8 @@ def policy_page(
     policy: Policy,
     demonstrations: Sequence[Demonstration],
     title: str,
-    states: Sequence[str] | None = None,
-    actions: Sequence[str] | None = None,
+    recipe: Recipe | None = None,
+    units: Mapping[str, str] | None = None,
 ) -> str:
     """Make the page of a fitted policy.
 
@@ -51,8 +55,10 @@ def policy_page(
         What it was fitted to, or others.
     title : str
         Of the page.
-    states, actions : sequence of str, optional
-        Names of the columns, with their units.
+    recipe : Recipe, optional
+        That prepared them: it names the columns, and says whether actions are velocities; by default they are.
+    units : mapping of str to str, optional
+        Of columns whose unit is known.
 
     Returns
     -------
@@ -66,10 +72,15 @@ def policy_page(
     """
     demos = list(demonstrations)
     n, d = demos[0].states.shape[1], demos[0].actions.shape[1]
+    made, known = recipe or Recipe(), dict(units or {})
+    states, actions = made.labels(known)
     xs = list(states or (f"state {index + 1}" for index in range(n)))
     us = list(actions or (f"action {index + 1}" for index in range(d)))
     learner, held_out = named(policy.learner), _held_out(policy, demos)
+    found = verdicts.of_explained(policy.held_out_score(), len(demos), diagnosis.states_told(policy))
+    judged = replayed(found, policy, demos, made, None, known)
     parts = [
+        *_replays(judged.runs, judged.verdict.said.removeprefix(f"{found.said} ").removeprefix("But "), xs),
         html.section("The demonstrations", _movements(policy, demos, xs)),
         *_reproduced(policy, demos, xs),
         html.section("Predicted and observed actions", _actions(policy, demos, us)),
@@ -80,9 +91,7 @@ def policy_page(
     parts += [html.section("Numbers", _summary(policy, demos), _determined(policy))]
     if is_dataclass(learner):
         parts.append(html.settings_table(learner))
-    told = None if policy.solution_.belief is None else policy.solution_.determined_share
-    verdict = verdicts.of_explained(policy.held_out_score(), len(demos), told)
-    return html.document(title, verdict, _lead(policy, type(learner).__name__, xs, us), *parts)
+    return html.document(title, judged.verdict, _lead(policy, type(learner).__name__, xs, us), *parts)
 
 
 def _lead(policy: Policy, learner: str, states: Sequence[str], actions: Sequence[str]) -> html.Markup:
@@ -149,6 +158,21 @@ def _drawn(tracks: list[tuple[str, Demonstration]], names: Sequence[str]) -> obj
     flat = [(key, demo.states if n == 2 else np.column_stack([_times(demo), demo.states])) for key, demo in tracks]
     labels = (names[0], names[1]) if n == 2 else (_time_label(first), names[0])
     return figures.paths(flat, labels=labels, equal=n == 2)
+
+
+def _replays(runs: Sequence[Replay], said: str, names: Sequence[str]) -> list[html.Markup]:
+    """Roll-outs over the demonstrations that they start with, below what is judged of them."""
+    if not runs:
+        return []
+    keys = ["hybrid" if one.held else "roll-out, free" for one in runs]
+    drawn = [("training", one.done) for one in runs] + [(key, one.run) for key, one in zip(keys, runs, strict=True)]
+    caption = html.words("fit_replays", held=keys.count("hybrid"), every=len(runs), flat=f"{FLAT:.0%}")
+    shown = [key for key in ("training", "hybrid", "roll-out, free") if key in {name for name, _ in drawn}]
+    labels = {"training": "demonstrations", "hybrid": "roll-outs, held alike"}
+    picture = html.picture(
+        "replays", [_drawn([(key, _thin(demo)) for key, demo in drawn], names)], caption, keys=shown, labels=labels
+    )
+    return [html.section("From where demonstrations start", html.paragraph(f"{said[:1].upper()}{said[1:]}"), picture)]
 
 
 def _reproduced(policy: Policy, demos: list[Demonstration], names: Sequence[str]) -> list[html.Markup]:

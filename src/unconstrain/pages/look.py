@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
+from dataclasses import replace
 from html import escape
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Array
 from ..base.errors import MissingBeliefError, SettingError
+from ..evaluation import verdicts
 from ..recordings import Demonstration, Recording, stack
 from .alone import assembled, literal
 from .live import serve as serve
@@ -36,6 +39,10 @@ PAUSE = 5.0
 """So many usual intervals between samples that follow each other are a pause that was left out."""
 
 
+MOST_NUMBERS = 50_000
+"""Of the covariances of a policy's weights; of more the page does not say where recordings tell the policy."""
+
+
 class Mark(NamedTuple):
     """What is to be seen on the time line: ``start`` and ``length`` in seconds from the first stamp."""
 
@@ -55,6 +62,7 @@ def look_page(
     command: Sequence[str] = ("", ""),
     policy: Policy | None = None,
     constraint: LearntConstraint | None = None,
+    held: Sequence[Demonstration] | None = None,
     free: Array | None = None,
 ) -> str:
     """Make the page, a whole HTML document that needs nothing else.
@@ -76,13 +84,14 @@ def look_page(
         Fitted, of as many states.
     constraint : LearntConstraint, optional
         Fitted, of as many states.
+    held : sequence of Demonstration, optional
+        Those that the constraint is of; by default all.
     free : ndarray, shape (N,), optional
         Probability that each of all samples was free, by a quick look; a policy that learnt from them knows better.
     """
     demos = list(demonstrations)
     every = max(1, -(-sum(map(len, demos)) // MOST_SAMPLES))
     thinned = [demo[np.unique([*range(0, len(demo), every), len(demo) - 1])] for demo in demos]
-    states = stack(thinned).states
     learnt = _free(policy, demos)
     known = free if learnt is None else learnt
     described = None if policy is None else _described(policy, len(columns))
@@ -94,12 +103,14 @@ def look_page(
         "quick": learnt is None,
         "marks": [[mark._asdict() for mark in each] for each in marks],
         "command": list(command),
-        "patches": list(_patches(constraint, states)),
+        "patches": list(_patches(constraint, stack(held or thinned).states)),
         "samples": sum(map(len, demos)),
         "policy": described,
     }
-    script = "null" if policy is None or described is None or described["trouble"] else policy.javascript()
-    return assembled("look.html", title=escape(title), data=literal(data), policy=script)
+    runs = policy is not None and described is not None and not described["trouble"]
+    script = policy.javascript() if policy is not None and runs else "null"
+    told = _told(policy) if policy is not None and runs else "null"
+    return assembled("look.html", title=escape(title), data=literal(data), policy=script, told=told)
 
 
 def marks_of(recording: Recording, survey: Any, demonstration: Demonstration) -> list[Mark]:
@@ -207,6 +218,32 @@ def _described(policy: Policy, columns: int) -> dict[str, Any]:
         except SettingError as error:
             trouble = str(error)
     return {"method": policy.solution_.method, "trouble": trouble}
+
+
+def _told(policy: Policy) -> str:
+    """JavaScript object with what no recording tells of a policy's weights, and the features they are over; or null."""
+    belief, centring = policy.solution_.belief, policy.training_.model.centring
+    models, d, p = policy.solution_.weights.shape
+    if belief is None or policy.scale_ is not None or belief.undetermined.size > MOST_NUMBERS:
+        return "null"
+    of_features = copy(policy)
+    over = np.eye(p)[None] if centring is None else centring
+    of_features.solution_ = replace(policy.solution_, weights=over)
+    own = belief.from_noise.reshape(models, over.shape[1], d, over.shape[1], d)
+    noise = np.einsum("miaja->maij", own)
+    numbers = {
+        "actions": d,
+        "models": models,
+        "small": verdicts.SMALL,
+        "misfit": belief.misfit,
+        "undetermined": _singles(belief.undetermined),
+        "noise": _singles(noise),
+    }
+    return f"{{...{literal(numbers)}, features: {of_features.javascript()}}}"
+
+
+def _singles(values: Array) -> str:
+    return base64.b64encode(values.astype("<f4").tobytes()).decode()
 
 
 def _patches(constraint: LearntConstraint | None, states: Array) -> Iterator[dict[str, Any]]:

@@ -63,9 +63,7 @@ class Candidate(Shown):
     @property
     def free(self) -> int:
         """In how many directions it moves."""
-        one = self.mechanisms[0]
-        rows = one.rows((one.centre + one.frame[-1])[None])[0]
-        return len(one.centre) - int(rows.any(axis=1).sum())
+        return len(self.mechanisms[0].centre) - self.mechanisms[0].rank
 
     def bends(self, other: Candidate) -> bool:
         """Whether the other is what it is where it does not bend."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, NamedTuple, Self, TypeVar
+from typing import Any, ClassVar, NamedTuple, Self, TypeVar
 
 import numpy as np
 
@@ -135,6 +135,26 @@ class Mechanism(Shown):
             radius=_length(self.radius, sure.get("radius", 0.0), self.unit),
             pitch=_length(2 * np.pi * self.pitch, 2 * np.pi * sure.get("pitch", 0.0), self.unit),
         )
+
+    @property
+    def rank(self) -> int:
+        """How many directions it holds."""
+        return int(self.rows((self.centre + self.frame[-1])[None])[0].any(axis=1).sum())
+
+    @property
+    def title(self) -> str:
+        """What it is, without where: ``a circle (hinge)``."""
+        return self.form.phrase.partition(" {")[0].rpartition(" ")[0] or self.form.phrase
+
+    def numbers(self) -> dict[str, Any]:
+        """By which it can be restored, for a file."""
+        return {
+            "kind": self.kind,
+            "centre": self.centre.tolist(),
+            "frame": self.frame.tolist(),
+            "radius": float(self.radius),
+            "pitch": float(self.pitch),
+        }
 
     def moved(self, step: Array) -> Self:
         """Changed by small numbers (k,) of the chart: lengths, and rotations in radians."""

@@ -57,18 +57,19 @@ function policyOf({ origin, maps, exponents, monomials, precision, frame, factor
     return terms > 1 ? z : [1];
   }
 
-  function plain(state) {
-    const z = relative(state), regressor = regressors(z), action = new Array(actions).fill(0);
+  /** Share and values of each map. */
+  function parts(state) {
+    const z = relative(state), regressor = regressors(z);
     const logs = exponents ? exponents.map((slopes) => dot(slopes, z)) : [0];
-    const largest = Math.max(...logs);
-    let total = 0;
-    for (let m = 0; m < logs.length; m++) {
-      const share = Math.exp(logs[m] - largest);
-      total += share;
-      if (share === 0) continue;
-      for (let k = 0; k < actions; k++) action[k] += share * dot(maps[m][k], regressor);
-    }
-    return action.map((sum) => sum / total);
+    const largest = Math.max(...logs), sizes = logs.map((log) => Math.exp(log - largest));
+    const total = sizes.reduce((sum, size) => sum + size, 0);
+    return maps.map((map, m) => [sizes[m] / total, sizes[m] === 0 ? [] : map.map((row) => dot(row, regressor))]);
+  }
+
+  function plain(state) {
+    const action = new Array(actions).fill(0);
+    for (const [share, values] of parts(state)) values.forEach((value, k) => { action[k] += share * value; });
+    return action;
   }
 
   const clip = (value, low, high) => Math.max(low, Math.min(high, value));
@@ -123,5 +124,5 @@ function policyOf({ origin, maps, exponents, monomials, precision, frame, factor
     return Math.exp(Math.min(0, nearest - 0.5 * precision.reduce((sum, each, i) => sum + each * z[i] * z[i], 0)));
   }
 
-  return { policy, support, under };
+  return { policy, support, under, parts };
 }

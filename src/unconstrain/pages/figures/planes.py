@@ -133,7 +133,8 @@ def known_map(
         "known", [COLOURS["training"], COLOURS["inconsistency"]]
     )
     end = max(float(values.max()), top)
-    drawn = axes.scatter(*points[order].T, 9, values[order], cmap=shades, vmin=0.0, vmax=end, rasterized=True)
+    small = {"rasterized": True, "linewidths": 0, "antialiased": False}  # in bytes
+    drawn = axes.scatter(*points[order].T, 9, values[order], cmap=shades, vmin=0.0, vmax=end, **small)
     made.colorbar(drawn, label=scale).outline.set_visible(False)
     if directions is not None and len(marked):
         reach = float(np.ptp(points, axis=0).max()) / 16

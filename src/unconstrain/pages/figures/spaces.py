@@ -35,7 +35,7 @@ def movements(
     for key, corners in plates:
         axes.add_collection3d(faces([corners], alpha=0.12, **keyed(key, **own.get(key, {}))))
     for key, states in tracks:
-        axes.plot(*broken(states).T, **keyed(key, linewidth=1.5, **own.get(key, {})))
+        axes.plot(*broken(states).T, **keyed(key, linewidth=0.9 if key == "training" else 1.3, **own.get(key, {})))
     axes.set(xlabel=labels[0], ylabel=labels[1], zlabel=labels[2])
     seen = np.concatenate([states for _, states in tracks])
     low, high = np.nanmin(seen, axis=0), np.nanmax(seen, axis=0)

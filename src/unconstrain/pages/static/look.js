@@ -341,7 +341,7 @@
 
   // ------------------------------------------------------------------------------------------------- the policy
 
-  const roll = { start: null, begun: 0, tilt: 0, turn: 0, plane: false, track: [], support: [], times: [] };
+  const roll = { start: null, begun: 0, tilt: 0, turn: 0, plane: false, track: [], support: [], times: [], untold: [] };
   const canRoll = () => learnt && roll.start;
 
   /** Normal of the plane: the last axis, tilted, then turned about it. */
@@ -369,7 +369,23 @@
       time += step;
       if (near !== null && near < NEAR_DATA) beyond += step * speed;
     }
+    roll.untold = untoldAlong();
   }
+
+  /** What no recording tells of each action, as a share of a typical one; null where that is not known. */
+  function untoldAlong() {
+    if (!untold) return null;
+    const way = roll.plane ? normal() : null, weights = roll.times.map(lasting);
+    const squares = roll.track.map((state) => learnt.policy(state).reduce((sum, each) => sum + each * each, 0));
+    const mean = squares.reduce((sum, one, i) => sum + weights[i] * one, 0) / weights.reduce((sum, one) => sum + one, 0);
+    return roll.track.map((state) => (mean > 0 ? untold.at(state, way) / Math.sqrt(mean) : 0));
+  }
+
+  /** How long a roll-out stays at a state, the last as long as the one before. */
+  const lasting = (time, i, times) => {
+    const last = Math.min(i + 1, times.length - 1);
+    return last ? times[last] - times[last - 1] : 1;
+  };
 
   /** What the plane, if there is one, leaves of the policy. */
   function allowed(state) {
@@ -385,13 +401,14 @@
     if (roll.plane && !axes.some((which) => which >= count)) drawPlane(context);
     const points = roll.track.map((state, i) =>
       project(axes.map((which) => (which < count ? state[which] : roll.times[i]))));
-    for (const isNear of [false, true]) {
-      context.strokeStyle = drawing.colour(isNear ? "ink" : "soft");
-      context.lineWidth = isNear ? 2.8 : 2;
-      context.globalAlpha = isNear ? 1 : 0.5;
+    const kinds = roll.track.map((_, i) => (roll.support[i] < NEAR_DATA ? 0 : isOpen(i) ? 1 : 2));
+    for (const [kind, colour] of ["soft", "soft", "ink"].entries()) {
+      context.strokeStyle = drawing.colour(colour);
+      context.lineWidth = [2, 2.8, 2.8][kind];
+      context.globalAlpha = [0.5, 0.8, 1][kind];
       context.beginPath();
       for (let i = 1; i < points.length; i++) {
-        if (roll.support[i] >= NEAR_DATA !== isNear) continue;
+        if (kinds[i] !== kind) continue;
         context.moveTo(...points[i - 1]);
         context.lineTo(...points[i]);
       }
@@ -434,10 +451,23 @@
     return [a, [y * a[2] - z * a[1], z * a[0] - x * a[2], x * a[1] - y * a[0]]];
   }
 
+  const isOpen = (i) => roll.untold !== null && roll.untold[i] > untold.small;
+
   function sayPolicy() {
-    const off = roll.support.findIndex((near) => near < NEAR_DATA);
-    of("policy-says").textContent = "The bold line: where it goes from the ring, which can be dragged. " +
-      (off >= 0 ? `Grey from ${number(roll.times[off])} s on: far from all data.` : "All of it is near the data.");
+    of("policy-says").textContent = `The bold line: where it goes from the ring, which can be dragged. ${howKnown()}`;
+  }
+
+  /** The same as the verdict of `unconstrain rollout`. */
+  function howKnown() {
+    const off = roll.support.findIndex((near) => near < NEAR_DATA), open = roll.track.findIndex((_, i) => isOpen(i));
+    if (off >= 0) return `Grey from ${number(roll.times[off])} s on: far from all data.`;
+    if (!untold) return "All of it is near the data; whether recordings tell the policy there is not known here.";
+    if (open < 0) return "All of it is near the data, and recordings tell the policy.";
+    const lasts = roll.times.map(lasting), sum = (values) => values.reduce((total, one) => total + one, 0);
+    const percent = (share) => `${Math.round(100 * share)} %`;
+    return `Near demonstrations, but ${percent(sum(lasts.filter((_, i) => isOpen(i))) / sum(lasts))} of the time, first at ` +
+      `${number(roll.times[open])} s, where it is grey, no recording tells the policy in a direction that it takes: ` +
+      `undetermined, by up to ${percent(Math.max(...roll.untold))} of its typical action.`;
   }
 
   function begin(index) {

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import unconstrain as uc
+import numpy as np
+from scipy.spatial import cKDTree
 
+from ..base.arrays import Array
 from ..base.errors import DivergedError
-from .progress import shown
+from ..evaluation import verdicts
+from ..models import spaces
+from ..motion import rollout
+from ..recordings import Demonstration
+
+if TYPE_CHECKING:
+    from ..policies import Policy
+    from ..recordings import Recipe
 
 MOST, STEPS = 20, 2000
 """Demonstrations, and steps of each, that are run at most: seconds."""
@@ -29,37 +38,48 @@ class Replay(NamedTuple):
     """Mean distance of the states of the roll-out to the nearest of the demonstration, unit of the states."""
     held: bool
     """Whether what held the demonstration is known: given, or seen as it is flat."""
+    done: Demonstration
+    run: Demonstration
+
+
+class Replayed(NamedTuple):
+    """A verdict, medians over those whose constraint is known, None where there are none, and all that were run."""
+
+    verdict: verdicts.Verdict
+    medians: dict[str, float | None] | None
+    runs: Sequence[Replay] = ()
 
 
 def replayed(
-    found: uc.evaluation.verdicts.Verdict,
-    policy: uc.Policy,
-    demos: Sequence[uc.Demonstration],
-    recipe: uc.Recipe,
+    found: verdicts.Verdict,
+    policy: Policy,
+    demos: Sequence[Demonstration],
+    recipe: Recipe,
     held: Any,
     units: Mapping[str, str],
-) -> tuple[uc.evaluation.verdicts.Verdict, dict[str, float | None] | None]:
-    """Judge by those whose constraint is known, too; and their medians, None where there are none."""
-    import numpy as np
+) -> Replayed:
+    """Add to a verdict how a policy moves from where demonstrations start, under what held them as far as it is known.
 
+    ``held`` is their constraint, or None; ``units`` are those of columns.
+    """
     try:
         runs = replays(policy, demos, recipe, held)
     except DivergedError:
-        return uc.evaluation.verdicts.of_divergence(found), None
+        return Replayed(verdicts.of_divergence(found), None)
     known = [one for one in runs if one.held]
     if not known:
         unknown = " Its size and pace over time: not compared, as what held these recordings is not known."
-        return (found._replace(doubt=found.doubt + unknown) if runs else found), None
+        return Replayed(found._replace(doubt=found.doubt + unknown) if runs else found, None, runs)
     extents, paces, apart = np.array([one[:3] for one in known]).T
     unit = {units.get(name, "") for name in recipe.states or ()}
     said = f"{np.median(apart):.3g} {unit.pop() if len(unit) == 1 else ''}".rstrip()
     measured = {"extent": extents, "pace": paces[np.isfinite(paces)], "apart": apart}
     medians = {name: float(np.median(values)) if len(values) else np.nan for name, values in measured.items()}
     told = {name: value if np.isfinite(value) else None for name, value in medians.items()}
-    return uc.evaluation.verdicts.of_replays(found, extents, paces, said), told
+    return Replayed(verdicts.of_replays(found, extents, paces, said), told, runs)
 
 
-def replays(policy: uc.Policy, demos: Sequence[uc.Demonstration], recipe: uc.Recipe, held: Any = None) -> list[Replay]:
+def replays(policy: Policy, demos: Sequence[Demonstration], recipe: Recipe, held: Any = None) -> list[Replay]:
     """Compare at most twenty demonstrations; none where actions are not known to be velocities of Euclidean states.
 
     Raises
@@ -67,10 +87,9 @@ def replays(policy: uc.Policy, demos: Sequence[uc.Demonstration], recipe: uc.Rec
     DivergedError
         If a run leaves the finite numbers.
     """
-    import numpy as np
-
+    n, d = demos[0].states.shape[1], demos[0].actions.shape[1]
     chosen = [one for one in demos if one.times is not None and len(one) > 2 and np.ptp(one.states, axis=0).any()]
-    if recipe.actions is not None or recipe.space != uc.spaces.Euclidean(policy.n_features_in_) or not chosen:
+    if recipe.actions is not None or n != d or demos[0].space != spaces.Euclidean(n) or not chosen:
         return []
     chosen = [chosen[k] for k in np.linspace(0, len(chosen) - 1, min(len(chosen), MOST)).astype(int)]
     clocks = [np.asarray(one.times, np.float64) for one in chosen]
@@ -78,49 +97,41 @@ def replays(policy: uc.Policy, demos: Sequence[uc.Demonstration], recipe: uc.Rec
     dt = max(float(np.median(np.diff(clocks[0]))), max(lasted) / STEPS)
     shapes = [_spread(one.states) for one in chosen]
     normals = [axes * (spread < FLAT * spread[0])[:, None] for spread, axes in shapes]
-    task = held.target if isinstance(held, uc.LearntConstraint) and held.task else None
+    task = held.target if getattr(held, "task", False) else None
     starts, steps = np.array([one.states[0] for one in chosen]), round(max(lasted) / dt) + 1
-    with shown("running it from the same starts"):
-        own = [partial(_same, rows) for rows in normals] if held is None else held
-        runs = uc.rollout(policy, starts, steps, dt, own, task=task, least_support=0.0)
-    cut = [run.states[: round(seconds / dt) + 1] for run, seconds in zip(runs, lasted, strict=True)]
+    own = [partial(_same, rows) for rows in normals] if held is None else held
+    runs = rollout(policy, starts, steps, dt, own, task=task, least_support=0.0)
+    cut = [run[: round(seconds / dt) + 1] for run, seconds in zip(runs, lasted, strict=True)]
     return [
-        _compared(one.states, run, axes[:2], held is not None or bool(rows.any()))
+        _compared(one, run, axes[:2], held is not None or bool(rows.any()))
         for one, run, (_, axes), rows in zip(chosen, cut, shapes, normals, strict=True)
     ]
 
 
-def _same(rows: Any, states: Any, _times: Any) -> Any:
+def _same(rows: Array, states: Array, _times: Array) -> Array:
     """A constraint of the same rows everywhere."""
-    import numpy as np
-
     return np.broadcast_to(rows, (len(states), *rows.shape))
 
 
-def _spread(states: Any) -> tuple[Any, Any]:
+def _spread(states: Array) -> tuple[Array, Array]:
     """How far states (T, n) spread, most first (n,), and along which directions, in rows (n, n); zeros beyond T."""
-    import numpy as np
-
     _, spread, axes = np.linalg.svd(states - states.mean(axis=0), full_matrices=False)
     beyond = states.shape[1] - len(axes)
     return np.pad(spread, (0, beyond)), np.pad(axes, ((0, beyond), (0, 0)))
 
 
-def _compared(shown_: Any, run: Any, plane: Any, held: bool) -> Replay:
+def _compared(done: Demonstration, run: Demonstration, plane: Array, held: bool) -> Replay:
     """As seen along two directions in rows, (2, n)."""
-    import numpy as np
-    from scipy.spatial import cKDTree
-
-    size = [float(np.sqrt(one.var(axis=0).sum())) for one in (shown_, run)]
-    turns = [_turns((one - one.mean(axis=0)) @ plane.T) for one in (shown_, run)]
+    both = done.states, run.states
+    size = [float(np.sqrt(one.var(axis=0).sum())) for one in both]
+    turns = [_turns((one - one.mean(axis=0)) @ plane.T) for one in both]
     pace = turns[1] / turns[0] if abs(turns[0]) >= 1 else np.nan
-    return Replay(size[1] / size[0], float(pace), float(cKDTree(shown_).query(run)[0].mean()), held)
+    apart = cKDTree(done.states).query(run.states)[0].mean()
+    return Replay(size[1] / size[0], float(pace), float(apart), held, done, run)
 
 
-def _turns(points: Any) -> float:
+def _turns(points: Array) -> float:
     """How often points (T, 2) go round the origin."""
-    import numpy as np
-
     if points.shape[1] < 2:
         return 0.0
     angles = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
