@@ -163,6 +163,11 @@ COMMANDS = [
     "demo",
     "look",
     "play",
+    "certify",
+    "convert",
+    "doctor",
+    "example",
+    "info",
 ]
 
 
@@ -183,6 +188,14 @@ def test_help_of_all_names_each_command_in_a_whole_sentence():
     for example in ("demo", "inspect *.csv", "fit *.csv -o policy.npz"):
         assert f"\n  unconstrain {example}   " in said
     assert max(map(len, said.splitlines())) <= 80
+
+
+def test_defaults_that_help_says_are_those_of_the_library():
+    said = " ".join(run("fit", "--help").split())
+    assert f"savgol, seconds; {uc.Recipe().window_s} by default" in said
+    assert f"threshold, {uc.Hybrid().alpha} by default" in said
+    for option, default in (("pauses", uc.Recipe().pauses), ("seams", uc.Recipe().seams), ("glitches", "keep")):
+        assert re.search(rf"--{option} \[[^]]*\] [^[]*\[default: {default}\]", said)
 
 
 def test_examples_use_options_that_exist():
@@ -260,7 +273,8 @@ def test_inspect_shows_columns_that_fit_cannot_guess(tmp_path):
     assert "columns: left, right, up\n" in said
     told = " ".join(said.split())
     assert "fit needs to know more: 'odd': cannot tell states and actions from its columns left, right, up." in told
-    assert "(--state, --action)" in told
+    assert "Say which with --state and --action, or take" in told
+    assert re.search(r"\n    unconstrain fit \S+odd\.csv --state left,right,up --differentiate -o policy\.npz\n", said)
 
 
 def test_inspect_counts_many_gaps(tmp_path):
@@ -743,15 +757,15 @@ def bad(folder, what):
         (
             lambda at: bad(at, "hole"),
             (
-                "'hole', row 7, column 'y': found nan (1 such cell in the selected columns), expected finite numbers. "
-                "Remove or repair these rows first."
+                "{at}/hole.csv, row 7, column 'y': found nan (1 such cell in the selected columns), expected finite "
+                "numbers. Remove or repair these rows first."
             ),
         ),
         (
             lambda at: bad(at, "nan"),
             (
-                "'nan', row 7, column 'y': found nan (1 such cell in the selected columns), expected finite numbers. "
-                "Remove or repair these rows first."
+                "{at}/nan.csv, row 7, column 'y': found nan (1 such cell in the selected columns), expected finite "
+                "numbers. Remove or repair these rows first."
             ),
         ),
         (
@@ -761,7 +775,7 @@ def bad(folder, what):
         (
             lambda at: bad(at, "backwards"),
             (
-                "'backwards', row 7: got time -1 s after 0.3 s, expected later ones. "
+                "{at}/backwards.csv, row 7: got time -1 s after 0.3 s, expected later ones. "
                 "Sort the rows (--sort), or split the file where a new recording begins."
             ),
         ),
@@ -796,7 +810,7 @@ def test_an_empty_file_and_one_without_rows_are_refused(tmp_path):
 )
 def test_an_unknown_column_is_answered_with_those_there_are(files, tmp_path, option):
     said = refused("fit", *files, *option, "-o", tmp_path / "p.npz")
-    assert said == "'swing_0' has no column 'z'; it has x, y, vx, vy."
+    assert said == f"{files[0]} has no column 'z'; it has x, y, vx, vy."
 
 
 @pytest.mark.parametrize("option", ["--group", "--time"])
@@ -912,7 +926,7 @@ def test_a_rollout_that_makes_no_sense_is_refused(policy, tmp_path, options, sen
 
 def test_a_plane_without_a_direction_is_refused(policy, files):
     for command in (("rollout", policy, "--start", "0,0"), ("score", policy, files[0])):
-        assert refused(*command, "--plane", "0,0").startswith("--plane: normal: got [")
+        assert refused(*command, "--plane", "0,0").startswith("--plane: got [")
 
 
 def test_a_plane_of_other_dimension_than_the_actions_is_refused(policy, files):
@@ -927,9 +941,8 @@ def test_a_rollout_that_runs_away_is_refused(policy, tmp_path):
 
 def test_a_recording_of_other_columns_is_refused_by_score(policy, tmp_path):
     write(tmp_path / "other.csv", "t,a,b", [[0, 1, 2], [1, 2, 3]])
-    assert (
-        refused("score", policy, tmp_path / "other.csv") == "'other' has no column 'x', 'y', 'vx', 'vy'; it has a, b."
-    )
+    said = refused("score", policy, tmp_path / "other.csv")
+    assert said == f"{tmp_path}/other.csv has no column 'x', 'y', 'vx', 'vy'; it has a, b."
 
 
 def test_actions_that_are_no_velocities_cannot_be_rolled_out(tmp_path):
@@ -1262,4 +1275,4 @@ def test_fit_and_diagnose_name_the_sample_that_looks_wrong(tmp_path):
 
 
 def test_a_topic_of_a_file_without_any_is_refused(files):
-    assert "topic (--topic): " in refused("inspect", files[0], "--topic", "/joint_states")
+    assert refused("inspect", files[0], "--topic", "/joint_states").startswith(f"--topic: {files[0]} has none")

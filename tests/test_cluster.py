@@ -137,13 +137,16 @@ def test_the_command_line_fits_on_a_cluster(workers, tmp_path):
     said = []
     for name, more in (("here", []), ("there", ["--scheduler", workers.scheduler.address])):
         options = ["fit", pattern, "--state", "x,y", "--action", "vx,vy", "-o", str(tmp_path / f"{name}.npz")]
-        options += ["--learner", "hybrid"]
+        options += ["--learner", "hybrid", "--leave-out", "wipe_1"]
         ran = CliRunner().invoke(cli.main, [*options, *more], prog_name="unconstrain")
         assert ran.exit_code == 0, ran.stderr
         said.append(ran.stdout)
     same(uc.load(tmp_path / "there.npz"), uc.load(tmp_path / "here.npz"))
-    assert "600 samples" in said[0]
+    assert "2 demonstrations, 428 samples" in said[0]
     assert "where held out" in said[1]
+    ran = CliRunner().invoke(cli.main, [*options, *more, "--force", "--leave-out", "wipe1"], prog_name="unconstrain")
+    assert "--leave-out: no demonstration is called 'wipe1'" in ran.stderr
+    assert "Did you mean 'wipe_1'" in ran.stderr
 
 
 def test_errors_on_a_worker_are_ours(workers):

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import shutil
 import warnings
 
@@ -13,7 +14,7 @@ from numpy.testing import assert_allclose
 import unconstrain as uc
 from test_cli import call, refused, run, write
 from test_formats import workbook
-from unconstrain.cli import looking
+from unconstrain.cli import looking, progress
 
 HEAD = "Zeit [s],X [mm],Y [mm]"
 LINEAR = ("--model", "linear", "--learner", "direct")
@@ -102,16 +103,18 @@ def test_so_does_every_kind_of_file_and_with_that_column_they_are_the_strokes(on
 def test_what_comes_next_is_typed_as_this_was(tmp_path):
     file = write(tmp_path / "alle.csv", f"Strich,{HEAD}", strokes(words, 6))
     few = text(call("inspect", file))
-    assert "several-in-one, clock-gap" in few
-    assert "Next: --group Strich, which tells demonstrations apart." in few
+    assert "not as it should be: several-in-one. Next:" in few
+    assert "clock-gap" not in few  # it has the same cause
+    assert re.search(r"by the column 'Strich': unconstrain inspect \S+alle\.csv --group Strich ", few)
     shown = text(call("inspect", file, "--group", "Strich", "--state", "X,Y", "--by", "savgol", "--sort"))
     then = "--state X,Y --by savgol --sort --group Strich -o policy.npz"
     assert re.search(rf"Next: unconstrain fit .*alle\.csv {then}", shown)
 
 
-def test_many_files_are_not_all_said_again(folder):
+def test_many_files_are_a_pattern_that_stands_for_just_these(folder):
     each = sorted(folder.glob("*.csv"))
-    assert re.search(r"Next: unconstrain fit \S+w0\.csv \.\.\. -o policy\.npz", text(call("inspect", *each)))
+    for files, typed in ((each, shlex.quote(f"{folder}/*.csv")), (each[:4], shlex.join(map(str, each[:4])))):
+        assert f" unconstrain fit {typed} -o policy.npz\n" in run("inspect", *files)
 
 
 def test_a_file_of_a_constraint_says_which_mechanism_was_named(tmp_path):
@@ -185,7 +188,7 @@ def test_leaving_out_what_is_not_there_is_an_error(folder, policy, tmp_path, com
     before = (policy,) if command == "score" else ()
     after = (tmp_path / "to.csv",) if command == "convert" else ()
     said = refused(command, *before, folder / "w[01].csv", *after, "--leave-out", "W1,w9", *output)
-    assert "(--leave-out): no demonstration is called 'W1', 'w9'; there are 'w0', 'w1'." in said
+    assert "--leave-out: no demonstration is called 'W1', 'w9'; there are 'w0', 'w1'." in said
     assert said.endswith("Did you mean 'w1'?")
     assert not list(tmp_path.iterdir())
 
@@ -340,8 +343,8 @@ def test_the_verdict_speaks_of_obstacles(folder, policy, tmp_path):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--plane", "0,0"), "--plane: normal: got [0.0, 0.0], expected a vector that is not zero."),
-        (("--obstacle", "1,1,-2"), "--obstacle: radii: got -2.0, expected a number above 0.0."),
+        (("--plane", "0,0"), "--plane: got [0.0, 0.0], expected a vector that is not zero."),
+        (("--obstacle", "1,1,-2"), "--obstacle: got -2.0, expected a number above 0.0."),
         (("--obstacle", "{start},5"), "--start: is inside obstacle 1 of 1; expected a start outside of all."),
         (("--dt", "-1"), "--dt: got -1.0, expected a number above 0.0."),
     ],
@@ -386,3 +389,101 @@ def test_a_live_look_listens_where_it_is_told(folder, tmp_path, monkeypatch):
     monkeypatch.setattr(looking.click, "echo", click.utils.echo)
     assert "live: http://127.0.0.1:18765 (Ctrl-C ends it)" in heard
     assert "--port: belongs to --live" in refused("look", folder / "w0.csv", "--port", 1, "-o", tmp_path / "l.html")
+
+
+# Errors: whose they are, in words of who types
+
+
+MANY = ("--state", "X,Y", "--differentiate", *LINEAR)
+
+
+@pytest.mark.parametrize("command", ["fit", "diagnose", "score", "constraint", "convert"])
+def test_what_is_wrong_with_one_of_several_files_names_it(folder, policy, tmp_path, command):
+    bad = write(tmp_path / "w1.csv", HEAD.replace("Y", "Q"), stroke(1))
+    before, after = {"score": ((policy,), ()), "convert": ((), (tmp_path / "to.csv",))}.get(command, ((), ()))
+    output = ("-o", tmp_path / "p.npz") if command in ("fit", "constraint") else ()
+    model = ("--model", "affine") if command == "diagnose" else LINEAR if command == "fit" else ()
+    if command == "fit":  # where a file lacks what others have is the next test's
+        bad = write(tmp_path / "w1.csv", HEAD, [*stroke(1)[:9], [0.45, np.nan, 1.0], *stroke(1)[10:]])
+    states = ("--state", "X,Y") + (() if command == "convert" else ("--differentiate",))
+    said = refused(command, *before, folder / "w0.csv", bad, *after, *states, *model, *output)
+    assert said.startswith(f"{bad}, row 9, column 'X" if command == "fit" else f"{bad} has no column ")
+
+
+def test_a_stroke_of_a_table_is_named_with_its_table(tmp_path):
+    rows = strokes(words)
+    good = write(tmp_path / "a.csv", f"Strich,{HEAD}", [[f"A {row[0]}", *row[1:]] for row in rows])
+    rows[50][2] = np.nan
+    bad = write(tmp_path / "b.csv", f"Strich,{HEAD}", rows)
+    said = refused("fit", good, bad, "--group", "Strich", *MANY, "-o", tmp_path / "p.npz")
+    assert said.startswith(f"'Strich 1' of {bad}, row 10, column 'X")
+
+
+@pytest.mark.parametrize(
+    ("said", "typed"),
+    [
+        ("leave_out (--leave-out): no 'a'.", "--leave-out: no 'a'."),
+        ("a.bag: say which with topic (--topic): b.", "a.bag: say which with --topic: b."),
+        ("check --episodes (episodes), --task (task).", "check --episodes, --task."),
+        ("An affine policy (ParametricPolicy(Affine()), --model affine).", "An affine policy (--model affine)."),
+        ("max_gap_s: got -1.", "--max-gap: got -1."),
+        ("angle='x', angles=('a', 'b') or sort=True.", "--angle x, --angle a,b or --sort."),
+        (
+            "tell them apart with group=, or cut with seams='cut'.",
+            "tell them apart with --group, or cut with --seams cut.",
+        ),
+        ("Fit with learner=Robust(), or order=2.", "Fit with --learner robust, or --order 2."),
+        ("rate=5.csv: group=, 'time=3' of it=4", "rate=5.csv: --group, 'time=3' of it=4"),
+        ("name the time column (--time).", "name the time column (--time)."),
+    ],
+)
+def test_settings_are_said_as_options_but_for_names_of_files(said, typed, monkeypatch, tmp_path):
+    def fail(*_, **__):
+        warnings.warn(said, UserWarning, stacklevel=1)
+        raise uc.errors.SettingError(said)
+
+    monkeypatch.setattr(uc.preparation, "survey_set", fail)
+    ran = call("inspect", write(tmp_path / "a.csv", HEAD, stroke(0)))
+    assert ran.err == f"Note: {typed}\nError: {typed}\n"
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "meant"),
+    [
+        ("--time-unit", "mss", "'s', 'ms', 'us', 'ns'. Did you mean 'ms'?"),
+        ("--time-unit", "Milliseconds", "Did you mean 'ms'?"),
+        ("--time-unit", "µs", "Did you mean 'us'?"),
+        ("--time-unit", "fortnight", "'ns'."),
+        ("--model", "afine", "Did you mean 'affine'?"),
+        ("--scale", "aut", "expected auto, none, or numbers separated by commas, such as 1000,1."),
+    ],
+)
+def test_a_value_that_is_none_is_answered_with_what_was_meant(folder, tmp_path, option, value, meant):
+    assert refused("fit", folder, option, value, "-o", tmp_path / "p.npz").endswith(meant)
+
+
+def test_a_guess_at_the_states_is_a_command_that_runs(tmp_path):
+    axes = [f"{side} {axis} [mm]" for side in ("linker 'Arm'", "rechts") for axis in "xyz"]
+    for k in range(4):
+        rows = np.column_stack([stroke(k), stroke(k)[:, 1:], stroke(k + 4)[:, 1:]])
+        write(tmp_path / f"Weg {k}.csv", ",".join(["t", *axes]), rows)
+    shown = run("inspect", *sorted(tmp_path.glob("*.csv")))
+    assert "A guess, to be corrected:" in " ".join(shown.split())
+    [command] = [line for line in shown.splitlines() if line.startswith("    unconstrain fit ")]
+    _, *words_ = shlex.split(command)
+    run(*words_[:-1], tmp_path / "p.npz", *LINEAR)
+    assert json.loads(run("info", tmp_path / "p.npz", "--json"))["states"] == axes[:3]
+
+
+def test_what_few_demonstrations_show_says_where_to_record_and_what_lists_all_places(folder, tmp_path):
+    ran = run("fit", folder, "--leave-out", "w5", "-o", tmp_path / "p.npz")
+    assert re.search(r"least\s+is\s+known,\s+held\s+in\s+other\s+ways:\s+near\s+\(X\s+\[mm\]\s+=", ran)
+    assert f"\n    unconstrain diagnose {folder} --leave-out w5\n" in ran
+
+
+def test_a_long_fit_says_how_long_it_will_take(folder, tmp_path, monkeypatch):
+    clock = iter(np.arange(0.0, 1e4, 3.0))
+    monkeypatch.setattr(progress.time, "monotonic", lambda: float(next(clock)))
+    said = text(call("fit", folder, "--model", "affine", "-o", tmp_path / "p.npz"))
+    assert re.search(r"Note: this takes about \d+ s more \('--learner hybrid' takes about \d+ s in all\)\.", said)
+    assert said.count("Note: this takes about") == 1

@@ -419,3 +419,12 @@ def test_what_a_walk_looks_at_grows_with_the_demonstrations_and_not_with_their_s
     monkeypatch.setattr(stream, "named_demonstrations", lambda: iter(many))
     assert sum(len(batch.states) for batch in stream) == 900
     assert len(looked) <= 4 * len(many)
+
+
+def test_a_file_that_lacks_a_column_of_the_first_is_refused_as_by_prepare(tmp_path):
+    t = np.linspace(0, 1, 50)
+    for name, head in (("a", "t,x,y"), ("b", "t,x,z")):
+        np.savetxt(tmp_path / f"{name}.csv", np.column_stack([t, t, 1 - t]), "%.17g", ",", header=head, comments="")
+    stream = uc.Stream(sorted(tmp_path.glob("*.csv")), uc.Recipe(states=("x", "y"), differentiate="savgol"))
+    with pytest.raises(uc.errors.InvalidDataError, match=r"'b' has no column 'y'; it has x, z\."):
+        list(stream)

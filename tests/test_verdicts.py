@@ -1,6 +1,7 @@
 """What is said of numbers: signs and words agree, and nothing is claimed that data cannot tell."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -53,6 +54,25 @@ class TestMarks:
         found, alone = verdicts.of_score(share, 9, under), verdicts.of_score(min(share, under), 9)
         assert (found.mark, found.said.split(": ")[-1]) == (alone.mark, alone.said.split(": ")[-1])
         assert "--plane" not in found.doubt
+
+    def test_how_many_directions_were_held_is_a_bound_where_demonstrations_disagree(self):
+        def held(rank):
+            choice = SimpleNamespace(held_out=0.01, actions=4, doubts=(), lacking=())
+            return SimpleNamespace(rank_=rank, choice_=choice)
+
+        sure, unsure = verdicts.of_constraint(held(1), held(1)), verdicts.of_constraint(held(3), held(1), held(2))
+        assert sure.said.startswith("1 of 4 directions were held, others in each of 2 demonstrations; ")
+        assert unsure.said.startswith(
+            "At most 1 of 4 directions were held, others in each of 3 demonstrations (in some up"
+        )
+        assert (sure.mark, unsure.mark) == (Mark.GOOD, Mark.DOUBTFUL)
+
+    def test_a_command_that_comes_next_can_be_copied(self):
+        command = f"unconstrain fit {'a  b ' * 30}-o policy.npz"
+        for text in (command, f"{'Read the notes. ' * 9}Then:\n{command}"):
+            *prose, last = verdicts.Verdict(Mark.GOOD, "said", next=text).lines()
+            assert last.strip().removeprefix("Next: ") == command
+            assert max(map(len, prose)) <= 80
 
     @given(shares, shares)
     def test_who_explains_more_is_not_judged_worse(self, one, other):

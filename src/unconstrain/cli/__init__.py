@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import shlex
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -34,14 +33,7 @@ from .constraining import constraint, held_of, options_for_held
 from .converting import convert, example
 from .diagnosing import diagnose
 from .exporting import export
-from .fitting import (
-    alpha_of,
-    default_learner,
-    learn,
-    learner_of,
-    options_for_model,
-    policy_of,
-)
+from .fitting import alpha_of, default_learner, learn, learner_of, options_for_model, policy_of
 from .informing import TOLD, info, learnt_from, provenance
 from .looking import look, play
 from .printing import (
@@ -63,35 +55,45 @@ from .progress import shown
 from .reading import (
     fitted_policy,
     left_in,
+    likely_states,
+    next_command,
     numbers,
+    of_files,
     options_for_reading,
     prepared,
     reading_of,
     recipe_of,
+    recordings_of,
     said_recipe,
     stream_of,
-    typed,
 )
+from .speaking import as_typed
 from .writing import check_name, check_outputs, option_for_force
 
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
 
 
-@click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100, "show_default": True}
+
+
+@click.group(cls=Group, context_settings=SETTINGS)
 @click.version_option(package_name="unconstrain")
 def main() -> None:
     """Learn the policy behind movements that were recorded under unknown, changing constraints.
 
     \b
-    unconstrain play                      draw, and see what this is about
-    unconstrain demo                      the car-washing job, with a report
-    unconstrain example wiping            recordings to begin with
-    unconstrain inspect *.csv             what is in your recordings
-    unconstrain look *.csv                see them, in space and in time
-    unconstrain diagnose *.csv            noise, and what to record next
-    unconstrain fit *.csv -o policy.npz   learn from them
-    unconstrain constraint *.csv -o c.npz learn what held them
-    unconstrain info policy.npz           what a file is, and where it comes from
+    unconstrain play                              draw, and see what this is about
+    unconstrain demo                              wash a car, with a report
+    unconstrain example wiping                    recordings to begin with
+    unconstrain inspect *.csv                     what is in your recordings
+    unconstrain look *.csv                        see them, in space and in time
+    unconstrain diagnose *.csv                    noise, and what to record next
+    unconstrain fit *.csv -o policy.npz           learn from them
+    unconstrain score policy.npz new.csv          how good that is on others
+    unconstrain rollout policy.npz --start 0.1,0  move as was learnt
+    unconstrain export policy.npz -o policy.c     take it to a robot
+    unconstrain constraint *.csv -o held.npz      learn what held them
+    unconstrain info policy.npz                   what it is, and of what
 
     Completion by the tab key, here for bash (or zsh, fish):
 
@@ -114,7 +116,8 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
             first[:] = first or [recording]
             yield recording
 
-    surveys = uc.preparation.survey_set(recordings(), recipe)
+    with shown("reading"):
+        surveys = uc.preparation.survey_set(recordings(), recipe)
     if not first:
         raise ReadError(NOTHING_LEFT)
     names = uc.readers.unique_names(found.name for found in surveys)
@@ -124,25 +127,28 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
         plain = [
             asdict(found)
             | {
-                "warnings": [one._asdict() for one in found.warnings],
-                "notes": [one._asdict() for one in found.notes],
+                kind: [one._replace(message=as_typed(one.message))._asdict() for one in getattr(found, kind)]
+                for kind in ("warnings", "notes")
             }
             for found in surveys
         ]
         click.echo(json.dumps(plain, indent=2))
     else:
-        used, needed = "", ""
+        used, needed, more = "", "", tuple[str, ...]()
         try:
             used = f"fit uses {said_recipe(uc.preparation.decide(recipe, first[0])[0], first[0])}.\n"
         except UnconstrainError as error:
-            needed = str(error)
-        told = [
-            shlex.join(files) if len(files) < 4 else f"{shlex.quote(files[0])} ...",
-            shlex.join(typed("files", "as_json", "strict")),
-        ]
-        say_surveys(surveys, needed, f"unconstrain fit {' '.join(filter(None, told))} -o policy.npz")
+            needed, more = as_typed(str(error)), _guessed(recipe, first[0])
+        apart = next_command("inspect", "--group", without=["group"])
+        say_surveys(surveys, needed, next_command("fit", *more, "-o", "policy.npz"), apart)
         click.echo(used, nl=False)
     refuse_warnings(reading["strict"])
+
+
+def _guessed(recipe: uc.Recipe, first: uc.Recording) -> tuple[str, ...]:
+    """Options that may be what ``fit`` has to be told."""
+    states = () if recipe.states else ("--state", ",".join(likely_states(first.columns)))
+    return states if recipe.actions or recipe.differentiate else (*states, "--differentiate")
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain fit wipe_*.csv --state x,y,z --differentiate -o wipe.npz")
@@ -154,21 +160,25 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     "--alpha",
     type=alpha_of,
     metavar="FLOAT|AUTO",
-    help="Hybrid: weight of the standard risk in choosing the threshold, or auto.",
+    help="Hybrid: weight of the standard risk in choosing the threshold, 0.1 by default; auto softens in its place.",
 )
-@click.option("--softness", type=float, help="Hybrid: soften the split, such as 0.1; for noisy recordings.")
+@click.option(
+    "--softness",
+    type=float,
+    help="Hybrid: soften the split between what is consistent and what is near, such as 0.1; for noisy recordings.",
+)
 @click.option(
     "--speed-power",
     type=float,
     default=0.0,
-    show_default=True,
     help="Weight samples by this power of their speed; 2 for noisy recordings.",
 )
+@click.option("--folds", type=click.IntRange(2), default=10, help="Folds to choose the threshold on.")
 @click.option(
-    "--folds", type=click.IntRange(2), default=10, show_default=True, help="Folds to choose the threshold on."
-)
-@click.option(
-    "--hold-out", type=click.Choice(["auto", "demonstration", "sample"]), default="auto", help="Unit of a fold."
+    "--hold-out",
+    type=click.Choice(["auto", "demonstration", "sample"]),
+    default="auto",
+    help="What a fold holds out together; auto: demonstrations, or samples of a single one.",
 )
 @click.option("--report", type=click.Path(dir_okay=False), help="Also write an HTML report there.")
 @option_for_force
@@ -207,8 +217,9 @@ def fit(
     fitted = policy_of(model, variance, centres, scale, **chosen)
     with shown("reading, placing, learning") as progress:
         stream = stream_of(paths, speed_power, progress, **reading)
-        learn(fitted, stream, scheduler)
-    judged = judge_fit(fitted, stream, scheduler is not None)
+        with of_files(recordings_of(stream)):
+            learn(fitted, stream, scheduler)
+            judged = judge_fit(fitted, stream, scheduler is not None)
     if not as_json:
         say_verdict(judged.verdict)
         click.echo(f"Learnt from {said_recipe(stream.recipe, stream.first)}.")
@@ -235,7 +246,7 @@ def _reported(policy: uc.Policy, stream: uc.Stream, report: str | None, title: s
 @main.command(epilog="\b\nExample:\n  unconstrain score wipe.npz other.csv --plane 0,0.3,1 --json")
 @click.argument("policy", type=click.Path())
 @options_for_reading
-@options_for_held("that was held, for the errors that need one")
+@options_for_held("that held these recordings, to score under it, too")
 @option_for_json
 def score(
     policy: str,
@@ -245,14 +256,16 @@ def score(
     as_json: bool,
     **reading: Any,
 ) -> None:
-    """Score how well POLICY explains the demonstrations in each FILE.
+    """Score how well POLICY explains recordings.
 
-    They are read and prepared as the training data of the policy was, but for what options say.
+    The demonstrations in each FILE are read and prepared as the training data of the policy was, but for what options
+    say.
     """
     from ..pages.fit import replayed
 
     learnt, notes = fitted_policy(policy), uc.storage.load_notes(policy)
-    demonstrations, recipe, recordings = prepared(files, reading, notes)
+    with shown("reading"):
+        demonstrations, recipe, recordings = prepared(files, reading, notes)
     refuse_warnings(reading["strict"])
     held = held_of(plane, constraint, recipe, learnt.n_features_in_, learnt.n_outputs_, "one for each action")
 
@@ -284,8 +297,8 @@ def score(
 @main.command(epilog="\b\nExample:\n  unconstrain rollout wipe.npz --start 0.1,0,0 --plane 0,0.3,1 -o path.csv")
 @click.argument("policy", type=click.Path())
 @click.option("--start", type=numbers, required=True, help="Initial state, one number for each state column.")
-@click.option("--steps", type=click.IntRange(1), default=200, show_default=True, help="Number of samples.")
-@click.option("--dt", type=float, default=0.02, show_default=True, help="Seconds between samples.")
+@click.option("--steps", type=click.IntRange(1), default=200, help="Number of samples.")
+@click.option("--dt", type=float, default=0.02, help="Seconds between samples.")
 @options_for_held("to stay on")
 @click.option(
     "--obstacle",
@@ -294,14 +307,11 @@ def score(
     multiple=True,
     help="Centre of a ball to go round, and its radius; or of an ellipsoid, and its radii. More than once for several.",
 )
-@click.option(
-    "--method", type=click.Choice(["euler", "rk4", "adaptive"]), default="euler", show_default=True, help="Of steps."
-)
+@click.option("--method", type=click.Choice(["euler", "rk4", "adaptive"]), default="euler", help="How a step is taken.")
 @click.option(
     "--order",
     type=click.IntRange(1, 2),
     default=1,
-    show_default=True,
     help="2 where states are positions, then velocities, and actions accelerations.",
 )
 @click.option(
@@ -312,12 +322,7 @@ def score(
     help="Stop where demonstrations support less, 1 near and 0 far from them; 0 goes on.",
 )
 @click.option(
-    "-o",
-    "--output",
-    type=click.Path(dir_okay=False, allow_dash=True),
-    default="-",
-    show_default=True,
-    help="CSV file; - prints.",
+    "-o", "--output", type=click.Path(dir_okay=False, allow_dash=True), default="-", help="CSV file; - prints."
 )
 @option_for_force
 @option_for_json
@@ -371,22 +376,16 @@ def rollout(
 @main.command(epilog="\b\nExample:\n  unconstrain reproduce table1 --trials 100 --out results")
 @click.argument("experiment", type=click.Choice(experiments.NAMES))
 @click.option("--trials", type=click.IntRange(1), help="Data sets; the paper's number by default.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of all random numbers.")
+@click.option("--seed", type=click.IntRange(0), default=0, help="Seed of all random numbers.")
 @click.option(
     "--only",
     multiple=True,
     help="Of regimes: a system, a constraint, or both, such as 'limit cycle, half'. Of recorded: a kind of data.",
 )
 @click.option(
-    "--workers", type=int, default=-1, help="Processes; one for each core by default. The numbers do not depend on it."
+    "--workers", type=int, default=-1, help="Processes; -1 is one for each core. The numbers do not depend on it."
 )
-@click.option(
-    "--out",
-    type=click.Path(file_okay=False),
-    default="results",
-    show_default=True,
-    help="Folder for NAME.json and NAME.html.",
-)
+@click.option("--out", type=click.Path(file_okay=False), default="results", help="Folder for NAME.json and NAME.html.")
 @option_for_json
 def reproduce(experiment: str, out: str, **settings: Any) -> None:
     """Run one of the paper's experiments, beside its printed values.
@@ -402,10 +401,8 @@ def reproduce(experiment: str, out: str, **settings: Any) -> None:
 @click.option("--real", is_flag=True, help="Learn from recorded wiping of a car rim, leaving one tilt out at a time.")
 @click.option("--download", is_flag=True, help="Fetch those recordings (3 MB) if they are not there.")
 @click.option("--plate", type=numbers, help="TILT_X,TILT_Y of a further plate to wipe, degrees.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the simulation.")
-@click.option(
-    "--out", type=click.Path(file_okay=False), default="demo", show_default=True, help="Folder for the report."
-)
+@click.option("--seed", type=click.IntRange(0), default=0, help="Seed of the simulation.")
+@click.option("--out", type=click.Path(file_okay=False), default="demo", help="Folder for the report.")
 @option_for_json
 def demo(out: str, **settings: Any) -> None:
     """Wash a car: learn on some surfaces, test on others.
@@ -417,10 +414,10 @@ def demo(out: str, **settings: Any) -> None:
     commands.demo(out, print_table, shown, **settings)
 
 
-@main.command(epilog="\b\nExample:\n  unconstrain doctor")
+@main.command(epilog="\b\nExample:\n  unconstrain doctor --json")
 @option_for_json
 def doctor(as_json: bool) -> None:
-    """List what is installed, what is missing, and how to install it."""
+    """List what is missing, and how to install it."""
     from .doctor import examine
 
     found = examine()

@@ -13,11 +13,14 @@ from ..base.errors import ModelFileError
 
 @click.command(epilog="\b\nExample:\n  unconstrain certify guided.npz")
 @click.argument("policy", type=click.Path())
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of starts and planes.")
+@click.option(
+    "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the starts and planes that are tried."
+)
 def certify(policy: str, seed: int) -> None:
-    """Say what is guaranteed of the motion of POLICY, by what margin, where and under which constraints.
+    """Say what is guaranteed of the motion of POLICY.
 
-    Exits with 1 where it is not, with a start, and a plane, from which it does not arrive.
+    By what margin, where and under which constraints. Exits with 1 where it is not, with a start, and a plane, from
+    which it does not arrive.
     """
     import numpy as np
 
@@ -27,7 +30,7 @@ def certify(policy: str, seed: int) -> None:
     elif isinstance(stored, uc.Policy) and hasattr(stored, "solution_"):
         around = _learnt_at(stored)
     else:
-        raise ModelFileError(f"{policy}: holds no policy that is fitted or guided. Save one with uc.save.")
+        raise ModelFileError(f"{policy}: holds no policy that is fitted or guided. Learn one with 'unconstrain fit'.")
     found = uc.certify(stored, around, seed)
     click.echo(f"{policy}: {found.said}")
     if not found.holds:

@@ -42,10 +42,18 @@ FEATURES = ("auto", "constant", "affine", "quadratic", "rbf")
     type=click.Path(dir_okay=False),
     help="File for the constraint (.npz); where each demonstration has its own, the stem of theirs.",
 )
-@click.option("--features", type=click.Choice(FEATURES), default="auto", show_default=True, help="How A may vary.")
+@click.option(
+    "--features",
+    type=click.Choice(FEATURES),
+    default="auto",
+    show_default=True,
+    help="How the held directions may vary with the state.",
+)
 @click.option("--jacobian", metavar="URDF", help="States are joint angles of this robot: what is held is its hand.")
 @click.option("--tip", help="With --jacobian: the link that is its hand.")
-@click.option("--with-task", is_flag=True, help="Along what is held it moves, as a function of the state.")
+@click.option(
+    "--with-task", is_flag=True, help="What is held also moves by itself: learn how, as a function of the state."
+)
 @click.option("--surface", is_flag=True, help="Learn from the positions alone: they lie on a surface.")
 @click.option("--report", type=click.Path(dir_okay=False), help="Also write an HTML page there.")
 @option_for_force
@@ -187,7 +195,9 @@ def _numbers(learnt: uc.LearntConstraint) -> dict[str, Any]:
 
 def options_for_held(what: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Add the options that name a constraint."""
-    plane = click.option("--plane", type=numbers, help=f"Normal of a plane {what}.")
+    plane = click.option(
+        "--plane", type=numbers, help=f"Normal of a plane {what}; one number for each action, such as 0,0.3,1."
+    )
     learnt = click.option("--constraint", type=click.Path(), help=f"Learnt constraint {what} (.npz).")
     return lambda command: plane(learnt(command))
 

@@ -14,7 +14,8 @@ import unconstrain as uc
 
 from ..base.errors import NOTHING_LEFT, ReadError
 from .printing import option_for_json
-from .reading import left_in, options_for_reading, reading_of, recipe_of
+from .progress import shown
+from .reading import left_in, of_files, options_for_reading, reading_of, recipe_of
 from .writing import check_outputs, option_for_force
 
 
@@ -25,21 +26,24 @@ from .writing import check_outputs, option_for_force
 @option_for_force
 @option_for_json
 def convert(files: Sequence[str], output: str, align: bool, force: bool, as_json: bool, **options: Any) -> None:
-    """Write the recordings in each FILE to OUTPUT: .csv, .parquet, .mcap, or a folder for LeRobot.
+    """Write recordings in another format.
 
-    With --state or --action only those columns are written.
+    Those in each FILE go to OUTPUT: .csv, .parquet, .mcap, or a folder for LeRobot. With --state or --action only
+    those columns are written.
     """
     paths = uc.readers.expand(files)
     check_outputs((output,), paths, force)
-    every = left_in(uc.read(paths, **reading_of(**options).arguments), options["leave_out"])
-    recordings = [_timed(recording, options.get("rate")) for recording in every]
+    with shown("reading"):
+        every = left_in(uc.read(paths, **reading_of(**options).arguments), options["leave_out"])
+        recordings = [_timed(recording, options.get("rate")) for recording in every]
     if not recordings:
         raise ReadError(NOTHING_LEFT)
     if align:
         recordings = [uc.preparation.align(recordings)]
-    states, actions = _columns(recordings[0], options)
-    kept = (*states, *actions) or recordings[0].columns
-    chosen = [replace(each, columns=kept, values=each.select(kept)) for each in recordings]
+    with of_files(recordings):
+        states, actions = _columns(recordings[0], options)
+        kept = (*states, *actions) or recordings[0].columns
+        chosen = [replace(each, columns=kept, values=each.select(kept)) for each in recordings]
     uc.writers.write_recordings(chosen, output, states, actions)
     counts = {"recordings": len(chosen), "samples": sum(map(len, chosen))}
     if as_json:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, Literal
 
 import click
@@ -11,11 +12,13 @@ import click
 import unconstrain as uc
 
 from ..base.errors import SettingError
-from .reading import numbers
+from .reading import numbers, recordings_of
+
+CENTRES = 25
 
 MODELS: dict[str, Callable[..., uc.Policy]] = {
     "local": lambda variance=None, **chosen: uc.LocallyLinearPolicy(variance, **chosen),
-    "rbf": lambda centres=25, **chosen: uc.ParametricPolicy(uc.KMeansRBF(centres), **chosen),
+    "rbf": lambda centres=CENTRES, **chosen: uc.ParametricPolicy(uc.KMeansRBF(centres), **chosen),
     "auto": lambda **chosen: uc.ParametricPolicy("auto", **chosen),
     "affine": lambda **chosen: uc.ParametricPolicy(uc.Affine(), **chosen),
     "quadratic": lambda **chosen: uc.ParametricPolicy(uc.Polynomial(2), **chosen),
@@ -29,17 +32,18 @@ def options_for_model(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options that choose the model of the policy."""
     scale = "What counts as one of each state, such as 1000,1 for mm beside rad; auto finds it."
     metavar = "AUTO|NONE|A,B,..."
-    command = click.option(
-        "--scale", type=scale_of, default="none", show_default=True, metavar=metavar, help=scale, callback=_levelled
-    )(command)
-    variance = "Local: σ² of the receptive fields. By default from the data."
-    command = click.option("--centres", type=click.IntRange(1), help="RBF: number of kernels, 25 by default.")(command)
+    command = click.option("--scale", type=scale_of, default="none", metavar=metavar, help=scale, callback=_levelled)(
+        command
+    )
+    variance = "Local: σ² of the receptive fields, squared unit of the states; by default from the data."
+    command = click.option("--centres", type=click.IntRange(1), help=f"RBF: number of kernels; {CENTRES} by default.")(
+        command
+    )
     command = click.option("--variance", type=float, help=variance)(command)
     return click.option(
         "--model",
         type=click.Choice(MODELS),
         default="local",
-        show_default=True,
         help="Model of the policy; auto takes the one of least estimated error.",
     )(command)
 
@@ -54,7 +58,9 @@ def alpha_of(text: str) -> float | Literal["auto"]:
 
 def scale_of(text: str) -> str | tuple[float, ...] | None:
     """Numbers, auto, or None."""
-    return {"auto": "auto", "none": None}[text] if text in ("auto", "none") else numbers(text)
+    with suppress(click.BadParameter):
+        return {"auto": "auto", "none": None}[text] if text in ("auto", "none") else numbers(text)
+    raise click.BadParameter(f"got {text!r}, expected auto, none, or numbers separated by commas, such as 1000,1.")
 
 
 def _levelled(_: click.Context, __: click.Parameter, scale: Any) -> Any:
@@ -105,5 +111,7 @@ def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None) -> None:
         policy.fit_batches(stream)
         return
     uc.cluster.check_learner(policy.learner)  # before anybody is waited for
+    if stream.leave_out - {path.name.partition(".")[0] for path in stream.paths}:  # workers know their own files only
+        uc.readers.check_left_out(sorted(stream.leave_out), [one.name for one in recordings_of(stream)])
     with uc.cluster.connected(scheduler) as client:
         uc.cluster.fit_batches(policy, stream.parts(), client=client)

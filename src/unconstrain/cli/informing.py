@@ -67,7 +67,10 @@ def learnt_from(policy: uc.Policy, notes: Mapping[str, Any], recordings: Sequenc
 @click.argument("file", type=click.Path())
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def info(file: str, as_json: bool) -> None:
-    """Say what the policy or constraint in FILE is, and where it comes from."""
+    """Say what is in FILE, and where it comes from.
+
+    A policy, guided or not, or a constraint.
+    """
     held, notes = _loaded(file), uc.storage.load_notes(file)
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held), **_rest(notes)}
     if as_json:

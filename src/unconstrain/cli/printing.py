@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import re
 import sys
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
@@ -18,6 +19,8 @@ import unconstrain as uc
 from ..base.display import counted, listed
 from ..base.errors import InvalidDataError, SettingError
 from .endings import REFUSED, ending
+from .reading import next_command
+from .speaking import as_typed, meant_of
 from .terminal import plain_output
 
 if TYPE_CHECKING:
@@ -33,6 +36,9 @@ MEANINGS = {
     "nPOE": "recorded motion that the constraint would forbid, over the variance of the actions",
 }
 """What the heads of tables stand for."""
+
+PLACES = 20
+"""Of each demonstration, about, that are looked at for where least is known."""
 
 TITLES = "unconstrain.titles"
 """Where it is kept which recordings each code was said of."""
@@ -63,20 +69,17 @@ class Group(click.Group):
                     return super().invoke(ctx)
                 finally:
                     say_others()
+        except click.BadParameter as error:
+            known: Sequence[str] = getattr(getattr(error.param, "type", None), "choices", ())
+            refused = re.match(r"'(.*)' is not one of", error.message or "")
+            meant = meant_of(refused[1], known) if refused else ""
+            raise type(error)(f"{error.message}{meant}", error.ctx, error.param) if meant else error from None
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
         except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - the last clause
             said, code = ending(error)
-            click.echo(f"Error: {self._as_option(ctx, said)}", err=True)
+            click.echo(f"Error: {as_typed(said)}", err=True)
             ctx.exit(code)
-
-    def _as_option(self, ctx: click.Context, said: str) -> str:
-        """A sentence that begins with the name of a setting, with that of its option."""
-        command = self.commands.get(ctx.invoked_subcommand or "")
-        name, _, rest = said.partition(": ")
-        options = {one.name: one.opts[-1] for one in command.params if one.opts[-1].startswith("--")} if command else {}
-        option = options.get(name) or options.get(name.removesuffix("_s"))  # seconds
-        return f"{option}: {rest}" if option else said
 
 
 @contextmanager
@@ -85,15 +88,15 @@ def of_option(name: str) -> Iterator[None]:
     try:
         yield
     except SettingError as error:
-        raise SettingError(f"{name}: {error}") from None
+        raise SettingError(f"{name}: {re.sub(r'^[a-z_]+: ', '', str(error))}") from None
 
 
-def say_surveys(surveys: Sequence[Any], needed: str, then: str) -> None:
+def say_surveys(surveys: Sequence[Any], needed: str, then: str, apart: str) -> None:
     """Print what was found in recordings: a line for each, columns, what is not as it seems, what fit has to know.
 
-    ``then`` is the command that comes next.
+    ``then`` is the command that comes next, or, before the column that does so, ``apart`` to tell demonstrations apart.
     """
-    say_verdict(uc.evaluation.verdicts.of_surveys(surveys, needed, then))
+    say_verdict(uc.evaluation.verdicts.of_surveys(surveys, needed, then, apart))
     rows = [
         [
             found.name,
@@ -118,10 +121,14 @@ def say_surveys(surveys: Sequence[Any], needed: str, then: str) -> None:
         if found.non_increasing:
             click.echo(f"{found.title}: time does not increase at row {found.non_increasing[0]}.")
     each = [(found.title, remark) for found in surveys for remark in (*found.warnings, *found.notes)]
+    several = {title for title, remark in each if remark.code == "several-in-one"}
+    each = [
+        (title, one) for title, one in each if title not in several or one.code not in uc.evaluation.verdicts.SAME_CAUSE
+    ]
     for code in dict.fromkeys(remark.code for _, remark in sorted(each, key=lambda one: not one[1].warns)):
         titles = {title: remark for title, remark in reversed(each) if remark.code == code}
         *others, first = titles
-        click.echo(titles[first].about(first))
+        click.echo(as_typed(titles[first].about(first)))
         if others:
             click.echo(f"  the same of {listed(others[::-1], 8)}, {len(titles)} in all")
 
@@ -158,7 +165,22 @@ def judge_fit(policy: uc.Policy, stream: uc.Stream, on_cluster: bool) -> Judged:
     held_out, nan = policy.held_out_score(), float("nan")
     count, samples, missed = (len(stream.paths), 0, nan) if on_cluster else _walked(policy, stream)
     told = uc.evaluation.diagnosis.states_told(policy)
-    return Judged(uc.evaluation.verdicts.of_explained(held_out, count, told), count, samples, 1.0 - missed, held_out)
+    open_ = told is not None and told < uc.evaluation.verdicts.MOSTLY and not on_cluster
+    there = _least_known(policy, stream) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
+    verdict = uc.evaluation.verdicts.of_explained(held_out, count, told, there=there)
+    return Judged(verdict, count, samples, 1.0 - missed, held_out)
+
+
+def _least_known(policy: uc.Policy, stream: uc.Stream) -> str:
+    """Where more demonstrations tell most, and the command that lists all such places."""
+    import numpy as np
+
+    demos = [one[:: max(1, len(one) // PLACES)] for one in stream.beginning()]
+    states, _, groups = uc.stack(demos)
+    row = int(np.linalg.norm(policy.uncertainty(states).undetermined, axis=1).argmax())
+    place = uc.evaluation.diagnosis.named(states[row].tolist(), stream.recipe.states or ())
+    least = f"Record more where least is known, held in other ways: near {place}, as in '{demos[groups[row]].name}'."
+    return f"{least} All such places:\n{next_command('diagnose')}"
 
 
 def say_fit(policy: uc.Policy, stream: uc.Stream, judged: Judged, learner: str, verbose: bool) -> None:
@@ -307,7 +329,7 @@ def show_warning(message: Warning | str, *_: Any) -> None:
         titles[message.title] = None  # type: ignore[union-attr]
         if len(titles) > 1:
             return
-    click.echo(f"Note: {message}", err=True)
+    click.echo(f"Note: {as_typed(str(message))}", err=True)
 
 
 def say_others() -> None:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
+import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,8 +15,12 @@ import click
 
 import unconstrain as uc
 
-from ..base.errors import NOTHING_LEFT, ModelFileError, ReadError, SettingError
+from ..base.display import bare
+from ..base.errors import NOTHING_LEFT, InvalidDataError, ModelFileError, ReadError, SettingError, UnconstrainError
 from .progress import Progress
+
+MOST_GUESSED = 3
+"""Columns, at most, that are proposed as states where their names say nothing."""
 
 
 def names(text: str) -> tuple[str, ...]:
@@ -41,29 +48,51 @@ CURES = (
     click.option("--angle", type=names, help="State columns that are angles, such as roll,yaw."),
     click.option("--degrees", type=names, help="Columns in degrees, by default as their units or jumps say; or none."),
     click.option(
-        "--quaternion", "quaternions", multiple=True, help="Four state columns of a quaternion; several times."
+        "--quaternion",
+        "quaternions",
+        multiple=True,
+        help="Four state columns of a quaternion, such as qw,qx,qy,qz; again for another.",
     ),
     click.option(
-        "--rotation-vector", "rotation_vectors", multiple=True, help="Three state columns of a rotation vector."
+        "--rotation-vector",
+        "rotation_vectors",
+        multiple=True,
+        help="Three state columns of a rotation vector, such as rx,ry,rz; again for another.",
     ),
     click.option(
         "--action-is",
         type=click.Choice(["auto", "velocity", "target", "delta"]),
         default="auto",
-        show_default=True,
         help="What action columns hold: velocities, states to come, or changes to the next sample.",
     ),
-    click.option("--pauses", type=click.Choice(["drop", "keep"]), default="drop", help="Standing still in the middle."),
+    click.option(
+        "--pauses", type=click.Choice(["drop", "keep"]), default="drop", help="Rows that stand still in the middle."
+    ),
     click.option(
         "--glitches",
         type=click.Choice(["keep", "repair", "drop"]),
         default="keep",
-        help="Samples far off their neighbours.",
+        help="Samples far off their neighbours: repair puts a straight line there.",
     ),
-    click.option("--seams", type=click.Choice(["keep", "cut"]), default="keep", help="Jumps between demonstrations."),
-    click.option("--max-gap", type=float, help="Longest interval between samples that is no gap, seconds."),
+    click.option(
+        "--seams",
+        type=click.Choice(["keep", "cut"]),
+        default="keep",
+        help="Jumps to another place: cut smooths nothing across.",
+    ),
+    click.option(
+        "--max-gap",
+        type=float,
+        help="Longest interval between samples that is no gap, seconds; by default five usual ones.",
+    ),
     click.option("--sort", is_flag=True, help="Put the rows in the order of time."),
-    click.option("--leave-out", type=names, default="", help="Names of demonstrations to leave out."),
+    click.option(
+        "--leave-out",
+        type=names,
+        default="",
+        show_default=False,
+        help="Names of demonstrations to leave out, such as wipe_3,wipe_7.",
+    ),
     click.option("--strict", is_flag=True, help="End with exit code 2 where something is not as it seems."),
 )
 """Options for what is not what it seems."""
@@ -82,14 +111,22 @@ def options_for_reading(command: Callable[..., Any]) -> Callable[..., Any]:
                 type=click.Choice(["savgol", "kalman", "central"]),
                 help="How to differentiate, savgol by default; implies --differentiate.",
             ),
-            click.option("--window", type=float, help="Smoothing window of savgol, seconds."),
-            click.option("--still", type=float, help="Trim what is slower than this at start and end."),
-            click.option("--rate", type=float, help="Resample to this many samples a second."),
+            click.option("--window", type=float, help="Smoothing window of savgol, seconds; 0.25 by default."),
+            click.option(
+                "--still", type=float, help="Trim what is slower than this at start and end, unit of the actions."
+            ),
+            click.option(
+                "--rate", type=float, help="Resample to this many samples a second; without time stamps, their rate."
+            ),
             click.option("--centre", is_flag=True, help="States relative to the mean of each demonstration."),
             *CURES,
-            click.option("--group", help="Column that names the demonstration; or none."),
-            click.option("--time", help="Column with the time stamps."),
-            click.option("--time-unit", type=click.Choice(["s", "ms", "us", "ns"]), help="What the time stamps count."),
+            click.option("--group", help="Column that tells demonstrations apart; none: each file is one."),
+            click.option("--time", help="Column with the time stamps; by default one called t, time or so."),
+            click.option(
+                "--time-unit",
+                type=click.Choice(["s", "ms", "us", "ns"]),
+                help="Unit of the time stamps; by default as their name or size says.",
+            ),
             click.option("--columns", type=names, help="Names of the columns, in order, for files without a header."),
             click.option("--topic", help="ROS: topic to read. Excel: sheet."),
             click.option("--episodes", type=names, help="Demonstrations to read, such as 0-9,12 or train."),
@@ -175,6 +212,54 @@ def reading_of(**options: Any) -> uc.readers.Reading:
     return uc.readers.Reading(**{name: value for name, value in options.items() if name in known})
 
 
+@contextmanager
+def of_files(recordings: Iterable[uc.Recording]) -> Iterator[None]:
+    """Let what is wrong with a recording begin with its file; they are looked through where something is."""
+    try:
+        yield
+    except (InvalidDataError, SettingError) as error:
+        named = re.match(r"'(.+?)'(?=,|:| has )", str(error))
+        with suppress(UnconstrainError):
+            files = {one.file: None for one in recordings if named and one.name == named[1] and one.file}
+            if named and files:
+                own = any(Path(file).name.partition(".")[0] == named[1] for file in files)
+                title = " or ".join(files) if own else f"{named[0]} of {' or '.join(files)}"
+                error.args = (f"{title}{str(error)[named.end() :]}", *error.args[1:])
+        raise
+
+
+def recordings_of(stream: uc.Stream) -> Iterator[uc.Recording]:
+    """Read a stream's files once more."""
+    return (one for path in stream.paths for one in uc.readers.read_blocks(path, stream.reading, whole=True))
+
+
+def next_command(name: str, *more: str, without: Sequence[str] = ()) -> str:
+    """Another command, to copy: of the files and options of this one, as far as it has them."""
+    context = click.get_current_context()
+    known = {one.name for one in context.find_root().command.commands[name].params}  # type: ignore[attr-defined]
+    others = [one.name or "" for one in context.command.params if one.name not in known]
+    told = typed("files", "output", "report", "force", "verbose", "as_json", "strict", *others, *without)
+    return f"unconstrain {name} {_as_pattern(context.params['files'])} {shlex.join([*told, *more])}".rstrip()
+
+
+def _as_pattern(files: Sequence[str]) -> str:
+    """Files as they were typed; many by a pattern that stands for just these."""
+    folder, pattern = Path(files[0]).parent, f"*{Path(files[0]).suffix}"
+    if len(files) > 3 and sorted(map(Path, files)) == sorted(folder.glob(pattern)):
+        return shlex.quote(str(folder / pattern))
+    return shlex.join(files)
+
+
+def likely_states(columns: Sequence[str]) -> tuple[str, ...]:
+    """Columns that may be the states, where none are called so: the first x, y, z beside each other, or the first."""
+    plain = [bare(name).strip(" \"'").casefold() for name in columns]
+    for width in (3, 2):
+        for start in range(len(columns) - width + 1):
+            if "".join(name[-1:] for name in plain[start : start + width]) == "xyz"[:width]:
+                return tuple(columns[start : start + width])
+    return tuple(columns[:MOST_GUESSED])
+
+
 def typed(*without: str) -> list[str]:
     """The options of this command as they were typed, but for some."""
     context, told = click.get_current_context(), list[str]()
@@ -222,8 +307,8 @@ def prepared(paths: Sequence[Any], reading: dict[str, Any], notes: Mapping[str, 
     recordings = list(left_in(uc.read(paths, **how.arguments), reading["leave_out"]))
     if not recordings:
         raise ReadError(NOTHING_LEFT)
-    demonstrations = uc.prepare(recordings, asked)
-    return Prepared(demonstrations, uc.preparation.decide(asked, recordings[0])[0], recordings)
+    with of_files(recordings):
+        return Prepared(uc.prepare(recordings, asked), uc.preparation.decide(asked, recordings[0])[0], recordings)
 
 
 def _but(kept: Any, asked: Any) -> Any:

@@ -5,6 +5,7 @@ The thresholds of everything that is judged stand here, each with its reason; pa
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from enum import Enum
 from functools import partial
@@ -74,14 +75,15 @@ class Verdict(NamedTuple):
         return self._asdict() | {"mark": self.mark.name.lower()}
 
     def lines(self) -> list[str]:
-        """For a terminal of 80 columns."""
+        """For a terminal of 80 columns; a command that comes next, or follows in a line of its own, stays whole."""
         whole = partial(wrap, width=WIDTH, break_on_hyphens=False)  # options and paths can be copied
         said = whole(f"{self.mark.value} {self.said}", subsequent_indent="  ")
-        return said + [
-            line
-            for name, text in self.rest()
-            for line in whole(f"{name}: {text}", initial_indent="  ", subsequent_indent="    ")
-        ]
+        for name, text in self.rest():
+            prose, *commands = f"{name}: {text}".split("\n")
+            named = prose.startswith("Next: unconstrain ")
+            said += [f"  {prose}"] if named else whole(prose, initial_indent="  ", subsequent_indent="    ")
+            said += [f"    {command}" for command in commands]
+        return said
 
 
 def _graded(share: float, good: float = GOOD, fair: float = FAIR) -> tuple[Mark, str]:
@@ -96,7 +98,11 @@ def of_untold(share: float) -> str:
 
 
 def of_explained(
-    share: float, demonstrations: int, determined: float | None = None, what: str = "held-out motion"
+    share: float,
+    demonstrations: int,
+    determined: float | None = None,
+    what: str = "held-out motion",
+    there: str = "",
 ) -> Verdict:
     """Judge how much of some motion a policy explains, along the motion.
 
@@ -110,10 +116,13 @@ def of_explained(
         Share of the recorded states at which recordings tell the policy.
     what : str
         The motion.
+    there : str
+        What to record where fewer show it.
     """
     across = "What constraints hid: no recording shows it, so no score does."
     if determined is not None and determined < MOSTLY and demonstrations >= ENOUGH:
-        across = f"Across the motion: {of_untold(1 - determined)}; 'unconstrain diagnose' says where."
+        across = f"Across the motion: {of_untold(1 - determined)}"
+        across += "." if there else "; 'unconstrain diagnose' says where."
     if demonstrations < ENOUGH or not np.isfinite(share):
         seen = f"explains {share:.0%} of {what}, but " if np.isfinite(share) else ""
         few = f"{seen}no verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
@@ -126,7 +135,7 @@ def of_explained(
         Mark.BAD: "Look at the recordings ('unconstrain inspect'): columns, clocks or units may be wrong.",
     }[mark]
     trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
-    return Verdict(mark, f"Explains {share:.0%} of {what}: {word}.", trust, across, advice)
+    return Verdict(mark, f"Explains {share:.0%} of {what}: {word}.", trust, across, f"{advice} {there}".rstrip())
 
 
 def of_score(share: float, demonstrations: int, under: float | None = None, learnt: int | None = None) -> Verdict:
@@ -190,11 +199,14 @@ def of_constraint(learnt: LearntConstraint, *others: LearntConstraint) -> Verdic
         said = "No direction was held: nothing constrained these movements, or each direction was seen."
         return Verdict(Mark.DOUBTFUL, said, next="Look whether the demonstrations were held in different ways.")
     mark, word = _graded(1.0 - missed)
-    held = f"{' to '.join(map(str, sorted({min(ranks), max(ranks)})))} of {choice.actions} directions were held"
+    held = f"{min(ranks)} of {choice.actions} directions were held"
     apart = f", others in each of {_count(len(every))}" if others else ""
+    if len(ranks) > 1:
+        held = f"At most {held}"
+        apart += f" (in some up to {max(ranks)} look so, as does a direction in which nobody moved)"
     said = f"{held}{apart}; {missed:.0%} of held-out motion is along them: {word}."
     then = "Use it with 'unconstrain rollout --constraint' or 'score --constraint'."
-    if choice.doubts and mark is Mark.GOOD:
+    if (choice.doubts or len(ranks) > 1) and mark is Mark.GOOD:
         mark = Mark.DOUBTFUL
     if choice.lacking:
         then = "Record what is missing, then learn it again."
@@ -293,28 +305,35 @@ def of_early_end(why: str, seconds: float) -> Verdict:
     return Verdict(Mark.DOUBTFUL, f"{said}.", f"These {seconds:.2f} s.", "What would have come after.", then)
 
 
-def of_surveys(surveys: Sequence[Any], needed: str = "", then: str = "unconstrain fit") -> Verdict:
+SAME_CAUSE = ("clock-gap", "seam", "few-demonstrations")
+"""What is odd about several demonstrations in one table for no other reason than that."""
+
+
+def of_surveys(surveys: Sequence[Any], needed: str = "", then: str = "unconstrain fit", apart: str = "") -> Verdict:
     """Judge recordings by what is not as it seems in them, and by what their columns do not tell, a sentence.
 
-    ``then`` is the command for recordings that are as they seem.
+    ``then`` is the command for recordings that are as they seem, and where their columns do not tell, a guess; after
+    ``apart`` follows the column that tells several demonstrations apart.
     """
+    count, few = _count(len(surveys)), len(surveys) < ENOUGH
+    fewer = f"{count}: 'fit' tells what was free from {ENOUGH} or more, held in different ways." if few else ""
     warned = [found for found in surveys if found.warnings]
-    odd = sorted((one for found in warned for one in found.warnings), key=lambda one: one.code != "several-in-one")
-    codes = ", ".join(dict.fromkeys(one.code for one in odd))
-    few = len(surveys) < ENOUGH
-    fewer = f"{_count(len(surveys))}: 'fit' tells what was free from {ENOUGH} or more, held in different ways."
+    odd = {one.code: one for found in reversed(warned) for one in reversed(found.warnings)}
+    if several := odd.get("several-in-one"):
+        codes = ", ".join(code for code in odd if code not in SAME_CAUSE)
+        said = f"{len(warned)} of {count} not as it should be: {codes}."
+        then = f"Read them one by one, by the column {several.column!r}:\n{apart} {shlex.quote(several.column)}"
+        return Verdict(Mark.DOUBTFUL, said, next=then)
+    guess = f"{needed} A guess, to be corrected:\n{then}" if needed else then
     if not warned and needed:
-        said = f"{_count(len(surveys))}, nothing odd, but fit needs to know more."
-        return Verdict(Mark.DOUBTFUL, said, doubt=fewer if few else "", next=needed)
+        return Verdict(Mark.DOUBTFUL, f"{count}, nothing odd, but fit needs to know more.", doubt=fewer, next=guess)
     if not warned:
-        said = f"{_count(len(surveys))}, nothing odd: ready to learn from."
-        return Verdict(Mark.DOUBTFUL if few else Mark.GOOD, said, doubt=fewer if few else "", next=then)
-    said = f"{len(warned)} of {_count(len(surveys))} not as it should be: {codes}."
-    first = f"--group {odd[0].column}, which tells demonstrations apart. " if odd[0].code == "several-in-one" else ""
-    then = f"{first}Read the notes below; each names its cure." + (
-        f" And fit needs to know more: {needed}" if needed else ""
-    )
-    return Verdict(Mark.DOUBTFUL, said, doubt=fewer if few else "", next=then)
+        said = f"{count}, nothing odd: ready to learn from."
+        return Verdict(Mark.DOUBTFUL if few else Mark.GOOD, said, doubt=fewer, next=then)
+    said = f"{len(warned)} of {count} not as it should be: {', '.join(odd)}."
+    cures = "Read the notes below; each names its cure."
+    then = f"{cures} And fit needs to know more: {guess}" if needed else f"{cures} Then:\n{then}"
+    return Verdict(Mark.DOUBTFUL, said, doubt=fewer, next=then)
 
 
 def _count(demonstrations: int) -> str:

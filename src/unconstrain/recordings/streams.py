@@ -23,7 +23,7 @@ from .preparation import Recipe, decide, prepare
 from .preparation.movements import prepare_one, warn
 from .preparation.plausibility.outlines import Outline
 from .preparation.plausibility.sets import compare, outline
-from .preparation.surveys import subject_of
+from .preparation.plausibility.subject import Subject
 from .readers import Reading, check_left_out, expand, read_blocks
 
 HELD_BYTES = 2**25
@@ -217,7 +217,7 @@ class Stream:
 
     def _prepared(self, recording: Recording, before: int) -> Demonstration:
         """A recording, or a block of it after so many rows, as a demonstration."""
-        subject = subject_of(recording, self.recipe)
+        subject = Subject(recording, self.recipe)
         if not self._walked and len(self._outlines) < MOST_OUTLINES:
             self._outlines.append((recording.title, outline(subject)))
         prepared = prepare_one(subject)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -65,7 +66,7 @@ def free(shape: str, settings: Settings) -> dict[str, Any]:
     runs = _runs(policy, guided, contracting, demos, settings)
     ends = {name: arrived(paths, guided.goal_, demos) for name, paths in runs.items()}
     timed = {"unguided": policy, "guided": guided, "contracting": contracting}
-    steps = {name: 1e6 * per_step(one, demos) for name, one in timed.items()}
+    steps = {name: 1e6 * least for name, least in per_step(timed, demos).items()}
     likeness = {name: _likeness(runs[name], ends[name], strokes) for name in runs}
     shares = {name: _shares(there, len(demos)) for name, there in ends.items()}
     row = {
@@ -165,15 +166,16 @@ def arrived(paths: Sequence[Array], goal: Array, demos: Demos) -> NDArray[np.boo
     return np.array([np.linalg.norm(path[-1] - goal) for path in paths]) < NEAR * _reach(demos)
 
 
-def per_step(policy: Any, demos: Demos) -> float:
-    """Seconds for a single state: the least of some runs."""
-    states, times = uc.stack(demos).states[:200], []
+def per_step(policies: Mapping[str, Any], demos: Demos) -> dict[str, float]:
+    """Seconds of each for a single state: the least of some runs, taken in turn, so that all meet the same machine."""
+    states, least = uc.stack(demos).states[:200], dict.fromkeys(policies, math.inf)
     for _ in range(15):
-        begun = perf_counter()
-        for state in states:
-            policy.step(state)
-        times.append(perf_counter() - begun)
-    return min(times) / len(states)
+        for name, policy in policies.items():
+            begun = perf_counter()
+            for state in states:
+                policy.step(state)
+            least[name] = min(least[name], (perf_counter() - begun) / len(states))
+    return least
 
 
 def _reach(demos: Demos) -> float:

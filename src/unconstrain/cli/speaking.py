@@ -1,0 +1,86 @@
+"""What the library says to who calls it, in the words of who types: settings as options, names as what was meant."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
+
+import click
+
+ALSO = {"states": "--state", "actions": "--action", "angles": "--angle", "differentiate": "--by", "groups": "--group"}
+"""Settings whose options are called otherwise than they are, or as another setting."""
+
+OBJECTS = {
+    "ParametricPolicy(Affine())": "--model affine",
+    "a LocallyLinearPolicy": "--model local",
+    "fewer features, or Folds(2)": "--folds 2",
+    "a smaller dt": "a smaller --dt",
+    "uc.Guided": "in Python, uc.Guided",
+    "Take Hybrid()": "Take --learner hybrid",
+}
+"""What is made in Python, and the options that make it."""
+
+TIMES = {
+    "s": ("sec", "secs", "second", "seconds"),
+    "ms": ("msec", "millis", "millisecond", "milliseconds"),
+    "us": ("usec", "µs", "micros", "microsecond", "microseconds"),
+    "ns": ("nsec", "nanos", "nanosecond", "nanoseconds"),
+}
+"""How people write the units of time."""
+
+_SETTING = re.compile(
+    r"(?<![\w/'\".-])([a-z]\w*)=(\([^()]*\)|'[^']*'|[A-Z]\w*\(\)|True\b|-?\d+(?:\.\d+)?(?!\.?[\w/])|(?=[,;:)\s]|\.(?:\s|$)))"
+)
+"""``name=value`` or ``name=``, but in no path."""
+
+_TWICE = re.compile(r"\b(?:with [^().,;]*?|(\w+)) \((--[a-z-]+(?:, --[a-z-]+)*)\)|(--[a-z-]+) \((\w+)\)")
+"""A setting and its option, one of them in parentheses; or ``with`` some settings and their options."""
+
+
+def as_typed(said: str) -> str:
+    """A sentence of the library with options of this command, or where it has none of another, in place of settings."""
+    context = click.get_current_context(silent=True)
+    if context is None:
+        return said
+    commands = getattr(context.find_root().command, "commands", {})
+    own = commands.get(context.invoked_subcommand, context.command)
+    every = [one for command in (*commands.values(), own) for one in command.params]
+    options = {one.name: one.opts[-1] for one in every if one.opts[-1].startswith("--")} | ALSO
+    head, _, rest = said.partition(": ")
+    said = f"{option}: {rest}" if (option := _option(head, options)) else said
+    for made, option in OBJECTS.items():
+        said = said.replace(made, option)
+    said = _TWICE.sub(_once, _SETTING.sub(lambda found: _set(found, options), said))
+    return re.sub(r"(--[a-z-]+ \w+), \1", r"\1", said)
+
+
+def _option(name: str, options: Mapping[str, str]) -> str:
+    """The option of a setting, whose name may say that it is in seconds; empty where there is none."""
+    return options.get(name) or options.get(name.removesuffix("_s")) or ""
+
+
+def _set(found: re.Match[str], options: Mapping[str, str]) -> str:
+    option, value = _option(found[1], options), found[2].removesuffix("()") if found[2] != "()" else "none"
+    plain = re.sub(r"[()'\"\s]", "", value).rstrip(",").replace("True", "")
+    return f"{option} {plain.lower() if value.isalpha() else plain}".rstrip() if option else found[0]
+
+
+def _once(found: re.Match[str]) -> str:
+    """The option alone, where the word beside it is its name; after ``with``, all that are named."""
+    _, word, several, option, setting = found[0], *found.groups()
+    if option:
+        return option if option[2:] == setting.replace("_", "-") else found[0]
+    if word is None:
+        return f"with {several.replace(', ', ' and ')}"
+    return several if several[2:] == word.replace("_", "-") else found[0]
+
+
+def meant_of(value: str, known: Iterable[str]) -> str:
+    """A question after which of some values of an option may have been meant; empty where none is near."""
+    words = {one.casefold(): one for one in known}
+    words |= {word.casefold(): unit for unit, written in TIMES.items() if unit in words for word in written}
+    if value.casefold() in words:
+        return f" Did you mean {words[value.casefold()]!r}?"
+    near = dict.fromkeys(words[one] for one in get_close_matches(value.casefold(), words, n=2, cutoff=0.6))
+    return f" Did you mean {' or '.join(map(repr, near))}?" if near else ""
