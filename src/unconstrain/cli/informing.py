@@ -18,8 +18,8 @@ from ..base.errors import ModelFileError
 from .printing import print_table, say_verdict
 from .reading import innermost, reading_of
 
-TOLD = "states that recordings tell"
-"""Note of the share of the recorded states at which recordings tell a policy."""
+TOLD = "determined share of states"
+"""Note of the share of the recorded states at which recordings tell the policy in every direction."""
 
 OF, HELD_BY = "of", "held by"
 """Notes of a constraint: the demonstrations that it is of, where not of all; the numbers of the mechanism named."""
