@@ -25,11 +25,10 @@ FIRST_S = 2.0
 FIRST_STEP, KNOWN_AFTER = "noise correction: fold", 2
 """What the default learner counts off first, and after how many of it its pace is known."""
 
-WHOLE, HYBRID = 9.0, 0.5
-"""Time to learn by the default learner, and by the hybrid, over that of the first step.
+WHOLE = 9.0
+"""Time to learn by the default learner over that of the first step.
 
-Measured with 6, 9, 12 and 16 states, and 10,000, 6,000, 20,000 and 8,000 samples: 12, 10, 9.6 and 6.6 times; the hybrid
-with the first three of them: 0.49, 0.47 and 0.55.
+Measured with 6, 9, 12 and 16 states, and 10,000, 6,000, 20,000 and 8,000 samples: 12, 10, 9.6 and 6.6 times.
 """
 
 LONG_S = 20.0
@@ -56,20 +55,18 @@ def _foretelling(say: Say) -> Say:
         if what != FIRST_STEP or of is None or len(begun) > KNOWN_AFTER:
             return
         begun.append(time.monotonic())
-        spent, whole = begun[-1] - began, (begun[-1] - begun[0]) * of / KNOWN_AFTER
-        left = WHOLE * whole - (begun[-1] - begun[0])
+        spent = begun[-1] - begun[0]
+        left = WHOLE * spent * of / KNOWN_AFTER - spent
         if len(begun) > KNOWN_AFTER and left > LONG_S:
             context = click.get_current_context(silent=True)
-            other = f" ('--learner hybrid' takes about {_said(spent + HYBRID * whole)} in all)"
-            told = other if context is not None and "learner" in context.params else ""
+            told = " ('--learner hybrid' takes less)" if context is not None and "learner" in context.params else ""
             click.echo(f"Note: this takes about {_said(left)} more{told}.", err=True)
 
-    began = time.monotonic()
     return heard
 
 
 def _said(seconds: float) -> str:
-    return f"{seconds / 60:.0f} min" if seconds > 90 else f"{max(seconds, 1):.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"
 
 
 @contextmanager
