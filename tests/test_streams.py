@@ -428,3 +428,13 @@ def test_a_file_that_lacks_a_column_of_the_first_is_refused_as_by_prepare(tmp_pa
     stream = uc.Stream(sorted(tmp_path.glob("*.csv")), uc.Recipe(states=("x", "y"), differentiate="savgol"))
     with pytest.raises(uc.errors.InvalidDataError, match=r"'b' has no column 'y'; it has x, z\."):
         list(stream)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e12, 1e30])
+def test_a_first_batch_at_rest_says_nothing_of_the_size_of_later_actions(size):
+    # Without actions there is no unit of theirs: those that come later may be of any size in it.
+    states, actions = np.array([[0.1, -0.1], [-0.9, -2.5]]), np.array([[0.0, 0.0], [-1.0, -1.0]])
+    policy = uc.LocallyLinearPolicy(learner=uc.Likelihood()).fit(states[:1], actions[:1], groups=[5])
+    found = policy.partial_fit(states[1:], size * actions[1:], groups=[5]).predict(states)
+    assert np.isfinite(found).all()
+    np.testing.assert_allclose(found[1], size * actions[1], rtol=0.5)

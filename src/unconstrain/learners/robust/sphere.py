@@ -65,7 +65,7 @@ def distances(actions: Array, policy: Array) -> Distances:
     along = policy / (lengths + _TINY)[:, None]
     normal = 0.5 * (from_middle / (reach + _TINY)[:, None] + along)
     speed = np.sqrt(np.vecdot(actions, actions))
-    turn = actions * (lengths / (speed + _TINY))[:, None]
+    turn = lengths[:, None] * (actions / (speed + _TINY)[:, None])
     turn = turn - along * np.vecdot(turn, along)[:, None]
     return Distances(reach - 0.5 * lengths, normal, turn, lengths)
 
