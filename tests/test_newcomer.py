@@ -485,5 +485,4 @@ def test_a_long_fit_says_how_long_it_will_take(folder, tmp_path, monkeypatch):
     clock = iter(np.arange(0.0, 1e4, 3.0))
     monkeypatch.setattr(progress.time, "monotonic", lambda: float(next(clock)))
     said = text(call("fit", folder, "--model", "affine", "-o", tmp_path / "p.npz"))
-    assert re.search(r"Note: this takes about \d+ s more \('--learner hybrid' takes less\)\.", said)
-    assert said.count("Note: this takes about") == 1
+    assert said.count("Note: this may take minutes; '--learner hybrid' takes less.") == 1

@@ -165,7 +165,7 @@ def test_a_hinge_holds_two_directions_wherever_it_is_spoken_of(door):
     place, said = door
     assert said.startswith("✔ 1 of 3 directions were held")
     for told in (said, " ".join(run("info", place / "c.npz").split()), (place / "c.html").read_text("utf-8")):
-        assert "The positions keep to a circle (hinge), 2 of 3 held: the first counts what" in told
+        assert "what velocities show. Positions keep to a circle (hinge), which holds 2 of 3;" in told
         assert "Mechanism: a circle (hinge) about" in told or "mechanism a circle (hinge) about" in told
 
 
@@ -185,7 +185,7 @@ def test_a_roll_out_keeps_to_the_mechanism_that_was_named(door, tmp_path):
 def test_one_swing_may_be_a_habit_and_then_the_directions_learnt_are_followed(door, tmp_path):
     place, _ = door
     said = run("constraint", place / "0.csv", "--state", "x,y,z", "--differentiate", "-o", tmp_path / "c.npz")
-    assert "positions may keep to a circle (hinge), 2 of 3 held" in " ".join(said.split())
+    assert "Positions may keep to a circle (hinge), which holds 2 of 3" in " ".join(said.split())
     assert "rollout --constraint follows the directions that were learnt" in said
     assert "held by" not in uc.storage.load_notes(tmp_path / "c.npz")
 

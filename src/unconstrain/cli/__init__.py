@@ -34,7 +34,7 @@ from .converting import convert, example
 from .diagnosing import diagnose
 from .exporting import export
 from .fitting import alpha_of, default_learner, learn, learner_of, options_for_model, policy_of
-from .informing import TOLD, info, learnt_from, provenance
+from .informing import RAN, TOLD, info, learnt_from, provenance
 from .looking import look, play
 from .printing import (
     Group,
@@ -44,6 +44,7 @@ from .printing import (
     option_for_json,
     print_table,
     refuse_warnings,
+    said_of_replays,
     say_fit,
     say_scale,
     say_surveys,
@@ -226,7 +227,7 @@ def fit(
         say_scale(fitted, stream.recipe)
         say_fit(fitted, stream, judged, learner, verbose)
     refuse_warnings(reading["strict"])
-    told = {TOLD: uc.evaluation.diagnosis.states_told(fitted)}
+    told = {TOLD: uc.evaluation.diagnosis.states_told(fitted), RAN: said_of_replays(judged.replayed)}
     uc.save(fitted, output, provenance(paths, stream.recipe, stream.first, **reading) | told)
     written = {"policy": output} | _reported(fitted, stream, report, Path(output).stem)
     say_written(written, judged.to_json() if as_json else None)
@@ -307,7 +308,12 @@ def score(
     multiple=True,
     help="Centre of a ball to go round, and its radius; or of an ellipsoid, and its radii. More than once for several.",
 )
-@click.option("--method", type=click.Choice(["euler", "rk4", "adaptive"]), default="euler", help="How a step is taken.")
+@click.option(
+    "--method",
+    type=click.Choice(["euler", "rk4", "adaptive"]),
+    default="rk4",
+    help="How a step is taken: Runge-Kutta, or by euler as the loop of a controller does.",
+)
 @click.option(
     "--order",
     type=click.IntRange(1, 2),

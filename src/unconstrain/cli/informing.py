@@ -21,6 +21,9 @@ from .reading import innermost, reading_of
 TOLD = "determined share of states"
 """Note of the share of the recorded states at which recordings tell the policy in every direction."""
 
+RAN = "from the same starts"
+"""Note of size and pace of the policy's own movements over those of the demonstrations."""
+
 OF, HELD_BY = "of", "held by"
 """Notes of a constraint: the demonstrations that it is of, where not of all; the numbers of the mechanism named."""
 

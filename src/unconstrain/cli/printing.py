@@ -7,7 +7,7 @@ import json
 import re
 import sys
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -149,6 +149,7 @@ class Judged(NamedTuple):
     """How much of the motion a policy explains."""
 
     verdict: uc.evaluation.verdicts.Verdict
+    replayed: Mapping[str, float | None] | None
     demonstrations: int
     samples: int
     training: float
@@ -167,8 +168,20 @@ def judge_fit(policy: uc.Policy, stream: uc.Stream, on_cluster: bool) -> Judged:
     told = uc.evaluation.diagnosis.states_told(policy)
     open_ = told is not None and told < uc.evaluation.verdicts.MOSTLY and not on_cluster
     there = _least_known(policy, stream) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
-    verdict = uc.evaluation.verdicts.of_explained(held_out, count, told, there=there)
-    return Judged(verdict, count, samples, 1.0 - missed, held_out)
+    found = uc.evaluation.verdicts.of_explained(held_out, count, told, there=there)
+    from ..pages.fit import replayed
+
+    if on_cluster:
+        return Judged(found, None, count, samples, 1.0 - missed, held_out)
+    ran = replayed(found, policy, stream.beginning(), stream.recipe, None, stream.first.units, free=False)
+    return Judged(ran.verdict, ran.medians, count, samples, 1.0 - missed, held_out)
+
+
+def said_of_replays(medians: Mapping[str, float | None] | None) -> str | None:
+    """Size and pace from the same starts, in words; None where they were not compared."""
+    told = {"size": (medians or {}).get("extent"), "pace": (medians or {}).get("pace")}
+    shown = ", ".join(f"{name} {ratio:.2f} times" for name, ratio in told.items() if ratio is not None)
+    return f"{shown} the demonstrated" if shown else None
 
 
 def _least_known(policy: uc.Policy, stream: uc.Stream) -> str:
@@ -193,7 +206,7 @@ def say_fit(policy: uc.Policy, stream: uc.Stream, judged: Judged, learner: str, 
     if getattr(policy, "features", None) == "auto":
         click.echo(f"Features of least estimated error: {policy.training_.model.features}.")
     if solution.belief is not None:
-        click.echo(_said_of_samples(solution, judged.demonstrations))
+        click.echo(_said_of_samples(solution))
         if known:
             _say_suspects(solution.belief.suspects, stream)
     elif learner != "direct":
@@ -261,17 +274,14 @@ def _say_suspects(rows: NDArray[np.intp], stream: uc.Stream | None) -> None:
             click.echo(f"Note: {line}", err=True)
 
 
-def _said_of_samples(solution: uc.Solution, demonstrations: int) -> str:
+def _said_of_samples(solution: uc.Solution) -> str:
     """The candidate that a robust learner took, and its estimates of noise and free samples."""
     risks = {name: one.risk for name, one in solution.candidates.items()}
-    said = (
+    return (
         f"{uc.evaluation.diagnosis.about_choice(solution.method, risks)} Noise and misfit are about "
         f"{solution.noise:.3g} on each action, and {solution.free_share:.0%} of the samples were free, or "
         f"held by less than that{_said_of_undecided(solution)}."
     )
-    if demonstrations < uc.evaluation.diagnosis.ENOUGH:
-        return said
-    return f"{said} At least three demonstrations show {solution.determined_share:.0%} of the weight directions."
 
 
 def _said_of_undecided(solution: uc.Solution) -> str:

@@ -47,7 +47,7 @@ def shown(title: str) -> Iterator[Progress]:
 
 
 def _foretelling(say: Say) -> Say:
-    """Also say how long a fit of the default learner will take, once its pace is known, where that is long."""
+    """Also say that a fit of the default learner will take long, once its pace is known."""
     begun = list[float]()
 
     def heard(what: str, done: int, of: int | None) -> None:
@@ -59,14 +59,10 @@ def _foretelling(say: Say) -> Say:
         left = WHOLE * spent * of / KNOWN_AFTER - spent
         if len(begun) > KNOWN_AFTER and left > LONG_S:
             context = click.get_current_context(silent=True)
-            told = " ('--learner hybrid' takes less)" if context is not None and "learner" in context.params else ""
-            click.echo(f"Note: this takes about {_said(left)} more{told}.", err=True)
+            told = "; '--learner hybrid' takes less" if context is not None and "learner" in context.params else ""
+            click.echo(f"Note: this may take minutes{told}.", err=True)
 
     return heard
-
-
-def _said(seconds: float) -> str:
-    return f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"
 
 
 @contextmanager

@@ -219,10 +219,10 @@ def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool) -> Verdict:
     """Add to a verdict on a constraint of some rank that positions keep to a mechanism, where that holds more."""
     if named.rank <= rank:
         return found
-    keep = f"The positions {'' if sure else 'may '}keep to {named.title}, {named.rank} of {len(named.centre)} held"
-    counted = "the first counts what velocities show by the features taken, positions show what turns as they go, too."
+    keep = f"That is what velocities show. Positions {'' if sure else 'may '}keep to {named.title}, which holds "
+    keep += f"{named.rank} of {len(named.centre)}; as it turns on the way, velocities show less of it."
     then = "Use it with 'unconstrain rollout --constraint', which follows the mechanism." if sure else found.next
-    return found._replace(said=f"{found.said} {keep}: {counted}", next=then)
+    return found._replace(said=f"{found.said} {keep}", next=then)
 
 
 WITHOUT_SUPPORT = Verdict(
@@ -295,7 +295,8 @@ def _strays(found: Verdict, how: str) -> Verdict:
         mark=Mark.BAD if found.mark is Mark.BAD else Mark.DOUBTFUL,
         said=f"{found.said} But {how}.",
         doubt=f"Its size or pace over time. {found.doubt}".rstrip(),
-        next="Look at it ('unconstrain look'); learn from more demonstrations, or with another --window or --model.",
+        next="Look at it ('unconstrain look'). In Python, uc.Guided keeps it to the goal or the cycle that was shown; "
+        "more demonstrations, or another --model, may come nearer.",
     )
 
 

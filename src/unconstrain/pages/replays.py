@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..policies import Policy
     from ..recordings import Recipe
 
-MOST, STEPS = 20, 2000
+MOST, STEPS = 20, 1000
 """Demonstrations, and steps of each, that are run at most: seconds."""
 
 FLAT = 0.1
@@ -57,13 +57,15 @@ def replayed(
     recipe: Recipe,
     held: Any,
     units: Mapping[str, str],
+    free: bool = True,
 ) -> Replayed:
     """Add to a verdict how a policy moves from where demonstrations start, under what held them as far as it is known.
 
-    ``held`` is their constraint, or None; ``units`` are those of columns.
+    ``held`` is their constraint, or None; ``units`` are those of columns. Those whose constraint is not known are run
+    ``free``, or not at all.
     """
     try:
-        runs = replays(policy, demos, recipe, held)
+        runs = replays(policy, demos, recipe, held, free)
     except DivergedError:
         return Replayed(verdicts.of_divergence(found), None)
     known = [one for one in runs if one.held]
@@ -79,7 +81,9 @@ def replayed(
     return Replayed(verdicts.of_replays(found, extents, paces, said), told, runs)
 
 
-def replays(policy: Policy, demos: Sequence[Demonstration], recipe: Recipe, held: Any = None) -> list[Replay]:
+def replays(
+    policy: Policy, demos: Sequence[Demonstration], recipe: Recipe, held: Any = None, free: bool = True
+) -> list[Replay]:
     """Compare at most twenty demonstrations; none where actions are not known to be velocities of Euclidean states.
 
     Raises
@@ -91,20 +95,22 @@ def replays(policy: Policy, demos: Sequence[Demonstration], recipe: Recipe, held
     chosen = [one for one in demos if one.times is not None and len(one) > 2 and np.ptp(one.states, axis=0).any()]
     if recipe.actions is not None or n != d or demos[0].space != spaces.Euclidean(n) or not chosen:
         return []
+    chosen = chosen if free or held is not None else [one for one in chosen if _flat(one.states)[0].any()]
+    if not chosen:
+        return []
     chosen = [chosen[k] for k in np.linspace(0, len(chosen) - 1, min(len(chosen), MOST)).astype(int)]
     clocks = [np.asarray(one.times, np.float64) for one in chosen]
     lasted = [float(times[-1] - times[0]) for times in clocks]
     dt = max(float(np.median(np.diff(clocks[0]))), max(lasted) / STEPS)
-    shapes = [_spread(one.states) for one in chosen]
-    normals = [axes * (spread < FLAT * spread[0])[:, None] for spread, axes in shapes]
+    shapes = [_flat(one.states) for one in chosen]
     task = held.target if getattr(held, "task", False) else None
     starts, steps = np.array([one.states[0] for one in chosen]), round(max(lasted) / dt) + 1
-    own = [partial(_same, rows) for rows in normals] if held is None else held
-    runs = rollout(policy, starts, steps, dt, own, task=task, least_support=0.0)
+    own = [partial(_same, rows) for rows, _ in shapes] if held is None else held
+    runs = rollout(policy, starts, steps, dt, own, task=task, least_support=0.0, method="rk4")
     cut = [run[: round(seconds / dt) + 1] for run, seconds in zip(runs, lasted, strict=True)]
     return [
-        _compared(one, run, axes[:2], held is not None or bool(rows.any()))
-        for one, run, (_, axes), rows in zip(chosen, cut, shapes, normals, strict=True)
+        _compared(one, run, along, held is not None or bool(rows.any()))
+        for one, run, (rows, along) in zip(chosen, cut, shapes, strict=True)
     ]
 
 
@@ -113,11 +119,12 @@ def _same(rows: Array, states: Array, _times: Array) -> Array:
     return np.broadcast_to(rows, (len(states), *rows.shape))
 
 
-def _spread(states: Array) -> tuple[Array, Array]:
-    """How far states (T, n) spread, most first (n,), and along which directions, in rows (n, n); zeros beyond T."""
+def _flat(states: Array) -> tuple[Array, Array]:
+    """Directions, in rows, along which states (T, n) hardly spread, zero where they do (n, n), and most (2, n)."""
     _, spread, axes = np.linalg.svd(states - states.mean(axis=0), full_matrices=False)
     beyond = states.shape[1] - len(axes)
-    return np.pad(spread, (0, beyond)), np.pad(axes, ((0, beyond), (0, 0)))
+    spread, axes = np.pad(spread, (0, beyond)), np.pad(axes, ((0, beyond), (0, 0)))
+    return axes * (spread < FLAT * spread[0])[:, None], axes[:2]
 
 
 def _compared(done: Demonstration, run: Demonstration, plane: Array, held: bool) -> Replay:
