@@ -112,21 +112,28 @@ class Training(Shown):
         SettingError
             If demonstrations are held out and a batch does not name them.
         """
-        split, kept = self.split, self.kept
+        begun, split, kept = self, self.split, self.kept
         d, (models, p) = self.actions, self._sizes
         _check_size(split.validation.count, models, d, p)
         sums = [Sums(models, d, p, self.at_rest) for _ in range(split.validation.count)]
         for batch in batches:
             batch = batch.tempered(self.longest)
+            begun = begun._setting_out(batch)
             kept = None if kept is None else kept.with_batch(batch)
             with workers() as threads:  # not around the batches: what makes them is the caller's
                 for block in batch.blocks():
                     split = split.seeing(block.groups)
-                    _add(self._in_units(block), self.model, split, sums, threads)
+                    _add(begun._in_units(block), self.model, split, sums, threads)
         further = FoldedMoments(tuple(each.moments.on_host() for each in sums), self.gathered.held_out)
         gathered = self.gathered + further
         _check_range(np.inf, *(sums for part in gathered.parts for sums in (part.energy, part.consistent)))
-        return replace(self, split=split, gathered=gathered, kept=kept)
+        return replace(begun, split=split, gathered=gathered, kept=kept)
+
+    def _setting_out(self, batch: Batch) -> Training:
+        """The same in a unit of these actions, where all before were zero: so are their sums, in any unit."""
+        fastest = 0.0 if self.at_rest > 0.0 else float(namespace(batch.actions).abs(batch.actions).max())
+        unit = power_of_two(fastest)
+        return replace(self, action_unit=unit, at_rest=AT_REST * (fastest / unit)) if fastest else self
 
     def __add__(self, other: Training) -> Training:
         """Two parts of the same data, begun alike; this one's samples come first."""
