@@ -8,7 +8,7 @@ import pytest
 
 import unconstrain as uc
 from seen import opened
-from test_cli import run, write
+from test_cli import refused, run, write
 from unconstrain.evaluation.verdicts import Mark, Verdict, of_replays
 from unconstrain.pages.fit import policy_page
 from unconstrain.pages.replays import replayed
@@ -216,3 +216,24 @@ def test_a_policy_of_some_strokes_says_of_which(folder, tmp_path):
     assert json.loads(run("info", tmp_path / "p.npz", "--json"))["learnt from"] == ["held_3", "held_4"]
     said = run("look", *files, tmp_path / "p.npz", "-o", tmp_path / "look.html")
     assert "policy: learnt from 2 of these 3 demonstrations, held_3, held_4." in said
+
+
+def test_a_fit_itself_says_how_its_policy_moves(folder, tmp_path):
+    files = sorted(folder.glob("held_*.csv"))
+    asked = ("fit", *files, "--state", "x,y,z", "--differentiate", "--learner", "hybrid", "-o", tmp_path / "p.npz")
+    found = json.loads(run(*asked, "--json"))
+    told = re.search(r"un from the same starts: size (\S+) times", found["verdict"]["said"])
+    assert float(told[1]) == pytest.approx(found["replayed"]["extent"], abs=0.006)
+    assert f"size {told[1]} times, pace" in run("info", tmp_path / "p.npz")
+
+
+def test_what_a_page_cannot_draw_together_is_refused(folder, tmp_path):
+    stroke, page, policies = folder / "held_3.csv", tmp_path / "look.html", (folder / "same.npz", folder / "slow.npz")
+    assert "a page draws one policy and one constraint" in refused("look", stroke, *policies, "-o", page)
+    assert not page.exists()
+    table = write(
+        tmp_path / "other.csv", "t,a,b", np.column_stack([np.arange(99), np.random.default_rng(0).random((99, 2))])
+    )
+    run("constraint", table, "--state", "a,b", "--differentiate", "-o", tmp_path / "c.npz")
+    assert "of the same columns" in refused("look", stroke, policies[0], tmp_path / "c.npz", "-o", page)
+    run("look", stroke, policies[0], "-o", page)

@@ -121,9 +121,15 @@ def _seen(paths: Sequence[str | Path], reading: dict[str, Any]) -> Seen:
         raise ReadError(f"{found}: holds no recording to look at; add some: unconstrain look {found} wipe_*.csv")
     policies = [one for one in models.values() if isinstance(one, uc.Policy)]
     constraints = [one for one in models.values() if isinstance(one, uc.LearntConstraint)]
-    notes: dict[str, Any] = {}
-    for path in sorted(models, key=lambda path: isinstance(models[path], uc.Policy)):
-        notes |= uc.storage.load_notes(path)  # a policy's last: they hold
+    ordered = sorted(models, key=lambda path: isinstance(models[path], uc.Policy))  # a policy's notes last: they hold
+    own = {path: uc.storage.load_notes(path) for path in ordered}
+    columns = {uc.Recipe.from_dict(one.get("recipe", {})).states for one in own.values()}
+    if max(len(policies), len(constraints), len(columns)) > 1:
+        raise SettingError(
+            f"{', '.join(map(str, paths))}: a page draws one policy and one constraint, of the same columns. Look at "
+            "the others one after the other."
+        )
+    notes = {name: note for one in own.values() for name, note in one.items()}
     found = prepared(recorded, reading, notes)
     refuse_warnings(reading["strict"])
     return Seen(

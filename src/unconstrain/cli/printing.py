@@ -316,7 +316,7 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(*head, box=None, pad_edge=False)
+    table = Table(*head, box=None, pad_edge=False, show_header=any(head))
     for row in rows:
         table.add_row(*row)
     # Piped output is for programs and files: no wrapping there.

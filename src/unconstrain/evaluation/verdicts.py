@@ -131,7 +131,8 @@ def of_explained(
     missed = f"where the policy predicts, it misses about {np.sqrt(max(1 - share, 0)):.0%} of a typical action"
     advice = {
         Mark.GOOD: "Score it on recordings that were held in other ways.",
-        Mark.DOUBTFUL: "'unconstrain diagnose' says where it fails; a wider --window may take out noise.",
+        Mark.DOUBTFUL: "'unconstrain diagnose' says where it fails: by noise, which a wider --window takes out, or as "
+        "demonstrations have little in common.",
         Mark.BAD: "Look at the recordings ('unconstrain inspect'): columns, clocks or units may be wrong.",
     }[mark]
     trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
