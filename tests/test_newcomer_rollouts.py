@@ -231,9 +231,8 @@ def test_what_a_page_cannot_draw_together_is_refused(folder, tmp_path):
     stroke, page, policies = folder / "held_3.csv", tmp_path / "look.html", (folder / "same.npz", folder / "slow.npz")
     assert "a page draws one policy and one constraint" in refused("look", stroke, *policies, "-o", page)
     assert not page.exists()
-    table = write(
-        tmp_path / "other.csv", "t,a,b", np.column_stack([np.arange(99), np.random.default_rng(0).random((99, 2))])
-    )
+    times = 0.01 * np.arange(400)
+    table = write(tmp_path / "other.csv", "t,a,b", np.column_stack([times, np.outer(np.sin(times), [1.0, 2.0])]))
     run("constraint", table, "--state", "a,b", "--differentiate", "-o", tmp_path / "c.npz")
     assert "of the same columns" in refused("look", stroke, policies[0], tmp_path / "c.npz", "-o", page)
     run("look", stroke, policies[0], "-o", page)
