@@ -449,3 +449,15 @@ def test_batches_at_rest_say_nothing_of_the_size_of_later_actions(learner):
     assert np.abs(small).max() > 1.0
     for size in (2.0**-200, 2.0**40, 2.0**90):
         np.testing.assert_array_equal(learnt(size), small)
+
+
+def test_later_actions_may_be_of_another_size_altogether_and_some_of_them_none():
+    rng = np.random.default_rng(5)
+    states, groups = rng.normal(size=(60, 1)), np.arange(60) // 10
+    actions = np.column_stack([states, -0.5 * states])
+    actions[30::2] = 0.0
+    policy = uc.ParametricPolicy(uc.Affine(), uc.Likelihood()).fit(
+        states[:20], 1e-20 * actions[:20], groups=groups[:20]
+    )
+    policy.partial_fit(states[20:], actions[20:], groups=groups[20:])
+    assert np.isfinite(policy.predict(states)).all()

@@ -192,8 +192,9 @@ class _GaussNewton:
         along = correlation_time(place.radial[:, None], samples.groups)
         across = correlation_time(np.sqrt(tangential)[:, None] * place.turn, samples.groups)
         size = np.sqrt(np.vecdot(place.normal, place.normal))
-        normal = place.normal / np.maximum(size, 1e-300)[:, None]
-        target = (place.radial + np.vecdot(place.normal, self.policy)) / np.maximum(size, 1e-300)
+        felt = np.maximum(size, 1e-15)  # zero actions are on all spheres, and what is left of theirs is rounding
+        normal = place.normal / felt[:, None]
+        target = (place.radial + np.vecdot(place.normal, self.policy)) / felt
         radial = (1.0 - free) * size**2 / (noise * along)
         at_end, turned = free / (noise * along), tangential / across
         points = turned[:, None] * (self.policy + place.turn) + at_end[:, None] * samples.actions
