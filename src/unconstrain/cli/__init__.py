@@ -220,15 +220,15 @@ def fit(
         stream = stream_of(paths, speed_power, progress, **reading)
         with of_files(recordings_of(stream)):
             learn(fitted, stream, scheduler)
-            judged = judge_fit(fitted, stream, scheduler is not None)
+            judged = judge_fit(fitted, stream, told := uc.evaluation.diagnosis.states_told(fitted), scheduler)
     if not as_json:
         say_verdict(judged.verdict)
         click.echo(f"Learnt from {said_recipe(stream.recipe, stream.first)}.")
         say_scale(fitted, stream.recipe)
         say_fit(fitted, stream, judged, learner, verbose)
     refuse_warnings(reading["strict"])
-    told = {TOLD: uc.evaluation.diagnosis.states_told(fitted), RAN: said_of_replays(judged.replayed)}
-    uc.save(fitted, output, provenance(paths, stream.recipe, stream.first, **reading) | told)
+    notes = provenance(paths, stream.recipe, stream.first, **reading)
+    uc.save(fitted, output, notes | {TOLD: told, RAN: said_of_replays(judged.replayed)})
     written = {"policy": output} | _reported(fitted, stream, report, Path(output).stem)
     say_written(written, judged.to_json() if as_json else None)
 

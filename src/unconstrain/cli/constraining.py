@@ -28,7 +28,7 @@ LENGTHS = ("", "m", "mm", "cm", "um", "km", "in", "ft")
 """Units of positions, and none."""
 
 FOLLOWED = "rollout --constraint and score --constraint hold to that mechanism, in parallel through the start."
-NOT_FOLLOWED = "rollout --constraint follows the directions that were learnt, as said first."
+NOT_FOLLOWED = "That names the positions; rollout --constraint follows the directions that were learnt, as said first."
 
 FEATURES = ("auto", "constant", "affine", "quadratic", "rbf")
 
@@ -320,7 +320,7 @@ def _say(learnt: Mapping[str, uc.LearntConstraint], what: str, named: Named | No
     if named is not None:
         for sentence in named.sentences:
             click.echo(sentence)
-        click.echo(FOLLOWED if named.sure else "That names the positions; " + NOT_FOLLOWED)
+        click.echo(FOLLOWED if named.sure else NOT_FOLLOWED)
     head, rows = table_of(learnt, named)
     if rows:
         print_table(head, rows)

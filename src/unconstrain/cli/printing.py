@@ -161,19 +161,24 @@ class Judged(NamedTuple):
         return {name: None if value != value else value for name, value in plain.items()}
 
 
-def judge_fit(policy: uc.Policy, stream: uc.Stream, on_cluster: bool) -> Judged:
-    """Walk through the demonstrations once more; on a cluster only the sums are there."""
-    held_out, nan = policy.held_out_score(), float("nan")
-    count, samples, missed = (len(stream.paths), 0, nan) if on_cluster else _walked(policy, stream)
-    told = uc.evaluation.diagnosis.states_told(policy)
-    open_ = told is not None and told < uc.evaluation.verdicts.MOSTLY and not on_cluster
-    there = _least_known(policy, stream) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
-    found = uc.evaluation.verdicts.of_explained(held_out, count, told, there=there)
+def judge_fit(policy: uc.Policy, stream: uc.Stream, told: float | None, scheduler: str | None) -> Judged:
+    """Walk through the demonstrations once more; on a cluster only the sums are there.
+
+    ``told`` is the share of the recorded states at which recordings tell the policy, None where not known.
+    """
     from ..pages.fit import replayed
 
-    if on_cluster:
-        return Judged(found, None, count, samples, 1.0 - missed, held_out)
-    ran = replayed(found, policy, stream.beginning(), stream.recipe, None, stream.first.units, free=False)
+    held_out = policy.held_out_score()
+    if scheduler is not None:
+        count = len(stream.paths)
+        return Judged(
+            uc.evaluation.verdicts.of_explained(held_out, count, told), None, count, 0, float("nan"), held_out
+        )
+    count, samples, missed = _walked(policy, stream)
+    demos, open_ = stream.beginning(), told is not None and told < uc.evaluation.verdicts.MOSTLY
+    there = _least_known(policy, demos, stream.recipe) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
+    found = uc.evaluation.verdicts.of_explained(held_out, count, told, there=there)
+    ran = replayed(found, policy, demos, stream.recipe, None, stream.first.units, free=False)
     return Judged(ran.verdict, ran.medians, count, samples, 1.0 - missed, held_out)
 
 
@@ -184,14 +189,14 @@ def said_of_replays(medians: Mapping[str, float | None] | None) -> str | None:
     return f"{shown} the demonstrated" if shown else None
 
 
-def _least_known(policy: uc.Policy, stream: uc.Stream) -> str:
+def _least_known(policy: uc.Policy, demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe) -> str:
     """Where more demonstrations tell most, and the command that lists all such places."""
     import numpy as np
 
-    demos = [one[:: max(1, len(one) // PLACES)] for one in stream.beginning()]
+    demos = [one[:: max(1, len(one) // PLACES)] for one in demonstrations]
     states, _, groups = uc.stack(demos)
     row = int(np.linalg.norm(policy.uncertainty(states).undetermined, axis=1).argmax())
-    place = uc.evaluation.diagnosis.named(states[row].tolist(), stream.recipe.states or ())
+    place = uc.evaluation.diagnosis.named(states[row].tolist(), recipe.states or ())
     least = f"Record more where least is known, held in other ways: near {place}, as in '{demos[groups[row]].name}'."
     return f"{least} All such places:\n{next_command('diagnose')}"
 
