@@ -94,6 +94,14 @@ def test_a_bad_sample_is_named_however_the_samples_are_cut():
     assert_array_equal(policy.solution_.belief.suspects, [119])
 
 
+def test_samples_stay_where_no_field_sees_any_other():
+    states, actions, still = np.linspace(300, 900, 20)[:, None], np.random.default_rng(0).normal(size=(20, 2)), np.full((20, 1), -2.0)
+    policy = uc.LocallyLinearPolicy(learner=uc.Likelihood()).fit(still, np.full((20, 2), 1e9))
+    policy.partial_fit(states, actions)
+    assert len(policy.solution_.belief.suspects) == 0
+    assert_allclose(policy.predict(still[:1]), [[1e9, 1e9]], rtol=1e-6)
+
+
 # Neighbours in time
 
 

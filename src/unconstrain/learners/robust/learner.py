@@ -61,9 +61,10 @@ class SampleLearner(Learner):
         """Learn from the samples; as :class:`~unconstrain.Hybrid` with one action, no motion or a single fold."""
         everything = training.samples
         suspects = everything.suspects
-        if len(suspects):
-            training = training.without(suspects)
-            everything = training.samples
+        if len(suspects) and (rest := training.without(suspects)).gathered.filled:
+            training, everything = rest, rest.samples
+        else:  # where no field sees any of the rest, nothing says that the suspects are wrong
+            suspects = suspects[:0]
         found = self._learnt(training, everything)
         thinned = _thinned(training)
         listed = suspects[:0] if thinned else suspects  # which they are among all is not known
