@@ -15,6 +15,7 @@ from unconstrain.learners import Belief
 from unconstrain.learners.hybrid import chosen_softness
 from unconstrain.learners.robust import belief, consistent
 from unconstrain.paper.experiments import regimes
+from unconstrain.paper.experiments.recorded import draw as draw_recorded
 from unconstrain.risks.objectives import inconsistency, standard_risk
 
 LEARNERS = {
@@ -510,10 +511,22 @@ def test_what_takes_minutes_is_said_with_what_takes_seconds(monkeypatch):
         uc.LocallyLinearPolicy().fit(states, actions, groups=groups)
 
 
-def test_a_candidate_that_follows_rounding_is_not_taken_where_nothing_was_constrained():
-    numbers = regimes.numbers_of("pendulum", "none", np.random.SeedSequence(1).spawn(8)[6])
+@pytest.mark.parametrize(
+    ("noise", "seed", "draw_of", "variances"),
+    [(0.0, 1, 6, (20.0, np.inf)), (0.0, 900, 9, (1.0, 20.0)), (0.02, 960, 3, (0.5, 1.0))],
+)
+def test_a_candidate_that_follows_rounding_decides_nothing_where_nothing_was_constrained(noise, seed, draw_of, variances):
+    numbers = regimes.numbers_of("pendulum", "none", np.random.SeedSequence(seed).spawn(draw_of + 1)[draw_of])
     demos, test = regimes.demonstrate("pendulum", "none", numbers)
-    policy = regimes._policy("pendulum").set_params(learner=uc.Robust()).fit_demonstrations(demos)
+    policy = regimes._policy("pendulum").set_params(learner=uc.Robust())
+    policy.fit_demonstrations(regimes.with_noise(demos, noise, numbers))
     assert uc.nupe(policy, test) < 10 * uc.nupe(policy.with_learner(uc.Direct()), test)
-    unstable = [one for one in policy.solution_.candidates.values() if one.variance > 20.0]
-    assert unstable  # there is one that had been taken: with 140,000 times the error
+    unstable = [one for one in policy.solution_.candidates.values() if variances[0] < one.variance < variances[1]]
+    assert unstable  # there is one that had decided: with 300 to 140,000 times the error
+
+
+def test_an_unstable_candidate_shows_bias_where_it_is_the_more_consistent():
+    data = draw_recorded("coming to rest", "#1", 1)
+    policy = data.fit(uc.Robust())
+    assert uc.nupe(policy, data.test) < 0.1 * uc.nupe(policy.with_learner(uc.Direct()), data.test)
+    assert any(one.variance > 1.0 for one in policy.solution_.candidates.values())

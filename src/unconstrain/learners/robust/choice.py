@@ -33,9 +33,10 @@ Jacobian of the constraints has less bias than all, and a softness of −1. A
 candidate j that is less consistent than k where held out, along the actions,
 shows no bias of k: consistency is what it was learnt by, so it fits chance.
 Nor does one whose own variance is many times the motion: where nothing was
-constrained, hard hybrids follow rounding. Whoever knows the Jacobian is a
-candidate only if it is as consistent as the best of the others, and is compared
-no more.
+constrained, hard hybrids follow rounding. One whose variance is many times
+what k misses along the actions shows k's bias only if it is the more
+consistent. Whoever knows the Jacobian is a candidate only if it is as
+consistent as the best of the others, and is compared no more.
 
 Residuals have the variance ``‖π‖² (σ² / ‖u‖² + κ²)`` under any constraint:
 noise of variance σ² turns the direction of a slow action, and people vary by
@@ -66,6 +67,7 @@ from .constants import (
     LEAST_DEMONSTRATIONS,
     LEAST_MISFIT,
     MOST_VARIANCE,
+    MOST_VARIANCE_TO_LOSS,
     NEGLIGIBLE_LOSS,
     NEGLIGIBLE_RATIO,
     REFUTED,
@@ -233,10 +235,10 @@ class Comparison:
         Whoever knows more of the constraints than the second was compared before, see :attr:`as_consistent`.
         """
         mine, its = self._candidates[one].softness, self._candidates[other].softness
-        stable = self._variance[one] < MOST_VARIANCE * self._samples.energy
-        return mine < 0.0 <= its or (
-            (mine < its or mine == its <= 0.0) and bool(stable) and not self._refuted[one, other]
-        )
+        more_consistent, loss = self._refuted[other, one], self._losses[other].sum()
+        most = MOST_VARIANCE * self._samples.energy if more_consistent else MOST_VARIANCE_TO_LOSS * loss
+        stable = bool(self._variance[one] < most)
+        return mine < 0.0 <= its or ((mine < its or mine == its <= 0.0) and stable and not self._refuted[one, other])
 
     @cached_property
     def _refuted(self) -> NDArray[np.bool_]:
