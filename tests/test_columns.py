@@ -124,7 +124,7 @@ def test_usual_names_are_understood(states, actions, others):
     ],
 )
 def test_where_names_do_not_tell_it_is_asked(columns):
-    with pytest.raises(SettingError, match="--state"):
+    with pytest.raises(SettingError, match="states="):
         complete(columns)
 
 

@@ -99,6 +99,60 @@ def test_numbered_arrays_of_an_archive_are_demonstrations(tmp_path, lengths):
     assert [len(each) for each in uc.read(tmp_path / "a.npz")] == list(lengths)
 
 
+def in_container(path, **arrays):
+    if path.suffix == ".h5":
+        with h5py.File(path, "w") as file:
+            file.update(arrays)
+    elif path.suffix == ".npz":
+        np.savez(path, **arrays)
+    else:
+        scipy.io.savemat(path, arrays)
+    return path
+
+
+DEEP = np.stack([STATES, 2 * STATES, 3 * STATES])
+STAMPS = STEPS * 0.1
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".h5", ".mat"])
+@pytest.mark.parametrize("clock", [STAMPS, STAMPS[None], np.stack([STAMPS] * 3), np.stack([STAMPS] * 3)[:, :, None]])
+@pytest.mark.parametrize("more", [{}, {"label": np.arange(3)}])
+def test_demonstrations_in_one_array_share_a_clock_or_have_one_each(tmp_path, suffix, clock, more):
+    found = uc.read(in_container(tmp_path / f"a{suffix}", q=DEEP, t=clock, **more))
+    assert [one.columns for one in found] == [("q1", "q2", "q3")] * 3
+    for recording, states in zip(found, DEEP, strict=True):
+        assert_array_equal(recording.values, states)
+        assert_array_equal(recording.times, STAMPS)
+
+
+def test_what_has_as_many_samples_goes_along_with_demonstrations_in_one_array(tmp_path):
+    force = np.outer([1.0, 2.0, 3.0], STAMPS)
+    path = in_container(tmp_path / "a.npz", q=DEEP.transpose(0, 2, 1), f=force, ticks=STAMPS)
+    _, second, _ = uc.read(path, time="ticks")
+    assert second.columns == ("q1", "q2", "q3", "f")
+    assert_array_equal(second.values, np.column_stack([DEEP[1], force[1]]))
+    assert_array_equal(second.times, STAMPS)
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".h5", ".mat"])
+@pytest.mark.parametrize(
+    "stamps", [STAMPS[1:], STAMPS[::-1], np.sin(STEPS), np.ones(len(STEPS)), np.stack([STAMPS, STAMPS, -STAMPS])]
+)
+def test_what_is_no_clock_of_demonstrations_in_one_array_is_refused(tmp_path, suffix, stamps):
+    with pytest.raises(
+        ReadError, match="t does not increase as a clock, or not with the samples of the rest"
+    ) as caught:
+        uc.read(in_container(tmp_path / f"a{suffix}", q=DEEP, t=stamps))
+    assert f"q {DEEP.shape}" in str(caught.value)
+    assert f"t {stamps.shape}. Give a stamp for each sample" in str(caught.value)
+
+
+@pytest.mark.parametrize("deep", [np.tile(np.eye(3), (len(STEPS), 1, 1)), np.ones((len(STEPS), 20, 25))])
+def test_samples_beside_an_array_for_each_of_them_stay_samples(tmp_path, deep):
+    [recording] = uc.read(in_container(tmp_path / "a.npz", deep=deep, pos=STATES, x=STEPS, t=STAMPS))
+    assert recording.columns == ("pos1", "pos2", "pos3", "x")
+
+
 # MATLAB
 
 
@@ -198,7 +252,7 @@ def test_episodes_are_chosen_by_lists_numbers_ranges_and_names(tmp_path, asked, 
 
 def test_the_state_of_a_simulator_is_not_taken_for_that_of_the_movement(tmp_path):
     recording = uc.read(robomimic(tmp_path / "a.hdf5", simulated=True))[0]
-    with pytest.raises(UnconstrainError, match="--state"):
+    with pytest.raises(UnconstrainError, match="states="):
         guessed(recording)
     told = complete_recipe(uc.Recipe("states"), recording)
     assert (len(told.states), told.actions) == (11, ("actions1", "actions2", "actions3"))
@@ -401,7 +455,7 @@ def test_a_topic_of_ros_is_a_recording(tmp_path, kind):
 @pytest.mark.parametrize(
     ("topic", "sentence"),
     [
-        (None, r"several topics; say which with topic \(--topic\): /joint_states \(sensor_msgs/msg/JointState\)"),
+        (None, r"several topics; say which with topic=: /joint_states \(sensor_msgs/msg/JointState\)"),
         ("/gone", "no topic '/gone'; it has /joint_states"),
         ("/tf:foot", "no frame 'foot'; it has tool, hand"),
     ],

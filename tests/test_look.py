@@ -1,5 +1,6 @@
 """The page of demonstrations: in space, in time, with a policy and a constraint; in Chromium."""
 
+import contextlib
 import json
 import re
 
@@ -11,7 +12,7 @@ from selenium.webdriver import ActionChains, Keys
 import unconstrain as uc
 from seen import on_a_phone, unnamed_canvases, width_of
 from test_cli import call, refused, run
-from unconstrain.pages.look import look_page
+from unconstrain.pages.look import look_page, marks_of
 
 NAMES = ("x", "y", "z")
 
@@ -84,11 +85,26 @@ def test_numbers_arrive_as_they_were(folder, page):
             assert_allclose(states, table[:, 1:].T, atol=1e-4)
 
 
+@pytest.mark.parametrize("absent", [40, 6])
+def test_a_gap_is_told_once_and_shown_where_it_is(absent):
+    times = np.delete(3 + np.arange(120) * 0.01, slice(40, 40 + absent))
+    recording = uc.Recording(("x", "y"), np.column_stack([np.sin(times), np.cos(times)]), times)
+    recipe = uc.Recipe(states=("x", "y"), differentiate="central")
+    with pytest.warns(uc.preparation.PreparationWarning) if absent > 9 else contextlib.nullcontext():
+        [demonstration] = uc.prepare(recording, recipe)
+    [found] = uc.preparation.survey_set([recording], recipe)
+    marks = [one for one in marks_of(recording, found, demonstration) if "gap" in one.code]
+    assert [one.code for one in marks if one.message] == (["clock-gap"] if absent > 9 else ["gap"])
+    assert [one.start for one in marks if one.length] == [pytest.approx(0.39)]
+    assert all(one.start is None for one in marks if not one.length)
+
+
 def test_the_first_lines_say_what_is_there_and_what_is_odd(page):
     assert text(page, "summary").startswith("4 demonstrations, ")
     assert text(page, "verdict").startswith("! ")
     notes = text(page, "notes")
-    assert "gap: wipe_1 at 1.98 s" in notes
+    assert "clock-gap: wipe_1: 1 gap in the time stamps, the longest 0.706 s after 1.98319 s" in notes
+    assert notes.count("gap: wipe_1") == 1
     assert "pause: wipe_2" in notes
     assert "dashes: gap" in text(page, "time-says")
 

@@ -422,10 +422,10 @@ def test_a_stroke_of_a_table_is_named_with_its_table(tmp_path):
 @pytest.mark.parametrize(
     ("said", "typed"),
     [
-        ("leave_out (--leave-out): no 'a'.", "--leave-out: no 'a'."),
-        ("a.bag: say which with topic (--topic): b.", "a.bag: say which with --topic: b."),
-        ("check --episodes (episodes), --task (task).", "check --episodes, --task."),
-        ("An affine policy (ParametricPolicy(Affine()), --model affine).", "An affine policy (--model affine)."),
+        ("leave_out: no 'a'.", "--leave-out: no 'a'."),
+        ("a.bag: say which with topic=: b.", "a.bag: say which with --topic: b."),
+        ("check episodes=, task= and leave_out=.", "check --episodes, --task and --leave-out."),
+        ("An affine policy (ParametricPolicy(Affine())).", "An affine policy (--model affine)."),
         ("max_gap_s: got -1.", "--max-gap: got -1."),
         ("angle='x', angles=('a', 'b') or sort=True.", "--angle x, --angle a,b or --sort."),
         (
@@ -434,7 +434,8 @@ def test_a_stroke_of_a_table_is_named_with_its_table(tmp_path):
         ),
         ("Fit with learner=Robust(), or order=2.", "Fit with --learner robust, or --order 2."),
         ("rate=5.csv: group=, 'time=3' of it=4", "rate=5.csv: --group, 'time=3' of it=4"),
-        ("name the time column (--time).", "name the time column (--time)."),
+        ("with time=, or angles=('yaw (deg)',).", "with --time, or --angle 'yaw (deg)'."),
+        ("give group='Strich', degrees=() or steps=.", "give --group Strich, --degrees none or --steps."),
     ],
 )
 def test_settings_are_said_as_options_but_for_names_of_files(said, typed, monkeypatch, tmp_path):

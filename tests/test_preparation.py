@@ -194,7 +194,7 @@ def turned(unit: str = "deg", speed: str = "deg/s") -> Recording:
 @pytest.mark.parametrize("speed", ["deg/s", "°/s", "deg s^-1", "degrees per second", "deg/sec", "deg s⁻¹"])
 def test_columns_in_degrees_by_their_units_are_taken_in_radians(unit: str, speed: str) -> None:
     recording = turned(unit, speed)
-    with pytest.warns(PreparationWarning, match="degrees: 'arm': a, va is taken in radians; --degrees none forbids it"):
+    with pytest.warns(PreparationWarning, match=r"degrees: 'arm': a, va is taken in radians; degrees=\(\) forbids it"):
         demonstration = only(prepare(recording))
     np.testing.assert_allclose(demonstration.states, recording.values[:, :2] * [1, np.pi / 180], rtol=1e-15)
     np.testing.assert_allclose(demonstration.actions, recording.values[:, 2:] * [1, np.pi / 180], rtol=1e-15)
@@ -306,7 +306,7 @@ def test_nothing_is_smoothed_across_a_gap() -> None:
     assert [str(warning.message) for warning in caught] == [
         (
             "clock-gap: 'wipe', row 150: 1 gap in the time stamps, the longest 0.72 s after 1.49 s; "
-            "nothing is smoothed or interpolated across (--max-gap)."
+            "nothing is smoothed or interpolated across (max_gap_s=)."
         )
     ]
     assert caught[0].filename == __file__
@@ -369,7 +369,7 @@ def test_stamps_that_run_backwards_are_refused_with_their_row() -> None:
     times = STEADY.copy()
     times[7] = 0.02
     refused = pytest.raises(InvalidDataError, match=r"'wipe', row 7: got time 0\.02 s after 0\.06 s, expected later")
-    with pytest.warns(PreparationWarning, match=r"row-order: 'wipe', row 7: .* --sort"), refused:
+    with pytest.warns(PreparationWarning, match=r"row-order: 'wipe', row 7: .* sort=True"), refused:
         prepare(wiping(times))
 
 
@@ -466,7 +466,7 @@ def test_names_that_tell_nothing_are_refused_with_what_to_say(names: str, recipe
     with pytest.raises(SettingError) as caught:
         prepare(columns(*names.split()), recipe)
     assert f"'wipe': cannot tell {what} from its columns {', '.join(names.split())}." in str(caught.value)
-    assert "(--state, --action)" in str(caught.value)
+    assert "Say which with states= and actions=, or" in str(caught.value)
 
 
 names = st.text("ax_1 .,/'\"\\\n\té拭🙂", min_size=1)
@@ -531,6 +531,13 @@ def test_one_column_needs_no_tuple() -> None:
 
 
 # ---------------------------------------------------------------------------------------------------------- surveys
+
+
+def test_the_table_and_the_remark_tell_one_time_of_a_gap() -> None:
+    times = np.delete(3 + np.arange(100) * 0.02, slice(40, 60))
+    found = survey(Recording(("x", "y"), np.column_stack([np.sin(times), np.cos(times)]), times, "wipe"))
+    assert found.gaps == (Gap(pytest.approx(0.78), pytest.approx(0.42)),)
+    assert "the longest 0.42 s after 0.78 s" in found.warnings[0].message
 
 
 def test_a_survey_tells_what_is_there() -> None:
@@ -638,6 +645,6 @@ def test_targets_without_a_clock_are_learnt_as_they_are_with_a_word():
     path = np.cumsum(np.random.default_rng(3).normal(size=(80, 2)), axis=0)
     table = np.column_stack([path[:-1], path[1:]])
     recording = Recording(("q1", "q2", "a1", "a2"), table)
-    with pytest.warns(PreparationWarning, match="are the states to come.*--rate without a clock"):
+    with pytest.warns(PreparationWarning, match="are the states to come.*rate= without a clock"):
         [demonstration] = prepare(recording, Recipe(("q1", "q2"), ("a1", "a2")))
     np.testing.assert_array_equal(demonstration.actions, path[1:])

@@ -201,7 +201,7 @@ def test_degrees_are_known_by_the_row_of_units_by_their_jumps_or_by_the_option()
     with_units = uc.Recording(straight.columns, straight.values, straight.times, units={"crank": "deg"})
     asked = uc.Recipe(("crank",), differentiate="savgol", angles=("crank",), degrees=("crank",))
     for recording, recipe in ((wrapped, CRANK), (with_units, CRANK), (straight, asked)):
-        word = nullcontext() if recipe is asked else pytest.warns(match="crank is taken in radians; --degrees none")
+        word = nullcontext() if recipe is asked else pytest.warns(match=r"crank is taken in radians; degrees=\(\)")
         with word:
             [demonstration] = uc.prepare(recording, recipe)
         assert demonstration.space == Circle()

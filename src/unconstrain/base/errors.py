@@ -82,7 +82,5 @@ class SupportEndsWarning(UserWarning):
     """A movement that stops before it comes to where nothing was demonstrated."""
 
 
-NOTHING_LEFT = (
-    "no demonstration is left to read; check --episodes (episodes), --task (task) and --leave-out, or leave them off."
-)
+NOTHING_LEFT = "no demonstration is left to read; check episodes=, task= and leave_out=, or leave them off."
 """What a ReadError says where everything was to be passed over."""

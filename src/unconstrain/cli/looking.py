@@ -19,6 +19,7 @@ from .constraining import arm_of, known_arms
 from .informing import OF, learnt_from
 from .printing import refuse_warnings, say_verdict
 from .reading import options_for_reading, prepared, reading_of, typed
+from .speaking import as_typed
 from .writing import check_outputs, option_for_force
 
 MOST_QUICK = 20_000
@@ -140,12 +141,13 @@ def _seen(paths: Sequence[str | Path], reading: dict[str, Any]) -> Seen:
 def _page(seen: Seen, surveys: Sequence[Any]) -> str:
     from ..pages.look import look_page, marks_of
 
+    found = zip(seen.recordings, surveys, seen.demonstrations, strict=True)
     return look_page(
         seen.demonstrations,
         seen.recipe.states or (),
         _title(seen.paths),
         units=seen.recordings[0].units,
-        marks=[marks_of(*each) for each in zip(seen.recordings, surveys, seen.demonstrations, strict=True)],
+        marks=[[one._replace(message=as_typed(one.message)) for one in marks_of(*each)] for each in found],
         command=_to_fit(seen.paths, seen.recipe, seen.roles),
         policy=seen.policy,
         constraint=seen.constraint if seen.held else None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 
@@ -30,12 +31,9 @@ TIMES = {
 """How people write the units of time."""
 
 _SETTING = re.compile(
-    r"(?<![\w/'\".-])([a-z]\w*)=(\([^()]*\)|'[^']*'|[A-Z]\w*\(\)|True\b|-?\d+(?:\.\d+)?(?!\.?[\w/])|(?=[,;:)\s]|\.(?:\s|$)))"
+    r"(?<![\w/'\".-])([a-z]\w*)=(\((?:'[^']*'|[^()'])*\)|'[^']*'|[A-Z]\w*\(\)|True\b|-?\d+(?:\.\d+)?(?!\.?[\w/])|(?=[,;:)\s]|\.(?:\s|$)))"
 )
 """``name=value`` or ``name=``, but in no path."""
-
-_TWICE = re.compile(r"\b(?:with [^().,;]*?|(\w+)) \((--[a-z-]+(?:, --[a-z-]+)*)\)|(--[a-z-]+) \((\w+)\)")
-"""A setting and its option, one of them in parentheses; or ``with`` some settings and their options."""
 
 
 def as_typed(said: str) -> str:
@@ -51,8 +49,7 @@ def as_typed(said: str) -> str:
     said = f"{option}: {rest}" if (option := _option(head, options)) else said
     for made, option in OBJECTS.items():
         said = said.replace(made, option)
-    said = _TWICE.sub(_once, _SETTING.sub(lambda found: _set(found, options), said))
-    return re.sub(r"(--[a-z-]+ \w+), \1", r"\1", said)
+    return _SETTING.sub(lambda found: _set(found, options), said)
 
 
 def _option(name: str, options: Mapping[str, str]) -> str:
@@ -61,19 +58,10 @@ def _option(name: str, options: Mapping[str, str]) -> str:
 
 
 def _set(found: re.Match[str], options: Mapping[str, str]) -> str:
-    option, value = _option(found[1], options), found[2].removesuffix("()") if found[2] != "()" else "none"
-    plain = re.sub(r"[()'\"\s]", "", value).rstrip(",").replace("True", "")
-    return f"{option} {plain.lower() if value.isalpha() else plain}".rstrip() if option else found[0]
-
-
-def _once(found: re.Match[str]) -> str:
-    """The option alone, where the word beside it is its name; after ``with``, all that are named."""
-    _, word, several, option, setting = found[0], *found.groups()
-    if option:
-        return option if option[2:] == setting.replace("_", "-") else found[0]
-    if word is None:
-        return f"with {several.replace(', ', ' and ')}"
-    return several if several[2:] == word.replace("_", "-") else found[0]
+    option, value = _option(found[1], options), found[2]
+    words = shlex.quote(",".join(re.findall(r"'([^']*)'", value))) if "'" in value else ""
+    plain = words or ("none" if value == "()" else re.sub(r"[()\s]|True", "", value).lower())
+    return f"{option} {plain}".rstrip() if option else found[0]
 
 
 def meant_of(value: str, known: Iterable[str]) -> str:

@@ -44,7 +44,7 @@ MOST_NUMBERS = 50_000
 
 
 class Mark(NamedTuple):
-    """What is to be seen on the time line: ``start`` and ``length`` in seconds from the first stamp."""
+    """What is seen on the time line, ``start`` and ``length`` in seconds from its begin, and told unless empty."""
 
     code: str
     message: str
@@ -126,9 +126,12 @@ def marks_of(recording: Recording, survey: Any, demonstration: Demonstration) ->
     """
     stamps, kept = recording.times, demonstration.times
     begin = 0.0 if kept is None or not len(kept) else float(kept[0])
-    marks = [Mark("gap", f"{gap.length:.3g} s without samples", gap.start - begin, gap.length) for gap in survey.gaps]
+    first = 0.0 if stamps is None else float(stamps[np.isfinite(stamps)][:1].sum())
+    said = "" if any(remark.code == "clock-gap" for remark in survey.warnings) else "{:.3g} s without samples"
+    marks = [Mark("gap", said.format(gap.length), first + gap.start - begin, gap.length) for gap in survey.gaps]
     for remark in survey.warnings:
-        start = None if stamps is None or remark.row is None else float(stamps[remark.row]) - begin
+        row = None if remark.code == "clock-gap" else remark.row
+        start = None if stamps is None or row is None else float(stamps[row]) - begin
         where = "" if remark.column is None else f" (column {remark.column})"
         marks.append(Mark(remark.code, f"{remark.message}{where}", start))
     return [*marks, *_pauses(kept, begin, marks)]

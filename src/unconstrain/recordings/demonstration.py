@@ -80,7 +80,7 @@ class Recording(Shown):
         missing = [name for name in names if name not in self._places]
         if missing:
             has_not = f"'{self.name}' has no column {listed([*map(repr, missing)])}; it has {listed(self.columns)}"
-            words = f", and of words, for --group, {listed(self.words)}" if self.words else ""
+            words = f", and of words, for group=, {listed(self.words)}" if self.words else ""
             raise InvalidDataError(f"{has_not}{words}.{meant(missing, self.columns)}")
         return self.values[:, [self._places[name] for name in names]]
 

@@ -248,7 +248,7 @@ def _has_times(recordings: Sequence[Recording]) -> bool:
 
 def _times(recording: Recording) -> Array:
     if recording.times is None:
-        raise WriteError(f"'{recording.name}': has no times, which this format needs. Say its rate (--rate).")
+        raise WriteError(f"'{recording.name}': has no times, which this format needs. Say its rate (rate=).")
     return recording.times
 
 

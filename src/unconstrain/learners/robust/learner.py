@@ -379,8 +379,7 @@ def _say_if_long(samples: Samples) -> None:
     if models * float(size) ** 3 > LONG:
         warnings.warn(
             f"to compare learners of {counted(models, 'model')} with {size} weights takes minutes. An affine policy "
-            "(ParametricPolicy(Affine()), --model affine) or the hybrid alone (learner=Hybrid(), --learner hybrid) "
-            "take a fraction of it.",
+            "(ParametricPolicy(Affine())) or the hybrid alone (learner=Hybrid()) take a fraction of it.",
             UserWarning,
             stacklevel=2,
         )

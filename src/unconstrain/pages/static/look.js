@@ -552,7 +552,7 @@
       "dashes: gap": warnings.some(({ mark }) => mark.code === "gap"),
       "thin line: pause, left out": warnings.some(({ mark }) => mark.code === "pause") };
     of("time-says").textContent = Object.keys(signs).filter((sign) => signs[sign]).join("; ");
-    for (const { demo, mark } of warnings) {
+    for (const { demo, mark } of warnings.filter((one) => one.mark.message)) {
       const item = made("li"), name = made("b", { textContent: `${mark.code}: ` });
       item.append(name, `${demo.name}${mark.start === null ? "" : ` at ${number(mark.start)} ${clock}`}: ${mark.message}`);
       of("notes").append(item);

@@ -14,7 +14,7 @@ from .recipes import Recipe, complete_recipe, stamps
 DEGREES = re.compile(r"\s*(deg|degs|degrees?|[°º])\s*((/|per |\*|·)?\s*s(ec|econds?)?(\^?-1|⁻¹)?)?\s*", re.IGNORECASE)
 """How people write degrees, and degrees a second."""
 
-NOT_TOLD = "jumps by 360, and is taken for radians; name it with --degrees, or leave that option off."
+NOT_TOLD = "jumps by 360, and is taken for radians; name it with degrees=, or leave that off."
 """What is said of an angle in degrees that is not told to be."""
 
 
@@ -42,7 +42,7 @@ def decide(recipe: Recipe, recording: Recording) -> tuple[Recipe, tuple[Remark, 
         return _of_used_columns(completed), said
     if stamps(recording, completed) is None:  # nothing to differentiate by
         return _of_used_columns(completed), (*said, found)
-    message = "are the states to come, so the velocity of the states is learnt; --action-is velocity forbids it."
+    message = "are the states to come, so the velocity of the states is learnt; action_is='velocity' forbids it."
     decided = complete_recipe(replace(completed, action_is="target"), recording)
     return _of_used_columns(decided), (*said, found._replace(message=message))
 
@@ -82,4 +82,4 @@ def _about_degrees(asked: Recipe, decided: Recipe, recording: Recording) -> tupl
         return tuple(Remark("degrees", NOT_TOLD, name) for name in _turning_by_360(decided, recording))
     if not degrees:
         return ()
-    return (Remark("degrees", f"{', '.join(degrees)} is taken in radians; --degrees none forbids it."),)
+    return (Remark("degrees", f"{', '.join(degrees)} is taken in radians; degrees=() forbids it."),)

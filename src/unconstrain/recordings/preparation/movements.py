@@ -51,7 +51,7 @@ class PreparationWarning(UserWarning):
 
 
 class Gap(NamedTuple):
-    """Where samples are missing: stamp of the last one before, and seconds to the next."""
+    """Where samples are missing: time of the last one before, and seconds to the next."""
 
     start: float
     length: float
@@ -297,7 +297,7 @@ def _prepare(recording: Recording, recipe: Recipe) -> tuple[Demonstration, list[
     if actions is None:
         raise SettingError(
             f"'{recording.name}' has no times, which are needed to differentiate: "
-            "name the time column (--time), or give its rate in samples per second (--rate)."
+            "name the time column with time=, or give its rate in samples per second with rate=."
         )
     source = Source(recording.file, at)
     demonstration = Demonstration(states, actions, times, None, recording.name, recipe.space, noise, source)
@@ -315,7 +315,7 @@ def _about_centre(states: Array) -> list[Remark]:
     on = float(np.linalg.norm(states[-1] - states[0]))
     if on <= PUSHED * float(np.linalg.norm(np.ptp(states, axis=0))):
         return []
-    said = "is centred by the mean of a movement from end to end, which hides a constant push; leave --centre off."
+    said = "is centred by the mean of a movement from end to end, which hides a constant push; leave centre=True off."
     return [Remark("centred", said)]
 
 
@@ -340,7 +340,7 @@ def _without_repeats(piece: _Piece, name: str) -> tuple[_Piece, list[Remark]]:
         row = int(np.argmax(intervals < 0)) + 1
         raise InvalidDataError(
             f"'{name}', row {row}: got time {times[row]:.6g} s after {times[row - 1]:.6g} s, expected later ones. "
-            "Sort the rows (--sort), or split the file where a new recording begins."
+            "Sort the rows (sort=True), or split the file where a new recording begins."
         )
     fresh = np.append(True, intervals > 0)
     if fresh.all():

@@ -270,8 +270,8 @@ def _with_columns(recipe: Recipe, recording: Recording) -> Recipe:
         return replace(told, states=states, differentiate="savgol")
     raise SettingError(
         f"'{recording.name}': cannot tell {'the actions' if states else 'states and actions'} from its columns "
-        f"{', '.join(columns)}. Say which with states and actions (--state, --action), "
-        "or take the velocity of the states with differentiate='savgol' (--state, --differentiate)."
+        f"{', '.join(columns)}. Say which with states= and actions=, or take the velocity "
+        "of the states with differentiate='savgol'."
     )
 
 
@@ -310,7 +310,7 @@ def _in_states(group: Sequence[str], states: Sequence[str]) -> tuple[tuple[str, 
     if set(ordered) != set(group) or (letters not in spaces.ORDERS and ordered != tuple(group)):
         raise SettingError(
             f"quaternions: got {', '.join(group)} and the states {', '.join(states)}, expected the four columns side "
-            "by side, in the order w, x, y, z or x, y, z, w. Give the states in such an order (--state)."
+            "by side, in the order w, x, y, z or x, y, z, w. Give the states in such an order (states=)."
         )
     return ordered, spaces.Sphere(letters if letters in spaces.ORDERS else spaces.ORDERS[0])
 

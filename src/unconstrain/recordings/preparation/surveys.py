@@ -11,7 +11,7 @@ from ..demonstration import Recording
 from ..remarks import Remark, titled
 from .decisions import in_radians
 from .movements import Gap, find_gaps
-from .plausibility.checks import examine
+from .plausibility.checks import examine, once
 from .plausibility.sets import compare, outline, too_few
 from .plausibility.subject import Subject
 from .recipes import Recipe, complete_recipe, stamps
@@ -33,7 +33,7 @@ class Survey:
     jitter : float, optional
         Standard deviation of the intervals that are no gaps, as a share of the median one.
     gaps : tuple of Gap
-        Where samples are missing.
+        Where samples are missing, from the first stamp.
     non_increasing : tuple of int
         Rows whose stamp is not later than that of the row before, from 0.
     missing : mapping of str to int
@@ -110,19 +110,11 @@ def _with(each: Survey, added: tuple[Remark, ...]) -> Survey:
     return replace(each, warnings=warnings, notes=each.notes + notes)
 
 
-def once(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
-    """The first remark of each code."""
-    first: dict[str, Remark] = {}
-    for remark in remarks:
-        first.setdefault(remark.code, remark)
-    return tuple(first.values())
-
-
 def _survey(subject: Subject, asked: Recipe) -> Survey:
     recording = subject.recording
     times = stamps(recording, asked)
     known = np.empty(0) if times is None else times[np.isfinite(times)]
-    gaps, remarks = find_gaps(known, asked.max_gap_s), examine(subject)
+    gaps, remarks = find_gaps(known - known[:1], asked.max_gap_s), examine(subject)
     steady = _steady_intervals(known, gaps)
     typical = float(np.median(steady)) if steady.size else None
     bad_cells = [int((~np.isfinite(column)).sum()) for column in recording.values.T]

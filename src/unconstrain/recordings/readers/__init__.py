@@ -100,9 +100,9 @@ def read_blocks(path: PathLike, reading: Reading | None = None, *, whole: bool =
     file, told = Path(path), reading or Reading()
     known = format_of(file)
     if told.columns is not None and known.has_names:
-        raise SettingError(f"columns (--columns): {file} says itself what its columns are called; leave them off.")
+        raise SettingError(f"columns: {file} says itself what its columns are called; leave them off.")
     if told.topic is not None and not known.has_topics:
-        raise SettingError(f"topic (--topic): {file} has none; ROS recordings have topics, and workbooks sheets.")
+        raise SettingError(f"topic: {file} has none; ROS recordings have topics, and workbooks sheets.")
     blocks = None if whole else known.blocks
     assembly = Assembly(file, told, blocks is not None)
     with ours_alone(file, known.expected), unchanged(file):
@@ -120,7 +120,7 @@ def check_left_out(names: Iterable[str], came: Collection[str]) -> None:
     """
     if absent := [name for name in names if name not in came]:
         said = f"no demonstration is called {listed([*map(repr, absent)])}; there are {listed([*map(repr, came)])}."
-        raise SettingError(f"leave_out (--leave-out): {said}{meant(absent, came)}")
+        raise SettingError(f"leave_out: {said}{meant(absent, came)}")
 
 
 def expand(paths: PathLike | Iterable[PathLike]) -> list[Path]:

@@ -58,7 +58,7 @@ def _read(place: Path, path: Path, reading: Reading, rows: int | None) -> Iterat
     h5py = require_extra("h5py", "data")
     with ours_alone(path, EXPECTED), h5py.File(place, "r") as file:
         branch = _branch(file, path.stem, reading, _masks(file, Visit(h5py)), Visit(h5py))
-        yield from tables_of(branch, path, reading.columns, rows)
+        yield from tables_of(branch, path, reading, rows)
 
 
 def _branch(node: Any, name: str, reading: Reading, masks: Mapping[str, list[str]], visit: Visit) -> Branch:

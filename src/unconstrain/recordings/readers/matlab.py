@@ -36,7 +36,7 @@ def read_matlab(path: Path, reading: Reading) -> Iterator[Table]:
 
 
 def _tables(contents: Mapping[str, Any], path: Path, reading: Reading) -> Iterator[Table]:
-    return tables_of(Branch(contents, path.stem, is_short=False), path, reading.columns)
+    return tables_of(Branch(contents, path.stem, is_short=False), path, reading)
 
 
 def _is_hdf5(path: Path) -> bool:

@@ -34,7 +34,7 @@ def read_npz(path: Path, reading: Reading) -> Iterator[Table]:
         _check_pairs(path, contents, {"times", "groups", *filter(None, asked)})
     named = {name if name in asked else _ROLES.get(name, name): array for name, array in contents.items()}
     try:
-        yield from tables_of(Branch(named, path.stem), path, reading.columns)
+        yield from tables_of(Branch(named, path.stem), path, reading)
     except ReadError as error:
         raise ReadError(f"{path}: {str(error).removeprefix(f'{path}: ')} {_EXPECTED}.") from error
 
@@ -56,7 +56,7 @@ def _npy(path: Path, reading: Reading, rows: int | None) -> Iterator[Table]:
             array = np.load(path, allow_pickle=False)
     fields = array.dtype.names
     members = {UNNAMED: array} if fields is None else {name: array[name] for name in fields}
-    yield from tables_of(Branch(members, path.stem), path, reading.columns, rows)
+    yield from tables_of(Branch(members, path.stem), path, reading, rows)
 
 
 class OnDisk:

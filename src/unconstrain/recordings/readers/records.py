@@ -23,7 +23,7 @@ def read_json(path: Path, reading: Reading) -> Iterator[Table]:
     with opened(path) as file:
         tree = _tree(_parse(file.read().decode("utf-8-sig")))
     members = tree if isinstance(tree, Mapping) else {UNNAMED: tree}
-    yield from tables_of(Branch(members, stem(path), is_short=False), path, reading.columns)
+    yield from tables_of(Branch(members, stem(path), is_short=False), path, reading)
 
 
 def _parse(text: str) -> Any:

@@ -2,7 +2,7 @@
 
 A message becomes a row: each number in it is a column, called by its fields (``position.x``); the entries of a
 ``JointState`` are called by their joints (``position.elbow``). A topic of transforms holds a recording for each frame
-(``--topic /tf:tool``). Times are the stamps in the headers where they are set, else when a message was recorded.
+(``topic="/tf:tool"``). Times are the stamps in the headers where they are set, else when a message was recorded.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def _read(path: Path, asked: str | None, several: bool) -> Iterator[Table]:
     held = rows if frame is None else {frame: rows[frame]}
     if len(held) > 1 and asked is None:
         frames = listed([f"{topic}:{name}" for name in rows])
-        raise ReadError(f"{path}: the topic {topic} has several frames; say which with topic (--topic): {frames}.")
+        raise ReadError(f"{path}: the topic {topic} has several frames; say which with topic=: {frames}.")
     for name, one in held.items():
         parts = [stem(path), *([topic.strip("/")] if several else []), *([name] if len(held) > 1 else [])]
         yield _table(one, "/".join(parts), {"topic": topic, "frame": name, "start_ns": one[0][0]})
@@ -81,7 +81,7 @@ def _chosen(bag: Any, path: Path, asked: str | None) -> tuple[str, str | None]:
     moving = [topic for topic, kind in kinds.items() if MOTION.fullmatch(kind.rpartition("/")[2])]
     if len(moving) == 1 or len(kinds) == 1:
         return (moving or list(kinds))[0], None
-    raise ReadError(f"{path}: holds several topics; say which with topic (--topic): {_described(kinds)}.")
+    raise ReadError(f"{path}: holds several topics; say which with topic=: {_described(kinds)}.")
 
 
 def _described(kinds: Mapping[str, str]) -> str:

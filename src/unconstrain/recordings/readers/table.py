@@ -29,9 +29,6 @@ GROUP_NAMES = (
 NO_GROUP = "none"
 """Told as the group, no column tells demonstrations apart."""
 
-NO_GROUP = "none"
-"""Told as the group, no column tells demonstrations apart."""
-
 EXPONENTIAL = re.compile(r"[+-]?\d\.\d+[eE][+-]?\d{1,3}")
 """A number as ``numpy.savetxt`` writes it; demonstrations are called by it in short."""
 
@@ -154,7 +151,7 @@ def find_roles(names: Sequence[str], reading: Reading, path: Path) -> Roles:
     """
     for name, role in ((reading.group, "group"), (reading.time, "time")):
         if name is not None and name not in names and (role, name) != ("group", NO_GROUP):
-            none = f" Give another, or --group {NO_GROUP} where each file is one." if role == "group" else ""
+            none = f" Give another, or group={NO_GROUP!r} where each file is one." if role == "group" else ""
             cure = meant([name], names) or none
             raise ReadError(f"{path}: no column {name!r} for {role}; it has {listed(names)}.{cure}")
     group = reading.group or next((name for name in names if _names_group(name) and name != reading.time), None)
@@ -243,7 +240,7 @@ class Assembly:
         """Recordings between breaks, the first with a remark where a column takes apart more."""
         first, *others = self._at_breaks(whole, table, roles)
         name, count = _labels(table, roles)
-        said = f"has {'several' if self._in_blocks else count} values, a stroke each by its jumps: give --group {name}."
+        said = f"has {'several' if self._in_blocks else count} values, a stroke each by its jumps: give group={name!r}."
         hint = (Remark("several-in-one", said, name),) if count > 1 + len(others) else ()
         return [replace(first, remarks=(*first.remarks, *hint)), *others]
 

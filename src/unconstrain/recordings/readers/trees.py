@@ -1,8 +1,9 @@
 """Nested arrays, as HDF5, MATLAB, NumPy and JSON hold them, as tables.
 
 A mapping whose arrays have one length in common is a table. An array of one dimension is a column of its name; one of
-two is as many columns, numbered from 1, whichever way it lies; one of three holds a demonstration in each part. Each
-member of a sequence of mappings or arrays is a demonstration. Single numbers and words are attributes.
+two is as many columns, numbered from 1, whichever way it lies; one of three holds a demonstration in each part, with
+what has as many samples, as a clock of all or of each. Each member of a sequence of mappings or arrays is a
+demonstration. Single numbers and words are attributes.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from ...base.arrays import Array
 from ...base.display import listed
 from ...base.errors import ReadError
 from ..remarks import Remark
+from .clocks import TIME_NAME
+from .reading import Reading
 from .table import FEWEST_ROWS, Table, named_by, unique_names
 
 SHORT = {"states": "x", "actions": "u"}
@@ -78,18 +81,16 @@ class Leaf:
         return self.array[start:stop] if self.axis == 0 else np.asarray(self.array[:, start:stop]).T
 
 
-def tables_of(
-    branch: Branch, path: Path, names: Sequence[str] | None = None, rows: int | None = None
-) -> Iterator[Table]:
+def tables_of(branch: Branch, path: Path, reading: Reading, rows: int | None = None) -> Iterator[Table]:
     """All tables in a tree, with their columns called as told, whole or by so many rows at a time.
 
     Raises
     ------
     ReadError
-        If there is none, or other than so many columns.
+        If there is none, or other than so many columns, or a clock that is none of the demonstrations beside it.
     """
-    found = False
-    for table in _tables(branch, path, rows):
+    found, names = False, reading.columns
+    for table in _tables(branch, path, rows, reading.time):
         found = True
         yield table if names is None else replace(table, columns=named_by(names, table.columns, path))
     if not found:
@@ -102,16 +103,18 @@ def described(members: Mapping[str, Any]) -> str:
     return listed([f"{name} {_shape(member)}".strip() for name, member in members.items()]) or "nothing"
 
 
-def _tables(branch: Branch, path: Path, rows: int | None) -> Iterator[Table]:
+def _tables(branch: Branch, path: Path, rows: int | None, time: str | None) -> Iterator[Table]:
     arrays = {name: member for name, member in branch.members.items() if _is_array(member)}
     if episodes := _episodes(arrays):
         arrays = {name: array for name, array in arrays.items() if name not in EPISODE_ENDS} | episodes
     branch.attributes = {**branch.attributes, **_attributes(branch.members)}
     flat = {name: array for name, array in arrays.items() if array.ndim < 3}
     leaves = {} if _are_demonstrations(flat) else _leaves(flat)
-    deep = {} if leaves else {name: array for name, array in arrays.items() if array.ndim == 3}
-    below = [*(part for name, array in deep.items() for part in _parts(name, array, branch)), *_branches(branch)]
-    if leaves and (not below or _length(leaves) >= FEWEST_ROWS):
+    called = {name for name in arrays if name == time or TIME_NAME.fullmatch(name)}
+    clocks = {name for name in called if arrays[name].dtype.kind in "fiu" and arrays[name].shape[2:] in ((), (1,))}
+    deep = _deep(arrays, leaves, clocks, branch, path)
+    below = [*deep, *_branches(branch)]
+    if leaves and not deep and (not below or _length(leaves) >= FEWEST_ROWS):
         yield from _cut(leaves, branch, path, rows)
     elif not below:
         alike = _are_demonstrations(arrays)
@@ -120,7 +123,7 @@ def _tables(branch: Branch, path: Path, rows: int | None) -> Iterator[Table]:
                 below_it = Branch({}, _under(branch, name), branch.attributes, branch.labels)
                 yield from _cut(single, below_it, path, rows)
     for child in below:
-        yield from _tables(child, path, rows)
+        yield from _tables(child, path, rows, time)
 
 
 def _cut(leaves: dict[str, Leaf], branch: Branch, path: Path, rows: int | None) -> Iterator[Table]:
@@ -248,18 +251,45 @@ def _branches(branch: Branch) -> Iterator[Branch]:
                 yield Branch(inside, f"{_under(branch, name)}_{number}", branch.attributes, branch.labels)
 
 
-def _parts(name: str, array: Any, branch: Branch) -> list[Branch]:
-    """An array of three dimensions as demonstrations: along the first, or the last if samples come first."""
-    if array.dtype.kind not in "fiub" or min(array.shape) < 1 or array.shape[0] > max(array.shape[1:]) * 1000:
-        return []
-    samples_first = FEWEST_ROWS <= array.shape[0] > array.shape[1] <= MOST_COLUMNS
-    parts = (
-        [array[:, :, at] for at in range(array.shape[2])] if samples_first else [array[at] for at in range(len(array))]
-    )
-    return [
-        Branch({name: part}, f"{_under(branch, name)}_{at}", branch.attributes, branch.labels)
-        for at, part in enumerate(parts, start=1)
-    ]
+def _deep(arrays: Mapping[str, Any], leaves: Mapping[str, Leaf], clocks: set[str], branch: Branch, path: Path) -> Any:
+    """Arrays of three dimensions as demonstrations, each with what goes along; none where others are the samples."""
+    found: list[Branch] = []
+    three = {name: each for name, each in arrays.items() if each.ndim == 3 and name not in clocks}
+    strange = set(clocks)
+    for name, array in three.items():
+        if array.dtype.kind not in "fiub" or min(array.shape) < 1 or array.shape[0] > max(array.shape[1:]) * 1000:
+            continue
+        samples_first = FEWEST_ROWS <= array.shape[0] > array.shape[1] <= MOST_COLUMNS
+        *part, count = array.shape if samples_first else (*array.shape[1:], len(array))
+        along = _along({other: each for other, each in arrays.items() if other not in three}, part, count)
+        of_each = {other for other, leaf in leaves.items() if leaf.array.shape == (count,)} - clocks
+        if set(leaves) <= (clocks if samples_first or not along else {*along, *of_each}):
+            strange -= {other for other in strange & set(along) if _increases(along[other].astype(np.float64))}
+            for at in range(count):
+                members = {name: array[:, :, at] if samples_first else array[at]}
+                members |= {other: each[at] for other, each in along.items()}
+                found.append(Branch(members, f"{_under(branch, name)}_{at + 1}", branch.attributes, branch.labels))
+    if found and strange:
+        raise ReadError(
+            f"{path}: {listed(sorted(strange))} does not increase as a clock, or not with the samples of the rest: it "
+            f"holds {described(arrays)}. Give a stamp for each sample, of one demonstration or of each in turn."
+        )
+    return found
+
+
+def _along(others: Mapping[str, Any], part: Sequence[int], count: int) -> dict[str, Any]:
+    """Arrays that have a number for each sample, of all parts of a shape or of each, as shape (count, T)."""
+    shapes = {name: tuple(size for size in array.shape if size > 1) for name, array in others.items()}
+    return {
+        name: np.broadcast_to(np.asarray(others[name]).reshape(shape), (count, shape[-1]))
+        for name, shape in shapes.items()
+        if shape[-1] in (part[0], max(part)) and shape[:-1] in ((), (count,))
+    }
+
+
+def _increases(stamps: Array) -> bool:
+    """Whether stamps never go back in any demonstration, NaN aside, nor all stand still."""
+    return not (np.diff(stamps) < 0).any() and bool((np.fmax.reduce(stamps, 1) > np.fmin.reduce(stamps, 1)).all())
 
 
 def _episodes(arrays: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import pairwise
 
 import numpy as np
@@ -30,9 +31,13 @@ SHORTEST_PIECE = 5
 
 def examine(subject: Subject) -> tuple[Remark, ...]:
     """What is worth saying about one recording, at most once for each code, but for what its recipe cures."""
-    found = [*subject.recording.remarks, *(remark for check in CHECKS if (remark := check(subject)) is not None)]
+    return once([*subject.recording.remarks, *(remark for check in CHECKS if (remark := check(subject)) is not None)])
+
+
+def once(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
+    """The first remark of each code."""
     first: dict[str, Remark] = {}
-    for remark in found:
+    for remark in remarks:
         first.setdefault(remark.code, remark)
     return tuple(first.values())
 
@@ -51,7 +56,7 @@ def clock_unit(subject: Subject) -> Remark | None:
     if max(rates) > SLOWEST and min(rates) < FASTEST:
         return None
     unit = next((unit for unit, seconds in UNITS.items() if seconds / max(rates) < 1.0 / SLOWEST), "ns")
-    cure = f"such as --time-unit {unit}" if max(rates) <= SLOWEST else "--time-unit, or the right column with --time"
+    cure = f"such as time_unit={unit!r}" if max(rates) <= SLOWEST else "time_unit=, or the right column with time="
     return Remark("clock-unit", f"{rates[0]:.3g} samples a second; say the unit of the time stamps, {cure}.")
 
 
@@ -72,7 +77,7 @@ def clock_gap(subject: Subject) -> Remark | None:
     return Remark(
         "clock-gap",
         f"{rows.size} gap{'s' * (rows.size > 1)} in the time stamps, the longest {intervals[worst - 1]:.3g} s after "
-        f"{stamps[worst - 1] - stamps[0]:.6g} s; nothing is smoothed or interpolated across (--max-gap).",
+        f"{stamps[worst - 1] - stamps[0]:.6g} s; nothing is smoothed or interpolated across (max_gap_s=).",
         row=subject.row(int(rows[0])),
     )
 
@@ -106,13 +111,13 @@ def row_order(subject: Subject) -> Remark | None:
         back = np.flatnonzero(np.diff(subject.stamps) < 0) + 1
         if not back.size or subject.recipe.sort or back.size == len(subject.stamps) - 1:
             return None
-        message = f"time runs backwards at {back.size} row{'s' * (back.size > 1)}; put them in order with --sort."
+        message = f"time runs backwards at {back.size} row{'s' * (back.size > 1)}; put them in order with sort=True."
         return Remark("row-order", message, row=subject.row(int(back[0])))
     states = subject.states
     if len(states) < 2 * LEAST_ROWS or not states.shape[1] or not (noise_share(states) > 0.5).all() or _rests(subject):
         return None
     return Remark(
-        "row-order", "neighbouring rows have nothing in common; name the column of time stamps with --time and --sort."
+        "row-order", "neighbouring rows have nothing in common; name the column of time with time=, and sort=True."
     )
 
 
@@ -120,9 +125,9 @@ def reversed_in_time(subject: Subject) -> Remark | None:
     """Stamps that count down, or recorded velocities against the movement."""
     stamps = subject.stamps
     if stamps is not None and len(stamps) >= LEAST_ROWS and (np.diff(stamps) < 0).all() and not subject.recipe.sort:
-        return Remark("reversed", "the time stamps count down; put the rows in order with --sort.")
+        return Remark("reversed", "the time stamps count down; put the rows in order with sort=True.")
     if subject.moves and are_backwards(subject.clean, subject.actions):
-        return Remark("reversed", "moves against its own actions; leave it out with --leave-out, or turn it round.")
+        return Remark("reversed", "moves against its own actions; leave it out with leave_out=, or turn it round.")
     return None
 
 
@@ -132,7 +137,8 @@ def angle_wrap(subject: Subject) -> Remark | None:
         return None
     column, wrap = min(subject.wraps.items(), key=lambda one: one[1].rows[0])
     name = subject.name(column)
-    message = f"jumps by a turn of {wrap.turn:.4g}, {len(wrap.rows)} in all; it is made continuous with --angle {name}."
+    cure = f"it is made continuous with angles={(name,)}."
+    message = f"jumps by a turn of {wrap.turn:.4g}, {len(wrap.rows)} in all; {cure}"
     return Remark("angle-wrap", message, name, subject.row(wrap.rows[0]))
 
 
@@ -151,7 +157,7 @@ def _flip(subject: Subject, code: str) -> Remark | None:
         if flip.code == code:
             names = [subject.name(column) for column in range(start, start + flip.width)]
             times = f"{len(flip.found)} time{'s' * (len(flip.found) > 1)}"
-            message = f"turns its sign {times}; it is made continuous with {flip.option} {','.join(names)}."
+            message = f"turns its sign {times}; it is made continuous with {flip.setting}={tuple(names)}."
             return Remark(code, message, names[0], subject.row(flip.found[0]))
     return None
 
@@ -162,7 +168,7 @@ def glitch(subject: Subject) -> Remark | None:
         return None
     first, rows = subject.glitches[0], {row for one in subject.glitches for row in range(one.start, one.stop)}
     far = "1 sample far off its" if len(rows) == 1 else f"{len(rows)} samples far off their"
-    message = f"{far} neighbours; --glitches repair or drop."
+    message = f"{far} neighbours; glitches='repair' or glitches='drop'."
     return Remark("glitch", message, subject.name(first.column), subject.row(first.start))
 
 
@@ -172,7 +178,7 @@ def seam(subject: Subject) -> Remark | None:
         return None
     message = (
         f"{len(subject.seams)} jump{'s' * (len(subject.seams) > 1)} to another place, as between demonstrations; "
-        "tell them apart with --group, or cut there with --seams cut."
+        "tell them apart with group=, or cut there with seams='cut'."
     )
     return Remark("seam", message, row=subject.row(subject.seams[0]))
 
@@ -183,7 +189,7 @@ def other_topic(subject: Subject) -> Remark | None:
         return None
     message = (
         "rows alternate between two places, as where two topics share a table; take them apart by the column that "
-        "names them (--group), or read one (--topic of a ROS recording)."
+        "names them (group=), or read one (topic= of a ROS recording)."
     )
     return Remark("other-topic", message, row=subject.row(subject.topic))
 
@@ -193,7 +199,7 @@ def targets(subject: Subject) -> Remark | None:
     recipe = subject.recipe
     if not subject.moves or recipe.action_is != "auto" or not are_targets(subject.clean, subject.actions):
         return None
-    message = "are the states to come, not velocities; --action-is target learns these (--rate without a clock)."
+    message = "are the states to come, not velocities; action_is='target' learns these (rate= without a clock)."
     return Remark("targets-as-velocities", message, (recipe.actions or ("",))[0])
 
 
@@ -210,7 +216,7 @@ def pause(subject: Subject) -> Remark | None:
     if not found:
         return None
     rows = sum(stop - start for start, stop in found)
-    done = "left out (--pauses keep)" if subject.recipe.pauses == "drop" else "kept (--pauses drop)"
+    done = "left out (pauses='keep')" if subject.recipe.pauses == "drop" else "kept (pauses='drop')"
     message = f"stands still for {rows} of {len(subject.rows)} rows in the middle; they are {done}."
     return Remark("pause", message, row=subject.row(found[0][0]))
 
@@ -219,7 +225,7 @@ def at_rest(subject: Subject) -> Remark | None:
     """States that change no more than noise does, all the time."""
     if not subject.moves or subject.topic is not None or not _rests(subject):
         return None
-    return Remark("at-rest", "does not move: what changes is noise. Leave it out with --leave-out.")
+    return Remark("at-rest", "does not move: what changes is noise. Leave it out with leave_out=.")
 
 
 def _rests(subject: Subject) -> bool:
@@ -235,7 +241,7 @@ def all_zero(subject: Subject) -> Remark | None:
     """Action columns without any action."""
     if not subject.actions.size or subject.actions.any():
         return None
-    message = "all actions are zero; name others with --action, or take the velocity of the states: --differentiate."
+    message = "all actions are zero; name others with actions=, or take the states' velocity: differentiate='savgol'."
     return Remark("all-zero", message, (subject.recipe.actions or ("",))[0])
 
 

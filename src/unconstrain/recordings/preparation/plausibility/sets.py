@@ -84,7 +84,7 @@ def too_few(demonstrations: int) -> tuple[Remark, ...]:
     """The remark on fewer demonstrations than can be learnt from and checked; none where there are enough."""
     found = f"{demonstrations} demonstration{'s' * (demonstrations != 1)}"
     message = f"{found}, where {FEWEST} or more under different constraints are needed: record more, or tell those in "
-    message += "one file apart with --group."
+    message += "one file apart with group=."
     return (Remark("few-demonstrations", message),) if demonstrations < FEWEST else ()
 
 
@@ -97,7 +97,7 @@ def _explains_nothing(missed: float) -> tuple[Remark, ...]:
     """The remark on a policy that misses most of the motion that it learnt from, as a share; none where it does not."""
     message = (
         f"misses {missed:.0%} of the motion that it learnt from; the actions may be no function of the state, "
-        "as where a movement goes out and back or stands still. Look at the warnings of inspect, and at --state."
+        "as where a movement goes out and back or stands still. Look at the warnings of a survey, and at states=."
     )
     return (Remark("explains-nothing", message),) if missed > MOST_MISSED else ()
 
@@ -115,7 +115,7 @@ def mixed_units(outlines: Sequence[Outline]) -> list[Remark]:
     if ratio < UNLIKE or extent[large] < UNLIKE / 3 * extent[small]:
         return []
     names = outlines[0].names
-    message = f"is {ratio:.0f} times smaller than {names[large]!r}, which outweighs it; --scale auto levels them."
+    message = f"is {ratio:.0f} times smaller than {names[large]!r}, which outweighs it; scale='auto' levels them."
     return [Remark("mixed-units", message, names[small])]
 
 
@@ -129,9 +129,9 @@ def different_places(outlines: Sequence[Outline]) -> list[Remark]:
     if not 0.0 < APART * wide < np.median(apart):
         return []
     if np.median([one.push for one in outlines]) < PUSHED:
-        cure = "if where they are does not matter, take each from its own centre with --centre"
+        cure = "if where they are does not matter, take each from its own centre with centre=True"
     else:
-        cure = "they move on from end to end, so that no mean tells their places (--centre would hide a constant push)"
+        cure = "they move on from end to end, so no mean tells their places (centre=True would hide a constant push)"
     return [Remark("places", f"demonstrations are farther apart than each is wide; {cure}.")]
 
 
@@ -146,7 +146,7 @@ def unit_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
             factor = float(np.exp(np.abs(logs).mean()))
             message = (
                 f"is {factor:.3g} times {'larger' if logs[0] > 0 else 'smaller'} than the others, as in another unit; "
-                "convert it, or leave it out with --leave-out."
+                "convert it, or leave it out with leave_out=."
             )
             found.append((place, Remark("unit-differs", message, outlines[place].names[0])))
     return found
@@ -182,7 +182,7 @@ def smaller_than_others(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]
         return []
     covered = (extents[:, moving] / usual[moving]).max(axis=1)
     near = np.median([one.size for one in outlines], axis=0)[moving] < 20 * np.array([o.size[moving] for o in outlines])
-    message = "hardly moves beside the others; leave it out with --leave-out."
+    message = "hardly moves beside the others; leave it out with leave_out=."
     still = np.flatnonzero((covered < STILL) & near.any(axis=1))
     return [(int(place), Remark("at-rest", message)) for place in still]
 
@@ -192,7 +192,7 @@ def reversed_among_others(outlines: Sequence[Outline]) -> list[tuple[int, Remark
     strange = {place for place, _ in unit_differs(outlines)}
     moving = [place for place, one in enumerate(outlines) if len(one.steps) and place not in strange]
     together = [moving[first : first + TOGETHER] for first in range(0, len(moving), TOGETHER)]
-    message = "moves against the others at the same places; leave it out with --leave-out, or turn it round."
+    message = "moves against the others at the same places; leave it out with leave_out=, or turn it round."
     return [
         (places[index], Remark("reversed", message))
         for places in together

@@ -29,7 +29,7 @@ class Flip(NamedTuple):
     """A kind of orientation whose numbers turn their sign: its code, option, columns, and rows."""
 
     code: str
-    option: str
+    setting: str
     width: int
     rows: Callable[[Array], list[int]]
     repair: Callable[[Array], Array]
@@ -37,8 +37,8 @@ class Flip(NamedTuple):
 
 
 FLIPS = (
-    Flip("quaternion-flip", "--quaternion", 4, quaternion_flips, continuous_quaternions),
-    Flip("rotation-vector-flip", "--rotation-vector", 3, rotation_flips, unturned),
+    Flip("quaternion-flip", "quaternions", 4, quaternion_flips, continuous_quaternions),
+    Flip("rotation-vector-flip", "rotation_vectors", 3, rotation_flips, unturned),
 )
 
 
