@@ -515,7 +515,7 @@ def test_what_takes_minutes_is_said_with_what_takes_seconds(monkeypatch):
     ("noise", "seed", "draw_of", "variances"),
     [(0.0, 1, 6, (20.0, np.inf)), (0.0, 900, 9, (1.0, 20.0)), (0.02, 960, 3, (0.5, 1.0))],
 )
-def test_a_candidate_that_follows_rounding_decides_nothing_where_nothing_was_constrained(noise, seed, draw_of, variances):
+def test_a_candidate_that_follows_rounding_decides_nothing_of_free_movements(noise, seed, draw_of, variances):
     numbers = regimes.numbers_of("pendulum", "none", np.random.SeedSequence(seed).spawn(draw_of + 1)[draw_of])
     demos, test = regimes.demonstrate("pendulum", "none", numbers)
     policy = regimes._policy("pendulum").set_params(learner=uc.Robust())

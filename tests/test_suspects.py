@@ -95,7 +95,8 @@ def test_a_bad_sample_is_named_however_the_samples_are_cut():
 
 
 def test_samples_stay_where_no_field_sees_any_other():
-    states, actions, still = np.linspace(300, 900, 20)[:, None], np.random.default_rng(0).normal(size=(20, 2)), np.full((20, 1), -2.0)
+    states, actions = np.linspace(300, 900, 20)[:, None], np.random.default_rng(0).normal(size=(20, 2))
+    still = np.full((20, 1), -2.0)
     policy = uc.LocallyLinearPolicy(learner=uc.Likelihood()).fit(still, np.full((20, 2), 1e9))
     policy.partial_fit(states, actions)
     assert len(policy.solution_.belief.suspects) == 0
