@@ -135,6 +135,23 @@ def test_what_has_as_many_samples_goes_along_with_demonstrations_in_one_array(tm
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".h5", ".mat"])
+@pytest.mark.parametrize("axes", [(0, 1, 2), (0, 2, 1), (1, 2, 0)])
+def test_arrays_of_like_demonstrations_are_columns_of_the_same(tmp_path, suffix, axes):
+    states, actions = np.tile(DEEP, (1, 2, 1)), np.tile(-DEEP[:, :, :2], (1, 2, 1))
+    path = in_container(tmp_path / f"a{suffix}", states=states.transpose(axes), actions=actions.transpose(axes))
+    found = uc.read(path)
+    by_name = suffix == ".h5"  # which keeps no other order
+    assert by_name or [one.columns for one in found] == [("x1", "x2", "x3", "u1", "u2")] * 3
+    for one, *parts in zip(found, states, actions, strict=True):
+        assert_array_equal(one.values, np.column_stack(parts[::-1] if by_name else parts))
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".h5", ".mat"])
+def test_a_number_for_each_demonstration_does_not_hide_them(tmp_path, suffix):
+    assert len(uc.read(in_container(tmp_path / f"a{suffix}", q=DEEP, success=np.arange(3)))) == 3
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".h5", ".mat"])
 @pytest.mark.parametrize(
     "stamps", [STAMPS[1:], STAMPS[::-1], np.sin(STEPS), np.ones(len(STEPS)), np.stack([STAMPS, STAMPS, -STAMPS])]
 )
@@ -147,7 +164,9 @@ def test_what_is_no_clock_of_demonstrations_in_one_array_is_refused(tmp_path, su
     assert f"t {stamps.shape}. Give a stamp for each sample" in str(caught.value)
 
 
-@pytest.mark.parametrize("deep", [np.tile(np.eye(3), (len(STEPS), 1, 1)), np.ones((len(STEPS), 20, 25))])
+@pytest.mark.parametrize(
+    "deep", [np.tile(np.eye(3), (len(STEPS), 1, 1)), np.ones((len(STEPS), 20, 25)), np.ones((len(STEPS), 60, 80))]
+)
 def test_samples_beside_an_array_for_each_of_them_stay_samples(tmp_path, deep):
     [recording] = uc.read(in_container(tmp_path / "a.npz", deep=deep, pos=STATES, x=STEPS, t=STAMPS))
     assert recording.columns == ("pos1", "pos2", "pos3", "x")

@@ -1,7 +1,7 @@
 """NumPy's files: one array (``.npy``), or several (``.npz``). Nothing in them is ever unpickled.
 
 An archive of ``states`` (N, n), ``actions`` (N, d), and if known ``times`` (N,) and ``groups`` (N,) has the columns
-x1..xn and u1..ud. Other arrays are read as :mod:`~.trees` says.
+x1..xn and u1..ud. Other arrays are read as :mod:`~.trees` says, and so are those of R demonstrations, (R, T, n).
 """
 
 import math
@@ -29,8 +29,8 @@ def read_npz(path: Path, reading: Reading) -> Iterator[Table]:
     contents = _load(path)
     if "header" in contents and "array0" in contents:
         raise ReadError(f"{path}: is a policy that was saved, not recordings to learn from.")
-    asked = (reading.group, reading.time)
-    if {"states", "actions"} <= set(contents):
+    asked, pair = (reading.group, reading.time), {"states", "actions"}
+    if pair <= set(contents) and any(contents[name].ndim != 3 for name in pair):
         _check_pairs(path, contents, {"times", "groups", *filter(None, asked)})
     named = {name if name in asked else _ROLES.get(name, name): array for name, array in contents.items()}
     try:

@@ -254,21 +254,21 @@ def _branches(branch: Branch) -> Iterator[Branch]:
 def _deep(arrays: Mapping[str, Any], leaves: Mapping[str, Leaf], clocks: set[str], branch: Branch, path: Path) -> Any:
     """Arrays of three dimensions as demonstrations, each with what goes along; none where others are the samples."""
     found: list[Branch] = []
-    three = {name: each for name, each in arrays.items() if each.ndim == 3 and name not in clocks}
+    flat = {name: each for name, each in arrays.items() if each.ndim < 3 or name in clocks}
     strange = set(clocks)
-    for name, array in three.items():
-        if array.dtype.kind not in "fiub" or min(array.shape) < 1 or array.shape[0] > max(array.shape[1:]) * 1000:
-            continue
-        samples_first = FEWEST_ROWS <= array.shape[0] > array.shape[1] <= MOST_COLUMNS
-        *part, count = array.shape if samples_first else (*array.shape[1:], len(array))
-        along = _along({other: each for other, each in arrays.items() if other not in three}, part, count)
-        of_each = {other for other, leaf in leaves.items() if leaf.array.shape == (count,)} - clocks
-        if set(leaves) <= (clocks if samples_first or not along else {*along, *of_each}):
-            strange -= {other for other in strange & set(along) if _increases(along[other].astype(np.float64))}
+    for (last, count, samples), deep in _of_one_size(arrays, clocks).items():
+        along = _along(flat, {samples, next(iter(deep.values())).shape[1 - last]}, count)
+        of_each = {name for name, leaf in leaves.items() if leaf.array.shape == (count,)} - clocks
+        are_parts = not last and (along or (count < samples and not clocks))
+        if set(leaves) <= ({*along, *of_each} if are_parts else clocks):
+            strange -= {name for name in strange & set(along) if _increases(along[name].astype(np.float64))}
+            lie = len(deep) > 1 and not last and all(each.shape[2] == samples for each in deep.values())
             for at in range(count):
-                members = {name: array[:, :, at] if samples_first else array[at]}
-                members |= {other: each[at] for other, each in along.items()}
-                found.append(Branch(members, f"{_under(branch, name)}_{at + 1}", branch.attributes, branch.labels))
+                members = {name: each[:, :, at] if last else each[at] for name, each in deep.items()}
+                members = {name: each.T for name, each in members.items()} if lie else members
+                members |= {name: each[at] for name, each in along.items()}
+                name = f"{_under(branch, next(iter(deep)))}_{at + 1}"
+                found.append(Branch(members, name, branch.attributes, branch.labels))
     if found and strange:
         raise ReadError(
             f"{path}: {listed(sorted(strange))} does not increase as a clock, or not with the samples of the rest: it "
@@ -277,13 +277,26 @@ def _deep(arrays: Mapping[str, Any], leaves: Mapping[str, Leaf], clocks: set[str
     return found
 
 
-def _along(others: Mapping[str, Any], part: Sequence[int], count: int) -> dict[str, Any]:
-    """Arrays that have a number for each sample, of all parts of a shape or of each, as shape (count, T)."""
+def _of_one_size(arrays: Mapping[str, Any], clocks: set[str]) -> dict[tuple[bool, int, int], dict[str, Any]]:
+    """Arrays of three dimensions by whether demonstrations are along the last or the first, their number, and size."""
+    found: dict[tuple[bool, int, int], dict[str, Any]] = {}
+    for name, array in arrays.items():
+        if array.ndim != 3 or name in clocks or array.dtype.kind not in "fiub" or min(array.shape) < 1:
+            continue
+        last = FEWEST_ROWS <= array.shape[0] > array.shape[1] <= MOST_COLUMNS and array.shape[0] >= array.shape[2]
+        *part, count = array.shape if last else (*array.shape[1:], len(array))
+        if array.shape[0] <= max(array.shape[1:]) * 1000:
+            found.setdefault((last, count, max(part)), {})[name] = array
+    return found
+
+
+def _along(others: Mapping[str, Any], lengths: set[int], count: int) -> dict[str, Any]:
+    """Arrays that have a number for each of so many samples, of all demonstrations or of each, as shape (count, T)."""
     shapes = {name: tuple(size for size in array.shape if size > 1) for name, array in others.items()}
     return {
         name: np.broadcast_to(np.asarray(others[name]).reshape(shape), (count, shape[-1]))
         for name, shape in shapes.items()
-        if shape[-1] in (part[0], max(part)) and shape[:-1] in ((), (count,))
+        if shape[-1:] and shape[-1] in lengths and shape[:-1] in ((), (count,))
     }
 
 
