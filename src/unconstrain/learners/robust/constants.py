@@ -151,12 +151,13 @@ error over that of the best candidate was 1.26 without, 1.18 with 20 and with 10
 with six rows held is worse with 10. All with a distance of more than its variance, which without it are 1.21 with 20.
 """
 
-MOST_VARIANCE_TO_LOSS = 10.0
+MOST_VARIANCE_TO_LOSS = 30.0
 """Nor do those whose variance is more than so many times another's loss show that one's bias, unless more consistent.
 
-On 110 data sets that nothing constrained, with no or 2 % noise, the error over that of the best candidate was 2.15 in
-the geometric mean and 55,000 at worst without, and 1.55 and 13 with 5, 10 and 30; on 251 of 56 other kinds the mean was
-1.175 without, 1.170 with 3, 1.155 with 5, 1.157 with 10, 1.158 with 30 and 1.169 with 100.
+On 139 data sets of the plane that hardly anything constrained, with no or 2 % noise, the error over that of the best
+candidate was 2.15 in the geometric mean and 55,000 at worst without, and 1.55 and 13 with 5 to 300. On 208 of other
+kinds the mean was 1.163 without, 1.155 with 10, 1.156 with 30 and 1.163 with 300; on 41 of the arm 1.140, 1.142, 1.089
+and 1.140.
 """
 
 SHARE_OF_JACKKNIFE = 0.5
