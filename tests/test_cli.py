@@ -320,8 +320,8 @@ def test_what_is_learnt_goes_to_a_file_that_is_called_so(files, tmp_path, comman
 def test_fit_says_how_the_default_learner_went(files, tmp_path):
     said = below(run("fit", *files, "--model", "linear", "-o", tmp_path / "p.npz")).splitlines()[2]
     assert re.fullmatch(
-        r"Learnt as .*: .*\. Estimated squared error, against this: .* times for .*\. Noise and misfit are about \S+ "
-        r"on each action, and \d+% of the samples were free.*\.",
+        r"Learnt as .*: .*\. Estimated squared error, against this: .* times for .* \('fit -v' says what these are\)\. "
+        r"Noise and misfit are about \S+ on each action, and \d+% of the samples were free.*\.",
         said,
     )
 
@@ -895,19 +895,21 @@ def test_a_policy_file_that_is_not_ours_is_refused(files, tmp_path, command):
             return os.mkdir, (str(tmp_path / "run"),)
 
     (tmp_path / "pickle.npz").write_bytes(pickle.dumps(Trap()))
-    np.savez(tmp_path / "plain.npz", states=np.zeros((3, 2)), actions=np.zeros((3, 2)))
+    np.savez(tmp_path / "other.npz", states=np.array([["no", "numbers"]]))
     uc.save(uc.LocallyLinearPolicy(), tmp_path / "new.npz")
     for name, sentence in (
         ("none.npz", "no such file, expected a policy file."),
         ("", "a folder, expected a policy file."),
         ("pickle.npz", "is no policy file, or a damaged one. Expected a file that 'unconstrain fit' or save() wrote."),
-        ("plain.npz", "was not written by unconstrain. Expected a file that 'unconstrain fit' or save() wrote."),
+        ("other.npz", "was not written by unconstrain. Expected a file that 'unconstrain fit' or save() wrote."),
         ("new.npz", "holds a policy that is not fitted. Fit it before saving."),
     ):
         path = tmp_path / name
         said = refused(*(word.format(policy=path, file=files[0]) for word in command))
         assert said == f"{path}: {sentence}"
-    assert refused(*(word.format(policy=files[0], file=files[0]) for word in command)).startswith(f"{files[0]}: is no ")
+    assert refused(*(word.format(policy=files[0], file=files[0]) for word in command)).startswith(
+        f"{files[0]}: is a recording, not a policy. "
+    )
     assert not (tmp_path / "run").exists()
 
 
@@ -990,7 +992,7 @@ def test_no_traceback_in_a_process_of_its_own(folder):
 
 def test_a_closed_pipe_is_no_error_to_see(folder):
     for command, head in (
-        ("rollout swing.npz --start 0.5,0 --steps 3000", "t,x,y,vx,vy\n"),
+        ("rollout swing.npz --start 0.5,0 --steps 3000 2>verdict.txt", "t,x,y,vx,vy\n"),
         ("inspect swing_*.csv --json", "[\n"),
     ):
         ran = shell(f"unconstrain {command} | head -1", folder)

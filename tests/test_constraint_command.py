@@ -70,9 +70,9 @@ def test_its_file_holds_the_constraint_and_no_sample(folder):
     assert not hasattr(found, "evidence_")
     with pytest.raises(SettingError, match="was stored, without what it was learnt from"):
         found.partial_fit(np.ones((3, 3)), np.ones((3, 3)))
-    with pytest.raises(ModelFileError, match="holds a LearntConstraint, expected a policy"):
+    with pytest.raises(ModelFileError, match="holds a learnt constraint, expected a policy"):
         uc.load(folder / "plate.npz")
-    assert "holds a ParametricPolicy, expected a LearntConstraint" in refused(
+    assert "holds a policy, expected a learnt constraint" in refused(
         "score", folder / "wipe.npz", folder / "wipe_0.csv", "--constraint", folder / "wipe.npz"
     )
 

@@ -150,3 +150,10 @@ def test_the_blocks_of_a_page_run(page, names):
 def test_all_that_is_left_out_is_there():
     said = "\n".join(text for page in PAGES for _, text in blocks(page))
     assert [what for what in LEFT_OUT if what not in said] == []
+
+
+def test_the_glossary_has_the_names_of_candidates():
+    words = (ROOT / "docs" / "glossary.rst").read_text("utf-8")
+    assert [name for name in uc.evaluation.diagnosis.WAYS if f"\n   {name}\n" not in words] == [
+        "direct"
+    ]  # as direct learning

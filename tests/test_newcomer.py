@@ -14,7 +14,9 @@ from numpy.testing import assert_allclose
 import unconstrain as uc
 from test_cli import call, refused, run, write
 from test_formats import workbook
+from unconstrain.base.display import listening
 from unconstrain.cli import looking, progress
+from unconstrain.pages import fit as fit_page
 
 HEAD = "Zeit [s],X [mm],Y [mm]"
 LINEAR = ("--model", "linear", "--learner", "direct")
@@ -487,3 +489,98 @@ def test_a_long_fit_says_how_long_it_will_take(folder, tmp_path, monkeypatch):
     monkeypatch.setattr(progress.time, "monotonic", lambda: float(next(clock)))
     said = text(call("fit", folder, "--model", "affine", "-o", tmp_path / "p.npz"))
     assert said.count("Note: this may take minutes; '--learner hybrid' takes less.") == 1
+
+
+class TestFilesOfAnotherKind:
+    """What a file is instead is said, and what to do with it."""
+
+    def test_files_of_score_the_wrong_way_round_come_back_as_they_have_to_be(self, folder, policy):
+        said = refused("score", folder / "w0.csv", policy, folder / "w1.csv")
+        assert said == (
+            f"{folder / 'w0.csv'}: is a recording, not a policy. The policy comes first: unconstrain score {policy} "
+            f"{folder / 'w0.csv'} {folder / 'w1.csv'}"
+        )
+
+    @pytest.mark.parametrize("command", [["info"], ["certify"], ["score", "w1.csv"], ["rollout", "--start", "0,0"]])
+    def test_a_recording_is_no_policy(self, folder, command):
+        more = [folder / word if word.endswith(".csv") else word for word in command[1:]]
+        said = refused(command[0], folder / "w0.csv", *more)
+        assert said.startswith(f"{folder / 'w0.csv'}: is a recording, not a policy. 'unconstrain inspect' says what")
+
+    def test_a_damaged_policy_is_no_recording(self, policy, tmp_path):
+        (tmp_path / "half.npz").write_bytes(policy.read_bytes()[:2000])
+        assert refused("info", tmp_path / "half.npz").startswith(f"{tmp_path / 'half.npz'}: is no policy file, or a ")
+
+    def test_a_learnt_constraint_goes_beside_a_policy(self, folder, tmp_path):
+        held = tmp_path / "held.npz"
+        assert run("constraint", folder / "w0.csv", "-o", held)
+        said = "holds a learnt constraint, expected a policy. Give it beside a policy, as --constraint of rollout."
+        assert refused("rollout", held, "--start", "0,0") == f"{held}: {said}"
+        assert re.search(r"^holds +a learnt constraint", run("info", held), re.MULTILINE)
+        assert json.loads(run("info", held, "--json"))["holds"] == "LearntConstraint"
+
+
+@pytest.mark.parametrize("command", ["inspect", "fit", "diagnose"])
+def test_a_broken_file_is_left_out_by_its_name(folder, tmp_path, command):
+    for k in range(4):
+        shutil.copy(folder / f"w{k}.csv", tmp_path)
+    (tmp_path / "w9.csv").write_text("garbage\n")
+    more = ("--model", "affine") if command != "inspect" else ()
+    asked = (command, *sorted(tmp_path.glob("*.csv")), *more, *(["-o", tmp_path / "p.npz"] if command == "fit" else []))
+    assert refused(*asked).startswith(f"{tmp_path / 'w9.csv'}: a header but no rows")
+    assert refused(*asked, "--leave-out", "w8").startswith(f"{tmp_path / 'w9.csv'}: a header but no rows")
+    assert "3 demonstrations" in run(*asked, "--leave-out", "w9,w3") or command == "inspect"
+    told = json.loads(run(*asked, "--leave-out", "w9,w3", "--json", *(["--force"] if command == "fit" else [])))
+    names = [one["name"] for one in told] if command == "inspect" else told.get("demonstrations", 3)
+    assert names in (["w0", "w1", "w2"], 3)
+
+
+def test_a_rollout_that_is_printed_ends_with_its_verdict(policy, tmp_path):
+    asked = ("rollout", policy, "--start", "50,50", "--steps", 5)
+    printed = call(*asked)
+    written = run(*asked, "-o", tmp_path / "path.csv")
+    assert printed.out == (tmp_path / "path.csv").read_text()
+    assert printed.err.strip()
+    assert printed.err.strip() == written.partition("\nmovement: ")[0].strip()
+
+
+def test_a_good_verdict_of_a_printed_rollout_is_not_kept_back(tmp_path):
+    swings = np.random.default_rng(0).uniform(-1, 1, (60, 2))
+    uc.save(uc.LocallyLinearPolicy(learner="direct").fit(swings, -swings), tmp_path / "p.npz")
+    assert call("rollout", tmp_path / "p.npz", "--start", "0.2,0.2", "--steps", 3).err.startswith("✔ ")
+
+
+def test_names_of_candidates_are_explained_where_they_stand(folder, policy, tmp_path):
+    said = run("fit", folder, "-v", "-o", tmp_path / "p.npz")
+    assert "('fit -v' says what these are)" in said
+    rows = re.findall(r"^(direct|segments|softened hybrid, 1) +\S+ +(\S.*?) *$", said, re.MULTILINE)
+    ways = uc.evaluation.diagnosis.WAYS
+    assert dict(rows) == {
+        "direct": ways["direct"],
+        "segments": ways["segments"],
+        "softened hybrid, 1": ways["softened hybrid"],
+    }
+    known = uc.load(policy).solution_.method.partition(",")[0]
+    assert re.search(rf"^learnt as, in words +{re.escape(ways[known])} *$", run("info", policy), re.MULTILINE)
+
+
+def test_regions_of_a_diagnosis_are_one_number_each(folder):
+    said = " ".join(run("diagnose", folder, "-v").split())
+    told = json.loads(run("diagnose", folder, "--json"))["regions"]
+    alone, open_ = sum(len(one["shown_by"]) < 3 for one in told), sum(one["determined"] < 1 for one in told)
+    assert f"Do not trust: {alone} of {len(told)} regions, where fewer than 3 demonstrations" in said
+    where = (
+        f"of the states, in {open_} of {len(told)} regions; in {alone} regions fewer than 3 demonstrations moved along"
+    )
+    assert where in said
+    assert "shown by: demonstrations that moved along 'leave free' in this region." in said
+
+
+def test_a_report_says_that_it_learns_again(folder, tmp_path):
+    heard = []
+    policy = uc.ParametricPolicy(uc.Affine())
+    demos = uc.prepare(uc.read(folder / "w*.csv"), uc.Recipe(states=("X", "Y"), differentiate="savgol"))
+    policy.fit_demonstrations(demos)
+    with listening(lambda *told: heard.append(told)):
+        fit_page.policy_page(policy, demos, "A page")
+    assert heard == [("report: learning again, each time without some demonstrations:", k, 5) for k in range(1, 6)]

@@ -145,7 +145,7 @@ class TestInfo:
     def test_what_is_no_policy_is_refused(self, folder):
         ran = call("info", folder / "swing_0.csv")
         assert (ran.exit_code, ran.stdout) == (2, "")
-        assert "is no policy file" in ran.stderr
+        assert "swing_0.csv: is a recording, not a policy. " in ran.stderr
 
 
 def test_a_fit_tells_programs_what_it_tells_people(folder):

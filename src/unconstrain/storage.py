@@ -65,6 +65,7 @@ _FORMAT = "unconstrain-policy"
 _HEADER = "header"
 _EXPECTED = "a file that 'unconstrain fit' or save() wrote"
 _INCOMPLETE = "the policy in it is not complete"
+_WORDS: dict[type, str] = {Policy: "policy", Guided: "guided policy", LearntConstraint: "learnt constraint"}
 
 _KNOWN: dict[str, type] = {
     kind.__name__: kind
@@ -80,7 +81,6 @@ _KNOWN: dict[str, type] = {
         *secondary.STORED,
     )
 }
-
 
 K = TypeVar("K")
 
@@ -186,8 +186,10 @@ def load(path: str | os.PathLike[str], kind: type[Any] = Policy) -> Any:
         except UnconstrainError as error:
             raise ModelFileError(f"{path}: {_INCOMPLETE} ({type(error).__name__}: {error}).") from error
         if not isinstance(policy, kind):
-            wanted = "policy" if issubclass(Policy, kind) else kind.__name__
-            raise ModelFileError(f"{path}: holds a {type(policy).__name__}, expected a {wanted}.")
+            wanted = "policy" if issubclass(Policy, kind) else _WORDS.get(kind, kind.__name__)
+            held = next((each for each in _WORDS if isinstance(policy, each)), type(policy))
+            use = " Give it beside a policy, as constraint= of rollout." if held is LearntConstraint else ""
+            raise ModelFileError(f"{path}: holds a {_WORDS.get(held, held.__name__)}, expected a {wanted}.{use}")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # states have no names here
             _check_finite(

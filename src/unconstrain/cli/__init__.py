@@ -73,7 +73,6 @@ from .writing import check_name, check_outputs, option_for_force
 
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
 
-
 SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100, "show_default": True}
 
 
@@ -239,7 +238,7 @@ def _reported(policy: uc.Policy, stream: uc.Stream, report: str | None, title: s
         return {}
     from ..pages.fit import policy_page
 
-    with shown("drawing"):
+    with shown("report: drawing"):
         write(report, policy_page(policy, stream.beginning(), title, stream.recipe, stream.first.units))
     return {"report": report}
 
@@ -371,7 +370,7 @@ def rollout(
     if as_json:
         rows = None if output != "-" else _rows(path).tolist()
         click.echo(json.dumps({"columns": columns, "rows": rows, "output": output, "verdict": verdict.to_json()}))
-    elif trouble is None and (output != "-" or verdict.doubt):
+    elif trouble is None:
         say_verdict(verdict, err=output == "-")
     if trouble is not None:
         raise trouble

@@ -9,6 +9,7 @@ import click
 import unconstrain as uc
 
 from ..base.errors import ModelFileError
+from .reading import loaded
 
 
 @click.command(epilog="\b\nExample:\n  unconstrain certify guided.npz")
@@ -24,7 +25,7 @@ def certify(policy: str, seed: int) -> None:
     """
     import numpy as np
 
-    stored: Any = uc.load(policy, object)
+    stored: Any = loaded(policy, object)
     if isinstance(stored, uc.Guided):
         around = stored.goal_ + np.vstack([np.eye(len(stored.goal_)), -np.eye(len(stored.goal_))])
     elif isinstance(stored, uc.Policy) and hasattr(stored, "solution_"):

@@ -18,7 +18,7 @@ from ..base.files import write
 from .informing import HELD_BY, OF, provenance
 from .printing import of_option, option_for_json, print_table, refuse_warnings, say_verdict, say_written
 from .progress import shown
-from .reading import numbers, options_for_reading, prepared, said_recipe
+from .reading import loaded, numbers, options_for_reading, prepared, said_recipe
 from .writing import check_name, check_outputs, option_for_force
 
 MOST_POSITIONS = 4000
@@ -218,7 +218,7 @@ def held_of(
     if path is None:
         return None
     known_arms()
-    learnt = uc.load(path, uc.LearntConstraint)
+    learnt = loaded(path, uc.LearntConstraint)
     found = learnt.choice_.columns, learnt.choice_.actions
     if found != (states, actions):
         raise SettingError(f"{path}: holds {found[1]} actions at {found[0]} states, expected {actions} at {states}.")

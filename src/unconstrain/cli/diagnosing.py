@@ -81,15 +81,16 @@ def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequenc
         click.echo(line)
     shown = found.regions[:most]
     click.echo(f"\nThe {len(shown)} regions of largest undetermined spread, of {len(found.regions)}, largest first:")
-    head = ["demonstrate around", "in", "samples", "determined", "spread", "leave free"]
+    head = ["demonstrate around", "in", "samples", "determined", "spread", "leave free", "shown by"]
     rows = [
         [named(one.state, states), one.demonstration, str(one.samples), f"{one.determined:.0%}", f"{one.along:.1%}",
-         named(one.direction, actions)]
+         named(one.direction, actions), str(len(one.shown_by))]
         for one in shown
     ]  # fmt: skip
     print_table(head, rows)
     click.echo("determined: share of the samples there at which three demonstrations or more tell the policy.")
     click.echo("spread: how far it may be off at this one state, along 'leave free', as a share of a typical action.")
+    click.echo("shown by: demonstrations that moved along 'leave free' in this region.")
     free = sorted(found.movements, key=lambda one: -(one.free or 0.0))
     click.echo("\nMean probability that a sample was free, of the freest and the most constrained demonstrations:")
     ends = free if len(free) <= MOST_ROWS else [*free[: MOST_ROWS // 2], *free[-MOST_ROWS // 2 :]]

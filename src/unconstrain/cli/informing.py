@@ -14,9 +14,8 @@ import click
 
 import unconstrain as uc
 
-from ..base.errors import ModelFileError
 from .printing import print_table, say_verdict
-from .reading import innermost, reading_of
+from .reading import innermost, loaded, reading_of
 
 TOLD = "determined share of states"
 """Note of the share of the recorded states at which recordings tell the policy in every direction."""
@@ -74,24 +73,15 @@ def info(file: str, as_json: bool) -> None:
 
     A policy, guided or not, or a constraint.
     """
-    held, notes = _loaded(file), uc.storage.load_notes(file)
-    told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held), **_rest(notes)}
+    held, notes = loaded(file, uc.Policy | uc.LearntConstraint | uc.Guided), uc.storage.load_notes(file)
+    rest = {name: value for name, value in notes.items() if name not in ("recipe", "units", "digests", HELD_BY)}
+    told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held), **rest}
     if as_json:
         click.echo(json.dumps(told | {"verdict": verdict_of(held, notes).to_json()}, indent=2))
         return
     say_verdict(verdict_of(held, notes))
+    told |= {"holds": "a learnt constraint"} if isinstance(held, uc.LearntConstraint) else {}
     print_table(["", ""], [[name, _said(value)] for name, value in told.items() if value not in (None, [], {}, "")])
-
-
-def _loaded(path: str) -> Any:
-    """A policy, constraint or guided policy, whichever the file holds."""
-    for kind in (uc.Policy, uc.LearntConstraint):
-        try:
-            return uc.load(path, kind)
-        except ModelFileError as error:
-            if "expected a" not in str(error).rpartition("holds a")[2]:
-                raise
-    return uc.load(path, uc.Guided)
 
 
 def _columns(notes: Mapping[str, Any]) -> dict[str, Any]:
@@ -117,19 +107,16 @@ def _of(held: Any) -> dict[str, Any]:
     if solution is None:
         return {"fitted": False}
     return {
-        "demonstrations": _demonstrations(policy),
+        "demonstrations": len(policy.training_.split.fold_of) or None,  # None where nobody told them apart
         "learnt from": sorted(str(name).partition("/")[2] or str(name) for name in policy.training_.split.fold_of),
         "learner": type(policy.learner).__name__ if not isinstance(policy.learner, str) else policy.learner,
         "learnt as": solution.method,
+        "learnt as, in words": uc.evaluation.diagnosis.WAYS.get(solution.method.partition(", ")[0]),
         "model": f"{len(solution.weights)} local models" if len(solution.weights) > 1 else str(policy.features_),
         "explained held out": None if (share := policy.held_out_score()) != share else round(share, 4),
         "noise": None if solution.belief is None else solution.noise,
         "guided": held.aim_.promise if isinstance(held, uc.Guided) else None,
     }
-
-
-def _rest(notes: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in notes.items() if name not in ("recipe", "units", "digests", HELD_BY)}
 
 
 def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:
@@ -142,14 +129,9 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
     if not hasattr(policy, "solution_"):
         mark = uc.evaluation.verdicts.Mark.BAD
         return uc.evaluation.verdicts.Verdict(mark, "Not fitted: it cannot predict.", next="unconstrain fit")
-    told = _demonstrations(policy) or uc.evaluation.diagnosis.ENOUGH
+    told = len(policy.training_.split.fold_of) or uc.evaluation.diagnosis.ENOUGH
     shown = notes[TOLD] if isinstance(notes.get(TOLD), float) else None
     return uc.evaluation.verdicts.of_explained(policy.held_out_score(), told, shown)
-
-
-def _demonstrations(policy: uc.Policy) -> int | None:
-    """How many it learnt from; None where nobody told them apart."""
-    return len(policy.training_.split.fold_of) or None
 
 
 def _said(value: Any) -> str:

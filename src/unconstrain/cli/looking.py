@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -233,11 +234,9 @@ def _title(paths: Sequence[str | Path]) -> str:
 def _model(path: str | Path) -> Any:
     """The policy or constraint in a file; None where it holds a recording."""
     known_arms()
-    for kind in (uc.Policy, uc.LearntConstraint) if Path(path).suffix.lower() == ".npz" else ():
-        try:
-            return uc.load(path, kind)
-        except ModelFileError:
-            continue
+    if Path(path).suffix.lower() == ".npz":
+        with suppress(ModelFileError):
+            return uc.load(path, uc.Policy | uc.LearntConstraint)  # type: ignore[arg-type]
     return None
 
 

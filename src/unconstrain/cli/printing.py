@@ -227,7 +227,10 @@ def say_fit(policy: uc.Policy, stream: uc.Stream, judged: Judged, learner: str, 
     )
     if verbose and solution.belief is not None:
         rows = sorted((one.risk, name) for name, one in solution.candidates.items())
-        print_table(["candidate", "estimated squared error"], [[name, f"{risk:.4g}"] for risk, name in rows])
+        told = [
+            [name, f"{risk:.4g}", uc.evaluation.diagnosis.WAYS.get(name.partition(", ")[0], "")] for risk, name in rows
+        ]
+        print_table(["candidate", "estimated squared error", "what it is"], told)
     if known:
         _say_doubts(judged, learner)
 
@@ -281,17 +284,13 @@ def _say_suspects(rows: NDArray[np.intp], stream: uc.Stream | None) -> None:
 
 def _said_of_samples(solution: uc.Solution) -> str:
     """The candidate that a robust learner took, and its estimates of noise and free samples."""
-    risks = {name: one.risk for name, one in solution.candidates.items()}
+    risks, share = {name: one.risk for name, one in solution.candidates.items()}, solution.believed.undecided_share
+    undecided = f" ({share:.0%} free or always held in the same way, which looks alike)" if share >= 0.01 else ""
     return (
         f"{uc.evaluation.diagnosis.about_choice(solution.method, risks)} Noise and misfit are about "
         f"{solution.noise:.3g} on each action, and {solution.free_share:.0%} of the samples were free, or "
-        f"held by less than that{_said_of_undecided(solution)}."
+        f"held by less than that{undecided}."
     )
-
-
-def _said_of_undecided(solution: uc.Solution) -> str:
-    share = solution.believed.undecided_share
-    return f" ({share:.0%} free or always held in the same way, which looks alike)" if share >= 0.01 else ""
 
 
 def _walked(policy: uc.Policy, stream: uc.Stream) -> tuple[int, int, float]:

@@ -21,7 +21,6 @@ Say = Callable[[str, int, int | None], None]
 FIRST_S = 2.0
 """After so many seconds somebody may wonder; so often again where lines are written."""
 
-
 FIRST_STEP, KNOWN_AFTER = "noise correction: fold", 2
 """What the default learner counts off first, and after how many of it its pace is known."""
 

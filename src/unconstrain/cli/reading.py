@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 import re
 import shlex
+import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, fields, replace
+from functools import wraps
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -91,7 +93,7 @@ CURES = (
         type=names,
         default="",
         show_default=False,
-        help="Names of demonstrations to leave out, such as wipe_3,wipe_7.",
+        help="Names of demonstrations, or of files that cannot be read, to leave out, such as wipe_3,wipe_7.",
     ),
     click.option("--strict", is_flag=True, help="End with exit code 2 where something is not as it seems."),
 )
@@ -100,6 +102,7 @@ CURES = (
 
 def options_for_reading(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options for reading and preparing files."""
+    command = _without_broken(command)
     for option in reversed(
         [
             click.argument("files", nargs=-1, required=True, metavar="FILE..."),
@@ -135,6 +138,22 @@ def options_for_reading(command: Callable[..., Any]) -> Callable[..., Any]:
     ):
         command = option(command)
     return command
+
+
+def _without_broken(command: Callable[..., Any]) -> Callable[..., Any]:
+    """A command that leaves out whole files by their names, where they cannot be read."""
+
+    @wraps(command)
+    def begun(*args: Any, files: Sequence[str], leave_out: tuple[str, ...], **given: Any) -> Any:
+        stems = {path: path.name.partition(".")[0] for path in (uc.readers.expand(files) if leave_out else ())}
+        broken = {
+            one for path, one in stems.items() if one in leave_out and not is_recording(path, reading_of(**given))
+        }
+        files = [str(path) for path, one in stems.items() if one not in broken] if broken else files
+        leave_out = tuple(name for name in leave_out if name not in broken)
+        return command(*args, files=files, leave_out=leave_out, **given)
+
+    return begun
 
 
 def recipe_of(
@@ -183,10 +202,34 @@ def fitted_policy(path: str, kind: Any = None) -> Any:
     ModelFileError
         Also if it is not fitted.
     """
-    policy = uc.load(path, kind or uc.Policy)
+    policy = loaded(path, kind or uc.Policy)
     if not hasattr(innermost(policy), "solution_"):
         raise ModelFileError(f"{path}: holds a policy that is not fitted. Fit it before saving.")
     return policy
+
+
+def loaded(path: str, kind: Any) -> Any:
+    """What a file holds; a ModelFileError where it is of another kind, which says so of recordings."""
+    try:
+        return uc.load(path, kind)
+    except ModelFileError as error:
+        if not is_recording(Path(path)):
+            raise
+        context = click.get_current_context()
+        files = context.params.get("files", ())
+        then = "'unconstrain inspect' says what is in it, 'unconstrain fit' and 'unconstrain constraint' learn from it."
+        for saved in (one for one in files if zipfile.is_zipfile(one) and not is_recording(one)):
+            typed = shlex.join([saved, path, *(file for file in files if file != saved)])
+            then = f"The policy comes first: unconstrain {context.info_name} {typed}"
+        wanted = "learnt constraint" if kind is uc.LearntConstraint else "policy"
+        raise ModelFileError(f"{path}: is a recording, not a {wanted}. {then}") from error
+
+
+def is_recording(path: Path | str, how: uc.readers.Reading | None = None) -> bool:
+    """Whether a file can be read, to its end."""
+    with suppress(UnconstrainError):
+        return sum(len(block) for block in uc.readers.read_blocks(path, how)) > 0
+    return False
 
 
 def innermost(policy: Any) -> Any:

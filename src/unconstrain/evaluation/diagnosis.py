@@ -31,7 +31,6 @@ LITTLE = 0.01
 FREE, CONSTRAINED = 0.5, 0.1
 """A demonstration looks free above the first, and constrained below the second mean probability of free samples."""
 
-
 MOST_NAMED = 8
 """So many samples that look wrong are named."""
 
@@ -394,7 +393,6 @@ def sentences(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -
     return [
         _about_noise(found),
         about_choice(found.method, found.candidates),
-        _about_variability(found),
         *_about_regions(found, states, actions),
         _about_freedom(found),
         *about_suspects(found.suspects),
@@ -427,7 +425,7 @@ def _about_noise(found: Diagnosis) -> str:
     )
 
 
-_WAYS = {
+WAYS = {
     "direct": "ordinary regression, as constraints do not show",
     "softened hybrid": "consistent with the actions, and near to them",
     "noise-corrected": "consistent with the actions, with the noise taken out",
@@ -450,7 +448,7 @@ def about_choice(method: str, candidates: Mapping[str, float]) -> str:
         Estimated squared error of each, by name.
     """
     way, _, softness = method.partition(", ")
-    said = f"Learnt as {way}{f' (softness {softness})' * bool(softness)}: {_WAYS.get(way, 'as asked for')}."
+    said = f"Learnt as {way}{f' (softness {softness})' * bool(softness)}: {WAYS.get(way, 'as asked for')}."
     if len(candidates) < 2:
         return f"{said} Nothing was compared with it."
     least = {}
@@ -458,21 +456,7 @@ def about_choice(method: str, candidates: Mapping[str, float]) -> str:
         least[name.partition(", ")[0]] = risk
     own = max(candidates[method], 1e-300)
     others = [f"{risk / own:.3g} times for {name}" for name, risk in reversed(least.items()) if name != way]
-    return f"{said} Estimated squared error, against this: {', '.join(others)}."
-
-
-def _about_variability(found: Diagnosis) -> str:
-    share = found.states_determined
-    verdict = "rich enough" if share > 0.95 else "rich enough in most places" if share > 0.7 else "not rich enough"
-    if found.noise_share > robust.SPHERE_HIDDEN_BY_NOISE:
-        verdict = "unknown under so much noise"
-    open_, few = round(found.directions * (1.0 - found.directions_determined)), len(found.movements) < ENOUGH
-    verdict = "unknown from fewer than three demonstrations" if few else verdict
-    policy = "Supposing that they held nothing throughout, the policy" if few else "The policy"
-    return (
-        f"Variability of the constraints: {verdict}. {policy} is determined at {share:.0%} of the recorded states; "
-        f"{open_} of its {found.directions} weights' directions are not shown by three demonstrations or more."
-    )
+    return f"{said} Estimated squared error, against this: {', '.join(others)} ('fit -v' says what these are)."
 
 
 def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> list[str]:
@@ -482,9 +466,13 @@ def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[st
         f"demonstrate around {named(worst.state, states)} with motion along {named(worst.direction, actions)} left "
         f"free (standard deviation there: {worst.along:.0%} of a typical action; see '{worst.demonstration}')."
     )
+    alone = sum(len(one.shown_by) < ENOUGH for one in found.regions)
+    where = (
+        f"Not determined at {1.0 - found.states_determined:.0%} of the states, in {len(open_)} of {len(found.regions)} "
+    )
+    where += f"regions; in {alone} regions fewer than {ENOUGH} demonstrations moved along what is least known."
     if not open_:
-        return [f"Every recorded state is determined. If you record more: {advice}"]
-    where = f"{len(open_)} of {len(found.regions)} regions have states at which the policy is not determined."
+        return [f"{where} Every recorded state is determined. If you record more: {advice}"]
     return [f"{where} {_least_shown(worst, states, actions)}", f"What would help most: {advice}"]
 
 

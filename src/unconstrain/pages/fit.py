@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.arrays import Array
+from ..base.display import counted_off, listening
 from ..base.errors import InvalidDataError, SettingError
 from ..evaluation import diagnosis, ncpe, ninconsistency, nupe, verdicts
 from ..learners import named
@@ -105,9 +106,10 @@ def _held_out(policy: Policy, demos: list[Demonstration]) -> list[float] | None:
     if count < 2 or sum(map(len, demos)) > MOST_REFITTED:
         return None
     found = [float("nan")] * len(demos)
-    for fold in range(count):
+    for fold in counted_off(range(count), "report: learning again, each time without some demonstrations:"):
         rest = [demo for index, demo in enumerate(demos) if index % count != fold]
-        learnt = copy(policy).fit_demonstrations(rest)
+        with listening(lambda *_: None):  # their own steps would look as if the policy were learnt anew
+            learnt = copy(policy).fit_demonstrations(rest)
         for index in range(fold, len(demos), count):
             found[index] = _or_nan(ninconsistency, learnt, [demos[index]])
     return found
