@@ -140,3 +140,71 @@ def test_turns_take_as_long_as_those_shown_however_slow_the_policy_and_uneven_th
         both = (measured(each.states, np.array([0.3, 0.0, 1.0]), each.times[1]) for each in (run, shown))
         found, asked = (each["pace"] for each in both)
         assert abs(found / asked - 1) < 0.035
+
+
+def wiped(scatter):
+    """Ovals whose size varies by so much, at an even angle in time."""
+    times = 0.05 * np.arange(600)
+    size = 0.5 * (1.0 + scatter * np.sin(0.37 * times))
+    flat = size[:, None] * np.column_stack([np.cos(2.0 * times), 0.7 * np.sin(2.0 * times)])
+    return uc.Demonstration(flat, np.gradient(flat, times, axis=0), times)
+
+
+def oval(narrower):
+    """Round on ovals for ever, as wiped, or on narrower ones."""
+    return lambda states: 2.0 * states[:, ::-1] * [-narrower / 0.7, 0.7 / narrower]
+
+
+def parts(guided, states):
+    """Shares of the motion that are correction, across the surface and along it."""
+    slope, added = guided.potential_.gradient(states), guided.correction(states)
+    across = np.vecdot(slope, added) / np.linalg.norm(slope, axis=1)
+    along = np.sqrt(np.maximum((added**2).sum(axis=1) - across**2, 0.0))
+    moved = np.linalg.norm(guided.policy(states), axis=1).sum()
+    return np.abs(across).sum() / moved, along.sum() / moved
+
+
+def test_within_the_scatter_of_what_was_shown_the_cycle_is_the_one_that_the_policy_keeps_to():
+    for narrower in (1.0, 1.2, 1.4):
+        shown = wiped(0.15)
+        guided = uc.Guided(oval(narrower), orbit="shown", demonstrations=shown)
+        across, along = parts(guided, shown.states)
+        assert across < 0.04
+        assert along < 0.01
+        assert abs(np.sqrt(2.0 * guided.potential_(shown.states)).mean() / guided.aim_.radius - 1.0) < 0.01
+
+
+def test_where_what_was_shown_does_not_scatter_the_cycle_is_that_whatever_the_policy():
+    shown = wiped(0.0)
+    for policy in (oval(1.4), lambda states: states + np.array([1.0, 0.0])):
+        guided = uc.Guided(policy, orbit="shown", demonstrations=shown)
+        assert np.abs(off(guided, shown.states)).max() < 0.01 * 0.5 * guided.aim_.radius**2
+
+
+def test_what_keeps_to_the_cycle_as_shown_is_not_corrected_and_what_leaves_it_is():
+    shown = wiped(0.0)
+    for leaving, least, most in ((0.0, 0.0, 0.001), (0.1, 0.04, 0.1)):
+        guided = uc.Guided(
+            lambda states, leaving=leaving: oval(1.0)(states) + leaving * states, orbit="shown", demonstrations=shown
+        )
+        assert least <= sum(parts(guided, shown.states)) <= most
+
+
+def test_a_pace_near_the_one_shown_is_left_and_one_that_is_far_from_it_is_not():
+    shown, plane = wiped(0.0), np.eye(2)
+    for share in (0.7, 0.99, 1.01, 1.3):
+        guided = uc.Guided(lambda states, share=share: share * oval(1.0)(states), orbit="shown", demonstrations=shown)
+        assert abs(guided.aim_.turning(guided.policy, plane) / 2.0 - 1.0) < 0.025
+        assert (parts(guided, shown.states)[1] < 1e-6) == (abs(share - 1.0) < 0.02)
+
+
+def test_v_comes_nearer_for_any_policy_on_any_plane_also_where_what_was_shown_scatters():
+    rng = np.random.default_rng(2)
+    scattered = [uc.Demonstration(d.states + 0.05 * rng.standard_normal(d.states.shape), d.actions) for d in SHOWN]
+    for policy in (steady, lambda states: rng.standard_normal(states.shape)):
+        guided = uc.Guided(policy, orbit="shown", demonstrations=scattered)
+        assert uc.certify(guided, uc.stack(scattered).states).holds
+        held = np.eye(3) - NORMALS[:, :, None] * NORMALS[:, None]
+        moved = uc.project(held, guided.under(STARTS, held))
+        nearer = off(guided, STARTS) * np.vecdot(guided.potential_.gradient(STARTS), moved)
+        assert (nearer < 0.0).all()

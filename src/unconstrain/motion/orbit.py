@@ -28,7 +28,7 @@ MIDDLE = 0.2
 STRAY = 0.1
 """The pace is the one learnt from the demonstrations to within this share."""
 
-AROUND, TIMED = 64, 4
+AROUND, TIMED = 64, 12
 """Places on the cycle at which its pace is measured, and how often it is then set to the demonstrated one."""
 
 WELL_SHOWN = 0.15
@@ -36,6 +36,12 @@ WELL_SHOWN = 0.15
 
 ROUND = 1e-3
 """Weight of a sphere beside the demonstrated states, where these say nothing of the shape."""
+
+LEAVES = 0.03
+"""The surface is one that the policy leaves by this share of its speed as readily as states scatter about it."""
+
+TIMELY = 0.02
+"""A pace within this share of the demonstrated one is left: corrections on simulated bouts are a quarter less."""
 
 _TINY = 1e-150
 
@@ -193,36 +199,37 @@ def turns(demos: Sequence[Demonstration]) -> float:
 
 
 def encircled(demos: Sequence[Demonstration], policy: Callable[[Array], Array]) -> Orbit:
-    """The orbit that the states of demonstrations are on; guided on it a policy goes round at their pace."""
+    """The orbit that demonstrated states are about, and the policy is nearly on; guided it goes round at their pace."""
     states, velocities, _ = stack(demos)
     middle = states.mean(axis=0)
     z = states - middle
     radius = float(np.sqrt((z**2).sum(axis=1).mean()))
     axes = np.stack([np.eye(len(middle)), -np.eye(len(middle))])
     directions = spread_over(np.concatenate([z, -z, *(radius * axes)]), _DIRECTIONS)
-    weights = _level((np.maximum(z @ directions.T, 0.0) / radius) ** 2)
+    weights = _level(np.maximum(z @ directions.T, 0.0) / radius, np.asarray(policy(states)), directions)
     used = weights > 0.0
     potential = Potential(middle, directions[used], np.zeros(int(used.sum())), weights[used])
     turned = [_round(potential, demo) for demo in demos]
-    turn = _turning(turned, np.linalg.lstsq(z, velocities, rcond=1e-6)[0].T)
+    turn = _turning(turned, np.linalg.lstsq(z, velocities, rcond=1e-6)[0].T, lambda z: np.asarray(policy(z + middle)))
     orbit = Orbit(potential, radius, turn, float(np.sqrt((velocities**2).sum(axis=1).mean())) / radius)
     for _ in range(TIMED):
         paces = [orbit.turning(policy, plane) for plane, *_ in turned]
         shown = [float(np.vecdot(phases, velocities).mean()) for *_, phases, velocities in turned]
         faster = sum(shown) / sum(paces) if all(paces) else 1.0
-        orbit = replace(orbit, turn=faster * orbit.turn)
+        orbit = replace(orbit, turn=faster / np.clip(faster, 1.0 - TIMELY, 1.0 + TIMELY) * orbit.turn)
     return orbit
 
 
-def _turning(turned: Sequence[tuple[Array, ...]], plain: Array) -> Array:
-    """B (n, n) of which the part along the cycle is that of the demonstrations.
+def _turning(turned: Sequence[tuple[Array, ...]], plain: Array, policy: Callable[[Array], Array]) -> Array:
+    """B (n, n) of which the part along the cycle is that of the policy, or half or twice that of the demonstrations.
 
     Least squares of whole velocities are too slow: what is across the cycle, and what a plane takes away, counts as
     well. So their part along it is fitted, and of B the plain one is left where that says little.
     """
     _, z, tangents, _, velocities = map(np.concatenate, zip(*turned, strict=True))
     rows = (tangents[:, :, None] * z[:, None, :]).reshape(len(z), -1)
-    left = np.vecdot(tangents, velocities) - rows @ plain.ravel()
+    shown = np.vecdot(tangents, velocities)
+    left = np.clip(np.vecdot(tangents, policy(z)), *np.sort([0.5 * shown, 2.0 * shown], axis=0)) - rows @ plain.ravel()
     return plain + np.linalg.lstsq(rows, left, rcond=WELL_SHOWN)[0].reshape(plain.shape)
 
 
@@ -250,12 +257,20 @@ def _round(potential: Potential, demo: Demonstration) -> tuple[Array, ...]:
     )
 
 
-def _level(beyond: Array) -> Array:
-    """Weights (K,) at least zero with which sums of ``beyond`` (N, K) are one: in the mean, and as nearly as can be."""
+def _level(beyond: Array, wanted: Array, directions: Array) -> Array:
+    """Weights (K,) at least zero of the surface that states are about, and on which what is wanted (N, n) stays.
+
+    ``beyond`` (N, K) is how far states are along the directions, in radii.
+    """
     from scipy.optimize import nnls
 
-    count, slopes = beyond.shape
-    prior, sphere = ROUND * count / slopes, 1.0 / float(beyond.sum(axis=1).mean())
-    root = np.linalg.cholesky(beyond.T @ beyond + prior * np.eye(slopes))
-    weights = nnls(root.T, np.linalg.solve(root, beyond.sum(axis=0) + prior * sphere))[0]
-    return weights / float((beyond @ weights).mean())  # least squares alone are for less where sums vary
+    (count, slopes), squares, scatter = beyond.shape, beyond**2, 0.0
+    leaving = beyond * (wanted @ directions.T) / (np.sqrt((wanted**2).sum(axis=1).mean()) or 1.0)
+    prior, sphere = ROUND * count / slopes, 1.0 / float(squares.sum(axis=1).mean())
+    for _ in range(2):  # how they scatter is known from the first
+        falls = scatter / LEAVES * leaving
+        root = np.linalg.cholesky(squares.T @ squares + falls.T @ falls + prior * np.eye(slopes))
+        weights = nnls(root.T, np.linalg.solve(root, squares.sum(axis=0) + prior * sphere))[0]
+        weights /= float(np.sqrt(squares @ weights).mean()) ** 2  # least squares alone are for less where sums vary
+        scatter = float((squares @ weights).std())
+    return weights
