@@ -138,8 +138,6 @@ def arrival(found: list[Data]) -> Figures:
         way: np.array([one["area"] for one in found[0]["ways"] if one["way"] == way]) for way in ("guided", "stable")
     }
     ratios, prices = areas["guided"] / areas["stable"], [one["nupe_ratio"] for one in found[0]["rows"]]
-    bouts = [one for one in found[0]["cycles"] if re.fullmatch(r"[A-D]\d", one["cycle"])]
-    shares = [100 * one["correction"] for one in bouts]
     alone = [one["area_ratio"] for one in found[0]["rows"] if one["area_ratio"] is not None]
     return figures | {
         "guided / stable: area, median": float(np.median(ratios)),
@@ -148,6 +146,14 @@ def arrival(found: list[Data]) -> Figures:
         "guided / unguided: area, worst": max(alone),
         "price: worst": max(prices),
         "price: mean": float(np.mean(prices)),
+    }
+
+
+def arrival_cycles(found: list[Data]) -> Figures:
+    """Corrections at the states of recorded bouts, each alone, and what is off after a hundred turns."""
+    bouts = [one for one in found[0]["cycles"] if re.fullmatch(r"[A-D]\d", one["cycle"])]
+    shares = [100 * one["correction"] for one in bouts]
+    return {
         "bouts: correction, %": [min(shares), max(shares)],
         "bouts: pace off, %": 100 * max(abs(one["pace_off"]) for one in bouts),
     }
@@ -303,6 +309,9 @@ RUNS = {
     "demo": Run("unconstrain demo --out results/demo", "demo/washing.json", washing),
     "demo_real": Run("unconstrain demo --real --out results/real", "real/washing.json", washing),
     "arrival": Run("unconstrain reproduce arrival --out results", "arrival.json", arrival),
+    "arrival_cycles": Run(
+        "unconstrain reproduce arrival --only cycles --out results/cycles", "cycles/arrival.json", arrival_cycles
+    ),
     "regimes": Run("unconstrain reproduce regimes --out results", "regimes.json", regimes),
     "recorded": Run("unconstrain reproduce recorded --trials 8 --out results", "recorded.json", recorded),
     "constraints": Run("unconstrain reproduce constraints --out results", "constraints.json", constraints),

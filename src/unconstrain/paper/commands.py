@@ -147,13 +147,17 @@ def deliver(result: Result, verdict: Verdict, headlines: Sequence[str], out: str
 
 
 def summary(result: Result) -> tuple[list[str], list[list[str]]]:
-    """Head and rows: mean and s.d. fill a terminal's 80 columns; medians and the paper's values stay in the files."""
-    first = result.rows[0]
+    """Head and rows: mean and s.d. fill a terminal's 80 columns; medians and the paper's values stay in the files.
+
+    Where a part without rows of the result's own was asked for, they are of the first table that has any.
+    """
+    found = result.rows or next(rows for rows in result.tables.values() if rows)
+    first = found[0]
     kept = [name for name in first if not name.startswith("paper_") and not name.endswith(("_sd", "_median"))]
     names = [short if f"{short}_sd" in first else name for name in kept for short in [name.removesuffix("_mean")]]
     rows = [
         [_cell(row[name]) if name in row else f"{row[f'{name}_mean']:.2g} ± {row[f'{name}_sd']:.2g}" for name in names]
-        for row in result.rows
+        for row in found
     ]
     return [TITLES.get(name, name) for name in names], rows
 
