@@ -38,6 +38,9 @@ MORE = (
 OTHERWISE = 1.2
 """Size or pace of a roll-out over that demonstrated, or the inverse, from which on it is another movement."""
 
+FAR_OFF = 1.5
+"""Those of a single roll-out from which on not even the others speak for the policy."""
+
 SMALL = 0.1
 """An undetermined spread below this share of the typical action is negligible."""
 
@@ -271,31 +274,44 @@ def of_replays(found: Verdict, extents: Array, paces: Array, apart: str) -> Verd
     """Add to a verdict how a policy moves from the starts of demonstrations, held as they were.
 
     ``extents`` and ``paces`` are size and turns of each run over those of its demonstration, NaN where there are none;
-    ``apart`` is how far the runs stray. Half of them may be off by :data:`OTHERWISE` either way, whatever the mean is.
+    ``apart`` is how far the runs stray. Half of them may be off by :data:`OTHERWISE` either way, whatever the mean is,
+    and none by :data:`FAR_OFF`.
     """
     measured = {"size": extents[np.isfinite(extents)], "pace": paces[np.isfinite(paces)]}
     logs = {name: np.log(np.maximum(ratios, 1e-9)) for name, ratios in measured.items() if len(ratios)}
     if not logs:
         return found
-    told = ", ".join(f"{name} {np.exp(np.median(ratios)):.2f} times" for name, ratios in logs.items())
-    ran = f"un from the same starts: {told} the demonstrated, {apart} away on average"
-    off = {name: float(np.exp(np.median(np.abs(ratios)))) for name, ratios in logs.items()}
-    worst = max(off, key=lambda name: off[name])
-    if off[worst] <= OTHERWISE:
+    told = ", ".join(f"{name} {_times(np.exp(ratios))}" for name, ratios in logs.items())
+    ran = f"un from the same starts: {told} the demonstrated, typically {apart} away"
+    off = {name: np.abs(ratios) for name, ratios in logs.items()}
+    strays = {
+        name: int((many > np.log(OTHERWISE)).sum())
+        for name, many in off.items()
+        if np.median(many) > np.log(OTHERWISE) or many.max() > np.log(FAR_OFF)
+    }
+    if not strays:
         return found._replace(said=f"{found.said} R{ran}.")
-    return _strays(found, f"r{ran}: {worst} of half of them is off by {off[worst] - 1:.0%} or more")
+    counted = ", ".join(f"{name} of {count} of {len(extents)}" for name, count in strays.items())
+    which = f"; more than {OTHERWISE - 1:.0%} off: {counted}" if len(extents) > 1 else ""
+    return _strays(found, f"r{ran}{which}", " and ".join(strays))
+
+
+def _times(ratios: Array) -> str:
+    """The middle one, and the range of several that differ."""
+    least, middle, most = (f"{value:.2f}" for value in (ratios.min(), np.median(ratios), ratios.max()))
+    return f"{middle} times" if least == most else f"{middle} times ({least} to {most})"
 
 
 def of_divergence(found: Verdict) -> Verdict:
     """Add to a verdict that a policy leaves the finite numbers where demonstrations start."""
-    return _strays(found, "run from the same starts it leaves the finite numbers")
+    return _strays(found, "run from the same starts it leaves the finite numbers", "size and pace")
 
 
-def _strays(found: Verdict, how: str) -> Verdict:
+def _strays(found: Verdict, how: str, what: str) -> Verdict:
     return found._replace(
         mark=Mark.BAD if found.mark is Mark.BAD else Mark.DOUBTFUL,
         said=f"{found.said} But {how}.",
-        doubt=f"Its size or pace over time. {found.doubt}".rstrip(),
+        doubt=f"Its {what} over time. {found.doubt}".rstrip(),
         next="Look at it ('unconstrain look'). In Python, uc.Guided keeps it to the goal or the cycle that was shown; "
         "more demonstrations, or another --model, may come nearer.",
     )
