@@ -152,6 +152,10 @@ def test_one_that_is_another_movement_is_said_whatever_the_others_do():
     assert added([1.0, 1.0, 1.0, 1.0, 1.3]).mark is Mark.GOOD  # as people vary
 
 
+def test_what_is_poor_anyway_is_not_excepted_by_but():
+    assert "Poor. And run from" in of_replays(Verdict(Mark.BAD, "Poor."), np.array([2.0]), np.array([1.0]), "3 mm").said
+
+
 def test_of_one_that_was_run_no_share_is_said():
     found = added([0.79], 0.5)
     assert (

@@ -310,7 +310,7 @@ def of_divergence(found: Verdict) -> Verdict:
 def _strays(found: Verdict, how: str, what: str) -> Verdict:
     return found._replace(
         mark=Mark.BAD if found.mark is Mark.BAD else Mark.DOUBTFUL,
-        said=f"{found.said} But {how}.",
+        said=f"{found.said} {'But' if found.mark is Mark.GOOD else 'And'} {how}.",
         doubt=f"Its {what} over time. {found.doubt}".rstrip(),
         next="Look at it ('unconstrain look'). In Python, uc.Guided keeps it to the goal or the cycle that was shown; "
         "more demonstrations, or another --model, may come nearer.",

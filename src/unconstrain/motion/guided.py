@@ -263,7 +263,7 @@ def _kept(policy: Any) -> list[Demonstration]:
     if training is None or training.kept is None:
         raise SettingError(
             "demonstrations: got none, and the policy has not kept its own (a learner such as Robust keeps them, a "
-            "stored policy does not). Pass demonstrations=."
+            "stored policy does not). Pass demonstrations=, what it learnt from, as uc.prepare makes them."
         )
     kept, scale = training.samples, policy.scale_
     states, actions = kept.states, training.action_unit * kept.actions
