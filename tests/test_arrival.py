@@ -6,9 +6,10 @@ from numpy.testing import assert_allclose
 
 import unconstrain as uc
 from recorded import DATA, needs_data
-from unconstrain.paper import pages
+from unconstrain.paper import commands, pages
 from unconstrain.paper.experiments import arrival
 from unconstrain.paper.experiments.arrival import cycles, paths, stable, strokes
+from unconstrain.paper.experiments.trials import Result
 
 
 @pytest.fixture(scope="module")
@@ -77,6 +78,20 @@ def test_a_recorded_bout_keeps_radius_and_pace(monkeypatch):
     assert abs(row["radius_off"]) < 0.1
     assert abs(row["pace_off"]) < 0.05
     assert row["drift_mm"] < 5.0
+
+
+CYCLE = "turns radius_shown pace_shown radius_off pace_off drift_mm correction energy nupe_ratio"
+
+
+def test_of_cycles_alone_the_terminal_has_their_rows_and_a_page_is_written(tmp_path):
+    found = [
+        {"cycle": name, **dict.fromkeys(CYCLE.split(), 0.1)} for name in ("flat", *map(str, range(cycles.BOUTS + 1)))
+    ]
+    tables = {"planes": [], "ways": [], "prices": [], "cycles": found}
+    result = Result("arrival", arrival.Settings(only=("cycles",)), [], {"drawn": {}}, tables)
+    head, rows = commands.summary(result)
+    assert (head[0], rows[0][0], len(rows)) == ("cycle", "flat", cycles.BOUTS + 2)
+    assert pages.write(result, tmp_path)[1].is_file()
 
 
 def test_movements_are_those_of_a_rollout():
