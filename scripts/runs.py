@@ -288,11 +288,15 @@ def faults(found: list[str]) -> Figures:
 
 
 def fuzz(found: list[str]) -> Figures:
-    """Attacks: how often each was tried."""
-    tried: Figures = {}
-    for name, number in re.findall(r"^(\w[\w ]*?) {2,}(\d+) +\d+ +\d+ +\d+ +\d+$", found[0], re.MULTILINE):
+    """Attacks: how often each was tried, for how long in all, and faults, hangs and crashes."""
+    row = re.compile(r"^(\w[\w ]*?) {2,}(\d+) +\d+ +(\d+) +\d+ +\d+ +(\d+) s$", re.MULTILINE)
+    tried: Figures = {"faults": 0, "minutes": 0.0}
+    for name, *numbers in row.findall(found[0]):
+        number, wrong, seconds = map(int, numbers)
         attack = f"{'file' if name.startswith('file ') else name}: tried"
-        tried[attack] = tried.get(attack, 0) + int(number)
+        tried[attack] = tried.get(attack, 0) + number
+        tried["faults"] += wrong  # hangs and crashes among them
+        tried["minutes"] += seconds / 60
     return tried
 
 

@@ -6,8 +6,9 @@ from datetime import date
 
 import pytest
 
+from fuzz.__main__ import HEAD
 from measured import BOUND, PAGES, RESULTS, bound, figures_of, like, quoted
-from runs import RUNS, take
+from runs import RUNS, fuzz, take
 
 FIGURES = [figure for page in PAGES for figure in bound(page)]
 
@@ -140,3 +141,10 @@ def test_every_result_has_a_command_and_a_day():
         said = json.loads(path.read_text("utf-8"))
         assert said["command"] == (RUNS[path.stem].command if path.stem in RUNS else said["command"])
         assert date.fromisoformat(said["date"])
+
+
+def test_attacks_are_counted_from_their_table():
+    head = ("attack", "tried", "wanted", "faults", "hangs", "crashes", "time")
+    files = [("file npz", 200, 200, 1, 0, 1, "90 s"), ("file csv", 100, 200, 0, 0, 0, "30 s")]
+    table = "\n".join(HEAD.format(*row) for row in (head, *files, ("kills", 10, 10, 0, 0, 0, "60 s")))
+    assert fuzz([table]) == {"file: tried": 300, "kills: tried": 10, "faults": 1, "minutes": 3.0}
