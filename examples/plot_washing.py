@@ -94,15 +94,14 @@ plt.show()
 # Wipe it
 # -------
 #
-# Put the learnt policies under the constraint of the unseen plate and follow them for six seconds, in small steps: on a
-# circle every large Euler step leads outwards. A policy that drifts off or falls into the middle would not wipe. Seen
-# from above the plate:
+# Put the learnt policies under the constraint of the unseen plate and follow them for six seconds. A policy that drifts
+# off or falls into the middle would not wipe. Seen from above the plate:
 
 figure, panel = plt.subplots(figsize=(6, 6), layout="constrained")
 in_plate = plate.rotation[:, :2]
 panel.plot(*(broken(demo.states) @ in_plate).T, color=COLOURS["observed"], linewidth=1, label="demonstration")
 for method, policy in policies.items():
-    movement = uc.rollout(policy, demo.states[0], steps=1200, dt=0.005, constraint=plate.constraint)
+    movement = uc.rollout(policy, demo.states[0], steps=300, dt=0.02, constraint=plate.constraint)
     panel.plot(*(movement.states @ in_plate).T, color=COLOURS[method], label=LABELS[method])
 panel.set(aspect="equal", xlim=(-0.3, 0.3), ylim=(-0.3, 0.3), xlabel="along the plate (m)", ylabel="across it (m)")
 panel.legend(frameon=False, loc="upper right")

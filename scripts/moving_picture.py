@@ -147,7 +147,7 @@ def picture() -> str:
     for number, (title, kind, policy) in enumerate(
         [("Ordinary regression", "wrong", direct), ("unconstrain", "right", direct.with_learner(uc.Robust()))], start=1
     ):
-        movements = uc.rollout(policy, starts, 400, settings.dt, None, least_support=0.0)
+        movements = uc.rollout(policy, starts, 400, settings.dt, None, method="euler", least_support=0.0)
         ways = [part for one in movements for part in drawn.way(one.states, kind)]
         missed = said(f"misses {100 * uc.nupe(policy, test):.2g} % of the policy", kind)
         wanted = f'<path class="wanted" d="{line(ring)}"/>'

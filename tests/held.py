@@ -24,7 +24,7 @@ def near_corners(rng, count):
 
 def demonstrate(constraint, rng, policy=attracted, starts=near_corners, count=50, steps=20, dt=0.1, noise=0.0):
     """Roll-outs, with noise on the actions as a share of the policy's spread; returns them and its size."""
-    demos = uc.rollout(policy, starts(rng, count), steps, dt, constraint)
+    demos = uc.rollout(policy, starts(rng, count), steps, dt, constraint, method="euler")
     wanted = np.concatenate([demo.truth.policy for demo in demos])
     size = noise * np.sqrt(wanted.var(axis=0).mean())
     shaken = [

@@ -41,7 +41,7 @@ def test_a_free_movement_is_that_of_the_equation():
 
 
 def test_euler_s_steps_are_the_plain_loop():
-    run = uc.rollout(damped, [1.0, -0.5, 0.8, -0.6], 20, 0.05, PLANE, order=2)
+    run = uc.rollout(damped, [1.0, -0.5, 0.8, -0.6], 20, 0.05, PLANE, method="euler", order=2)
     q, v = np.array([1.0, -0.5]), np.array([0.8, -0.6])
     N = np.eye(2) - np.outer(PLANE.normal, PLANE.normal)
     for state, action, wanted in zip(run.states, run.actions, run.truth.policy, strict=True):
@@ -79,7 +79,8 @@ def test_a_bead_on_a_rod_that_turns_is_thrown_outwards():
 
 def test_what_a_constraint_does_not_allow_is_lost_as_in_an_impact():
     switching = uc.constraints.SwitchingLine([[0.0, 1.0], [1.0, 0.0]], [0.5])
-    run = uc.rollout(lambda x: np.tile([1.0, 2.0], (len(x), 1)), [0.0, 0.0, 3.0, 4.0], 11, 0.1, switching, order=2)
+    how = {"constraint": switching, "method": "euler", "order": 2}
+    run = uc.rollout(lambda x: np.tile([1.0, 2.0], (len(x), 1)), [0.0, 0.0, 3.0, 4.0], 11, 0.1, **how)
     assert_allclose(run.states[0, 2:], [3.0, 0.0])  # a start across the constraint
     assert_allclose(run.states[:6, 1], 0.0, atol=1e-12)
     assert_allclose(run.states[5, 2:], 0.0, atol=1e-12)  # along the old one

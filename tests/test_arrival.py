@@ -102,7 +102,7 @@ def test_movements_are_those_of_a_rollout():
     projections = uc.null_space_projection(np.stack([plane.normal for plane in planes])[:, None])
     flow, starts = strokes.flow(policy, guided.aim_, projections), [[2.0, 1.0], [-1.0, 0.5]]
     found = strokes.followed(flow, starts, shown, settings, 0.05)
-    for path, run in zip(found, uc.rollout(guided, starts, len(found[0]), 0.05, planes), strict=True):
+    for path, run in zip(found, uc.rollout(guided, starts, len(found[0]), 0.05, planes, method="euler"), strict=True):
         assert_allclose(path, run.states, atol=1e-12)
 
 

@@ -24,7 +24,7 @@ def two_goals(states):
     return np.column_stack([np.where(states[:, 0] > 0, 1.0, -1.0), np.zeros((len(states), 2))]) - states
 
 
-SHOWN = uc.rollout(lambda states: -(states - GOAL), AROUND[:5], 100, 0.05)
+SHOWN = uc.rollout(lambda states: -(states - GOAL), AROUND[:5], 100, 0.05, method="euler")
 POLICY = uc.LocallyLinearPolicy(learner="direct").fit_demonstrations(SHOWN)
 
 

@@ -58,7 +58,7 @@ def folder(tmp_path_factory):
 def test_it_says_what_was_held_and_how_its_form_was_chosen(folder):
     lines = below((folder / "said.txt").read_text()).splitlines()
     assert lines[0] == "Learnt from x, y, z as states and vx, vy, vz as actions."
-    assert lines[1] == "1 of 3 directions held, by constant features."
+    assert lines[1] == "Learnt: 1 of 3 directions held, by constant features."
     assert lines[2].startswith("Noise and misfit along them are about ")
     assert [line.split()[0] for line in lines[3:8]] == ["features", "constant", "affine", "quadratic", "rbf"]
     assert lines[8:] == [f"constraint: {folder / 'plate.npz'}", f"report: {folder / 'plate.html'}"]

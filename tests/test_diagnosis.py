@@ -14,6 +14,7 @@ from seen import on_a_phone, opened, width_of
 from test_cli import call, refused, run, write
 from test_report import References
 from unconstrain.base.errors import InvalidDataError, SettingError
+from unconstrain.evaluation import verdicts
 from unconstrain.evaluation.diagnosis import Diagnosis, diagnose, sentences
 from unconstrain.pages import diagnosis, fit
 
@@ -145,6 +146,16 @@ class TestWhatIsFound:
         found = replace(diagnose(*fitted), **change)
         assert said in " ".join(sentences(found, ["x", "y"], ["vx", "vy"]))
 
+    def test_what_is_determined_everywhere_is_not_said_to_be_open_anywhere(self, fitted):
+        found = diagnose(*fitted)
+        sure = replace(found, regions=tuple(replace(one, determined=1.0) for one in found.regions))
+        said = " ".join(sentences(sure, ["x", "y"], ["vx", "vy"]))
+        assert "Every recorded state is determined. If you record more: " in said
+        assert "Not determined" not in said
+        assert "Not determined" in " ".join(
+            sentences(replace(found, regions=(replace(found.regions[0], determined=0.5),)), ["x", "y"], ["vx", "vy"])
+        )
+
     def test_a_learner_without_candidates_has_nothing_compared(self):
         demos = movements()
         policy = uc.ParametricPolicy(learner=uc.NoiseCorrected()).fit_demonstrations(demos)
@@ -244,3 +255,63 @@ class TestPage:
         demos = [replace(one, actions=one.actions[:, :1]) for one in movements()]
         policy = uc.ParametricPolicy(learner=uc.Robust()).fit_demonstrations(demos)
         assert "Nothing can be said about that: got one action column" in fit.policy_page(policy, demos, "A policy")
+
+
+# What is shared by fit and diagnose: five strokes of a cycle that attracts, where the truth is known
+
+
+def cycling(states):
+    """Round the unit circle, and down to its plane."""
+    flat = states[:, :2]
+    room = 1.0 - (flat**2).sum(axis=1, keepdims=True)
+    return np.column_stack([room * flat + flat[:, ::-1] * [-1.0, 1.0], -states[:, 2]])
+
+
+def five_strokes(kind, seed):
+    """Each on a plane of its own; all on planes parallel to one; or each far from the others."""
+    rng, demos = np.random.default_rng(seed), []
+    normals = rng.standard_normal((5, 3)) + np.array([0.0, 0.0, 2.0 * (kind == "own planes")])
+    for k, normal in enumerate(normals if kind != "one plane" else [[0.0, 0.3, 1.0]] * 5):
+        plane, away = uc.constraints.Plane(normal), np.array([20.0 * k * (kind == "far apart"), 0.0, 0.0])
+        start = np.array([np.cos(k), np.sin(k), 0.0]) + 0.1 * rng.standard_normal(3) + away
+        if kind == "one plane":
+            start -= plane.normal * (plane.normal @ start)
+        run = uc.rollout(lambda states, away=away: cycling(states - away), start, 150, 0.04, plane, name=f"s{k}")
+        demos.append(replace(run, actions=run.actions + 0.01 * rng.standard_normal(run.actions.shape)))
+    return demos
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("kind", ["own planes", "one plane", "far apart"])
+def test_what_fit_and_diagnose_call_told_is_told(kind, seed):
+    demos = five_strokes(kind, seed)
+    policy = uc.LocallyLinearPolicy().fit_demonstrations(demos)
+    found, told = diagnose(policy, demos), uc.evaluation.diagnosis.states_told(policy)
+    assert found.told_together == pytest.approx(told)
+    states, wanted = uc.stack(demos).states, np.vstack([one.truth.policy for one in demos])
+    missed = np.sqrt(((policy(states) - wanted) ** 2).sum() / (wanted**2).sum())
+    fit, whole = verdicts.of_explained(policy.held_out_score(), 5, told), verdicts.of_diagnosis(found)
+    if kind == "own planes":
+        assert missed < 0.3
+        assert told > 0.5
+        assert fit.mark is not verdicts.Mark.BAD
+        assert "across" not in fit.said
+        assert whole.mark is not verdicts.Mark.BAD
+        assert "whichever two are left out: it may hang on one or two" in whole.said
+    else:
+        assert told < 0.05 < 0.2 < missed
+        assert whole.mark is verdicts.Mark.BAD
+        assert fit.mark is not verdicts.Mark.GOOD
+        assert "at 100% of the recorded states no recording tells" in fit.doubt
+
+
+@pytest.mark.parametrize(("count", "told"), [(2, False), (3, True)])
+def test_two_demonstrations_tell_nothing_together(count, told):
+    rng, demos = np.random.default_rng(0), []
+    for _ in range(count):
+        states, ways = rng.uniform(-1, 1, (200, 2)), rng.standard_normal((200, 2))
+        ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+        wanted = states @ TURN.T + [0.2, -0.1]
+        demos.append(uc.Demonstration(states, ways * np.vecdot(ways, wanted)[:, None]))
+    found = uc.ParametricPolicy(uc.Affine(), uc.Robust()).fit_demonstrations(demos)
+    assert (found.solution_.believed.told_together > 0.9) == told

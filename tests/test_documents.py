@@ -154,6 +154,6 @@ def test_all_that_is_left_out_is_there():
 
 def test_the_glossary_has_the_names_of_candidates():
     words = (ROOT / "docs" / "glossary.rst").read_text("utf-8")
-    assert [name for name in uc.evaluation.diagnosis.WAYS if f"\n   {name}\n" not in words] == [
+    assert [name for name in uc.evaluation.diagnosis._WAYS if f"\n   {name}\n" not in words] == [
         "direct"
     ]  # as direct learning

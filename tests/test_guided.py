@@ -28,7 +28,7 @@ def drifting(states):
     return spiral(states) * (1 - 0.5 * away**2) + 0.05
 
 
-SHOWN = uc.rollout(spiral, STARTS[:6] / 3, 120, 0.05)
+SHOWN = uc.rollout(spiral, STARTS[:6] / 3, 120, 0.05, method="euler")
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def least_on_plane(potential, start, normal):
 
 def test_every_movement_arrives(guided):
     assert (drifting(STARTS) * (STARTS - GOAL)).sum(axis=1).max() > 1.0
-    for run in uc.rollout(guided, STARTS, 4000, guided.dt_):
+    for run in uc.rollout(guided, STARTS, 4000, guided.dt_, method="euler"):
         assert_allclose(run.states[-1], GOAL, atol=1e-3)
 
 
@@ -58,7 +58,8 @@ def test_the_potential_falls_at_every_step_and_movements_end_where_it_is_least_o
     normals = np.random.default_rng(4).standard_normal((40, 3))
     planes = [Plane(normal) for normal in normals]
     steps = 2000 if factor == 1.0 else 300
-    for run, normal in zip(uc.rollout(guided, STARTS, steps, factor * guided.dt_, planes), normals, strict=True):
+    runs = uc.rollout(guided, STARTS, steps, factor * guided.dt_, planes, method="euler")
+    for run, normal in zip(runs, normals, strict=True):
         level = guided.potential_(run.states)
         moving = level[:-1] > level[-1] * (1 + 1e-9)
         assert moving[0]

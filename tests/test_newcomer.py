@@ -554,14 +554,11 @@ def test_names_of_candidates_are_explained_where_they_stand(folder, policy, tmp_
     said = run("fit", folder, "-v", "-o", tmp_path / "p.npz")
     assert "('fit -v' says what these are)" in said
     rows = re.findall(r"^(direct|segments|softened hybrid, 1) +\S+ +(\S.*?) *$", said, re.MULTILINE)
-    ways = uc.evaluation.diagnosis.WAYS
-    assert dict(rows) == {
-        "direct": ways["direct"],
-        "segments": ways["segments"],
-        "softened hybrid, 1": ways["softened hybrid"],
-    }
-    known = uc.load(policy).solution_.method.partition(",")[0]
-    assert re.search(rf"^learnt as, in words +{re.escape(ways[known])} *$", run("info", policy), re.MULTILINE)
+    words = uc.evaluation.diagnosis.in_words
+    assert dict(rows) == {name: words(name) for name in ("direct", "segments", "softened hybrid, 1")}
+    assert words("softened hybrid, 1") == words("softened hybrid") != ""
+    known = uc.load(policy).solution_.method
+    assert re.search(rf"^learnt as, in words +{re.escape(words(known))} *$", run("info", policy), re.MULTILINE)
 
 
 def test_regions_of_a_diagnosis_are_one_number_each(folder):

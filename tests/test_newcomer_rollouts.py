@@ -8,7 +8,7 @@ import pytest
 
 import unconstrain as uc
 from seen import opened
-from test_cli import refused, run, write
+from test_cli import call, refused, run, write
 from unconstrain.evaluation.verdicts import Mark, Verdict, of_replays
 from unconstrain.pages.fit import policy_page
 from unconstrain.pages.replays import replayed
@@ -189,9 +189,12 @@ def door(tmp_path_factory):
 
 def test_a_hinge_holds_two_directions_wherever_it_is_spoken_of(door):
     place, said = door
-    assert said.startswith("✔ 1 of 3 directions were held")
+    assert said.startswith("✔ 2 of 3 directions were held, by a circle (hinge). It turns on the way, so velocities")
     for told in (said, " ".join(run("info", place / "c.npz").split()), (place / "c.html").read_text("utf-8")):
-        assert "what velocities show. Positions keep to a circle (hinge), which holds 2 of 3;" in told
+        assert (
+            "2 of 3 directions were held, by a circle (hinge). It turns on the way, so velocities alone show 1;" in told
+        )
+        assert "1 of 3 directions were held" not in told
         assert "Mechanism: a circle (hinge) about" in told or "mechanism a circle (hinge) about" in told
 
 
@@ -212,8 +215,21 @@ def test_one_swing_may_be_a_habit_and_then_the_directions_learnt_are_followed(do
     place, _ = door
     said = run("constraint", place / "0.csv", "--state", "x,y,z", "--differentiate", "-o", tmp_path / "c.npz")
     assert "Positions may keep to a circle (hinge), which holds 2 of 3" in " ".join(said.split())
+    assert "Next: Learn it from several demonstrations, from other starts" in said
+    assert "Learn it from several" not in door[1]
     assert "rollout --constraint follows the directions that were learnt" in said
     assert "held by" not in uc.storage.load_notes(tmp_path / "c.npz")
+
+
+@pytest.mark.parametrize(("by", "said"), [(0.3, False), (30.0, True)])
+def test_a_constraint_of_another_place_is_remarked_on(door, tmp_path, by, said):
+    place, _ = door
+    rows = np.add(swing(0), [0, 0, by, 0])
+    moved, held = write(tmp_path / "moved.csv", DOOR, rows), ("--constraint", place / "c.npz")
+    start = ("--start", ",".join(map(str, rows[0, 1:])), "--least-support", 0, "-o", tmp_path / "path.csv")
+    told = [call("score", place / "p.npz", moved, *held).err, call("rollout", place / "p.npz", *start, *held).err]
+    told.append(run("look", moved, place / "c.npz", "-o", tmp_path / "look.html"))
+    assert ["is it of another task?" in one for one in told] == [said] * 3
 
 
 def test_the_file_of_one_demonstration_says_so_and_is_drawn_on_it_alone(tmp_path):

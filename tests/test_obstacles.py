@@ -87,7 +87,7 @@ def test_a_step_asks_each_obstacle_once():
         asked.append(len(states))
         return UNIT(states)
 
-    uc.rollout(np.negative, [[3.0, 1.0], [2.0, -2.0]], 20, 0.05, obstacles=[rock])
+    uc.rollout(np.negative, [[3.0, 1.0], [2.0, -2.0]], 20, 0.05, obstacles=[rock], method="euler")
     assert asked == [2] * 20
 
 

@@ -15,8 +15,8 @@ def decay(states):
     return -states
 
 
-def test_a_free_movement_is_euler_s():
-    demo = uc.rollout(decay, [1.0, -2.0], steps=50, dt=0.1)
+def test_a_free_movement_by_euler_s_steps():
+    demo = uc.rollout(decay, [1.0, -2.0], steps=50, dt=0.1, method="euler")
     assert_allclose(demo.states, np.array([1.0, -2.0]) * 0.9 ** np.arange(50)[:, None])
     assert_array_equal(demo.actions, -demo.states)
     assert_allclose(demo.times, 0.1 * np.arange(50))
@@ -25,9 +25,18 @@ def test_a_free_movement_is_euler_s():
     assert demo.name == "rollout"
 
 
+def test_circles_keep_their_size_by_default():
+    def circling(states):
+        return states[:, ::-1] * [-1.0, 1.0]
+
+    own, euler_s = (uc.rollout(circling, [1.0, 0.0], 200, 0.1, **how) for how in ({}, {"method": "euler"}))
+    assert_allclose(np.linalg.norm(own.states[-1]), 1.0, atol=1e-3)
+    assert np.linalg.norm(euler_s.states[-1]) > 2.0
+
+
 def test_a_constrained_movement_is_the_plain_loop():
     policy, line = LimitCycle(), SwitchingLine([[1.0, 0.3], [-0.2, 1.0]], [0.2])
-    demo = uc.rollout(policy, [0.5, 0.1], steps=30, dt=0.02, constraint=line)
+    demo = uc.rollout(policy, [0.5, 0.1], steps=30, dt=0.02, constraint=line, method="euler")
     x = np.array([0.5, 0.1])
     for k in range(30):
         A = np.array([[1.0, 0.3]]) if k < 10 else np.array([[-0.2, 1.0]])
@@ -105,7 +114,7 @@ def test_the_start_is_not_touched():
         ),
         ({"constraint": lambda x, t: np.full((1, 1, 2), np.nan)}, InvalidDataError, "constraint matrix: found NaN"),
         ({"policy": lambda x: np.full(x.shape, np.nan)}, InvalidDataError, "left the finite numbers at step 0"),
-        ({"policy": lambda x: 1e10 * x}, InvalidDataError, "left the finite numbers at step 2: start nearer"),
+        ({"policy": lambda x: 1e10 * x}, InvalidDataError, "left the finite numbers at step 1: start nearer"),
         ({"policy": lambda x: np.full(x.shape, 1e308)}, InvalidDataError, "left the finite numbers at step 0"),
     ],
 )

@@ -380,7 +380,7 @@ def test_features_of_an_angle_see_its_cosine_and_sine(features, count):
 
 def test_a_rollout_stays_in_the_space():
     policy = uc.ParametricPolicy(learner="direct", space=SPACES["product"])
-    path = uc.rollout(policy.fit(*_anything()), drawn(SPACES["product"], 3), 200, 0.1)
+    path = uc.rollout(policy.fit(*_anything()), drawn(SPACES["product"], 3), 200, 0.1, method="euler")
     for run in path:
         assert run.space == SPACES["product"]
         assert run.actions.shape == (200, 7)

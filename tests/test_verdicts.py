@@ -57,7 +57,7 @@ class TestMarks:
 
     def test_how_many_directions_were_held_is_a_bound_where_demonstrations_disagree(self):
         def held(rank):
-            choice = SimpleNamespace(held_out=0.01, actions=4, doubts=(), lacking=())
+            choice = SimpleNamespace(held_out=0.01, actions=4, doubts=(), lacking=(), several=True)
             return SimpleNamespace(rank_=rank, choice_=choice)
 
         sure, unsure = verdicts.of_constraint(held(1), held(1)), verdicts.of_constraint(held(3), held(1), held(2))
@@ -150,7 +150,8 @@ class TestInfo:
 
 def test_a_fit_tells_programs_what_it_tells_people(folder):
     told = json.loads((folder / "fit.json").read_text())
-    assert told["verdict"]["mark"] == "good"
+    assert told["verdict"]["mark"] == "doubtful"  # one circle three times: nothing was seen across it
+    assert told["verdict"]["said"] == "Explains 100% of held-out motion: good along it, not enough across it."
     assert told["held_out"] == pytest.approx(1.0, abs=1e-6)
     assert (told["demonstrations"], told["samples"]) == (3, 120)
     assert told["policy"].endswith("p.npz")

@@ -267,7 +267,7 @@ def score(
     with shown("reading"):
         demonstrations, recipe, recordings = prepared(files, reading, notes)
     refuse_warnings(reading["strict"])
-    held = held_of(plane, constraint, recipe, learnt.n_features_in_, learnt.n_outputs_, "one for each action")
+    held = held_of(plane, constraint, recipe, uc.stack(demonstrations).states, learnt.n_outputs_, "one for each action")
 
     def scores(of: uc.Demonstration | Sequence[uc.Demonstration], name: str, samples: int) -> dict[str, Any]:
         found = {"demonstration": name, "samples": samples, "ninc": uc.ninconsistency(learnt, of)}
@@ -310,8 +310,7 @@ def score(
 @click.option(
     "--method",
     type=click.Choice(["euler", "rk4", "adaptive"]),
-    default="rk4",
-    help="How a step is taken: Runge-Kutta, or by euler as the loop of a controller does.",
+    help="How a step is taken: Runge-Kutta by default, or by euler as the loop of a controller does.",
 )
 @click.option(
     "--order",
@@ -353,7 +352,7 @@ def rollout(
     _check_start(learnt, start, how["least_support"])
     places = learnt.n_outputs_ if how["order"] == 2 else len(start)  # what a constraint is a function of
     at = replace(recipe, states=recipe.states and recipe.states[:places])
-    held = held_of(plane, constraint, at, places, learnt.n_outputs_, "one for each action")
+    held = held_of(plane, constraint, at, [start[:places]], learnt.n_outputs_, "one for each action")
     task = held.target if isinstance(held, uc.LearntConstraint) and held.task else None
     round_ = [_obstacle(given, len(start)) for given in obstacles]
     path, why, trouble = _as_far_as_it_goes(learnt, list(start), constraint=held, task=task, obstacles=round_, **how)
@@ -478,7 +477,7 @@ def _as_far_as_it_goes(policy: uc.Policy, start: list[float], **how: Any) -> tup
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         try:
-            path = uc.rollout(policy, start, **how)
+            path = uc.rollout(policy, start, **{name: given for name, given in how.items() if given is not None})
         except DivergedError as error:
             if error.part is None:
                 raise

@@ -15,7 +15,7 @@ import unconstrain as uc
 from ..base.display import bare, listed
 from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
-from .informing import HELD_BY, OF, provenance
+from .informing import HELD_BY, OF, WHERE, provenance
 from .printing import of_option, option_for_json, print_table, refuse_warnings, say_verdict, say_written
 from .progress import shown
 from .reading import loaded, numbers, options_for_reading, prepared, said_recipe
@@ -96,7 +96,7 @@ def constraint(
         _say(learnt, "distance from it" if surface else "action", named)
     notes = provenance(paths, recipe, first, **reading)
     for name, place in outputs.items():
-        uc.save(learnt[name], place, notes | _of(name, named))
+        uc.save(learnt[name], place, notes | _of(name, named, demonstrations))
     written = {f"constraint of {name}" if name else "constraint": place for name, place in outputs.items()}
     if report is not None:
         _report(report, learnt, demonstrations, recipe.labels(first.units)[0], named, verdict)
@@ -104,17 +104,18 @@ def constraint(
     say_written(written, _told(learnt, verdict, named) if as_json else None)
 
 
-def _of(name: str, named: Named | None) -> dict[str, Any]:
-    """What a file notes of the demonstration that it is of, and of the mechanism."""
-    return ({OF: [name]} if name else {}) | ({} if named is None else named.notes(name))
+def _of(name: str, named: Named | None, demonstrations: Sequence[uc.Demonstration]) -> dict[str, Any]:
+    """What a file notes of the demonstration that it is of, of where that was, and of the mechanism."""
+    states = uc.stack([one for one in demonstrations if name in ("", one.name)]).states
+    where = {WHERE: [states.min(axis=0).tolist(), states.max(axis=0).tolist()]}
+    return where | ({OF: [name]} if name else {}) | ({} if named is None else named.notes(name))
 
 
 def _judged(learnt: Mapping[str, uc.LearntConstraint], named: Named | None) -> uc.evaluation.verdicts.Verdict:
     """What was learnt, and what it is by name where that holds more."""
     found, rank = uc.evaluation.verdicts.of_constraint(*learnt.values()), max(one.rank_ for one in learnt.values())
-    if named is None:
-        return found
-    return uc.evaluation.verdicts.of_mechanism(found, rank, named.found.mechanism, named.sure)
+    judged = uc.evaluation.verdicts.of_mechanism
+    return found if named is None else judged(found, rank, named.found.mechanism, named.sure)
 
 
 def _report(
@@ -128,11 +129,8 @@ def _report(
     from ..pages.constraint import constraint_page
 
     said = () if named is None else named.sentences
-    every = list(learnt.values())
-    write(
-        place,
-        constraint_page(every, demonstrations, Path(place).stem, columns, said, table_of(learnt, named, True), verdict),
-    )
+    every, table = list(learnt.values()), table_of(learnt, named, True)
+    write(place, constraint_page(every, demonstrations, Path(place).stem, columns, said, table, verdict))
 
 
 def _learnt(
@@ -203,9 +201,9 @@ def options_for_held(what: str) -> Callable[[Callable[..., Any]], Callable[..., 
 
 
 def held_of(
-    plane: tuple[float, ...] | None, path: str | None, recipe: uc.Recipe, states: int, actions: int, meaning: str
+    plane: tuple[float, ...] | None, path: str | None, recipe: uc.Recipe, at: Any, actions: int, meaning: str
 ) -> uc.constraints.Constraint | None:
-    """The constraint of the options: a plane, or a learnt one from a file, of the states that a recipe prepares."""
+    """The constraint of the options, a plane or a learnt one, to be used at states (N, n) that a recipe prepares."""
     if plane is not None and path is not None:
         raise SettingError("--plane: got --constraint too, expected one of them.")
     if plane is not None:
@@ -220,13 +218,25 @@ def held_of(
     known_arms()
     learnt = loaded(path, uc.LearntConstraint)
     found = learnt.choice_.columns, learnt.choice_.actions
-    if found != (states, actions):
+    if found != (states := len(at[0]), actions):
         raise SettingError(f"{path}: holds {found[1]} actions at {found[0]} states, expected {actions} at {states}.")
     notes = uc.storage.load_notes(path)
     own = uc.Recipe.from_dict(notes.get("recipe", {}))
     if own.states and recipe.states and (own.states, own.centre) != (recipe.states, recipe.centre):
         raise SettingError(f"{path}: is of {_said_states(own)}, expected {_said_states(recipe)}, as the policy.")
+    if said := said_elsewhere(notes, at):
+        click.echo(f"Note: {path}: {said}", err=True)
     return learnt if learnt.task or HELD_BY not in notes else uc.constraints.mechanisms.restored(notes[HELD_BY])
+
+
+def said_elsewhere(notes: Mapping[str, Any], states: Any) -> str:
+    """Of a constraint, that most states are farther from where it was learnt than that is wide; or nothing."""
+    import numpy as np
+
+    low, high = np.array(notes.get(WHERE, (-np.inf, np.inf)))
+    off = np.median(np.maximum(low - states, states - high).max(axis=1))
+    far = off > np.linalg.norm(high - low)
+    return f"it was learnt at states that are {off:.3g} away from these: is it of another task?" * bool(far)
 
 
 def _said_states(recipe: uc.Recipe) -> str:
@@ -331,7 +341,7 @@ def _say(learnt: Mapping[str, uc.LearntConstraint], what: str, named: Named | No
 def _say_one(learnt: uc.LearntConstraint, what: str) -> None:
     choice = learnt.choice_
     smooth = f", smoothed with {choice.smoothness:g}" if choice.smoothness else ""
-    click.echo(f"{learnt.rank_} of {choice.actions} directions held, by {choice.name} features{smooth}.")
+    click.echo(f"Learnt: {learnt.rank_} of {choice.actions} directions held, by {choice.name} features{smooth}.")
     click.echo(
         f"Noise and misfit along them are about {learnt.noise_:.3g} of {what}, and where held out "
         f"{choice.held_out:.3g} of its mean square."

@@ -23,8 +23,8 @@ TOLD = "determined share of states"
 RAN = "from the same starts"
 """Note of size and pace of the policy's own movements over those of the demonstrations."""
 
-OF, HELD_BY = "of", "held by"
-"""Notes of a constraint: the demonstrations that it is of, where not of all; the numbers of the mechanism named."""
+OF, HELD_BY, WHERE = "of", "held by", "least and largest states"
+"""Notes of a constraint: demonstrations that it is of, if not of all; numbers of the mechanism; where it was learnt."""
 
 ENDS = 2**16
 """Bytes at either end of a file by which it is known again."""
@@ -74,7 +74,7 @@ def info(file: str, as_json: bool) -> None:
     A policy, guided or not, or a constraint.
     """
     held, notes = loaded(file, uc.Policy | uc.LearntConstraint | uc.Guided), uc.storage.load_notes(file)
-    rest = {name: value for name, value in notes.items() if name not in ("recipe", "units", "digests", HELD_BY)}
+    rest = {name: value for name, value in notes.items() if name not in ("recipe", "units", "digests", HELD_BY, WHERE)}
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held), **rest}
     if as_json:
         click.echo(json.dumps(told | {"verdict": verdict_of(held, notes).to_json()}, indent=2))
@@ -111,7 +111,7 @@ def _of(held: Any) -> dict[str, Any]:
         "learnt from": sorted(str(name).partition("/")[2] or str(name) for name in policy.training_.split.fold_of),
         "learner": type(policy.learner).__name__ if not isinstance(policy.learner, str) else policy.learner,
         "learnt as": solution.method,
-        "learnt as, in words": uc.evaluation.diagnosis.WAYS.get(solution.method.partition(", ")[0]),
+        "learnt as, in words": uc.evaluation.diagnosis.in_words(solution.method) or None,
         "model": f"{len(solution.weights)} local models" if len(solution.weights) > 1 else str(policy.features_),
         "explained held out": None if (share := policy.held_out_score()) != share else round(share, 4),
         "noise": None if solution.belief is None else solution.noise,

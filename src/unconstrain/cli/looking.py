@@ -16,7 +16,7 @@ import unconstrain as uc
 from ..base.display import counted, listed
 from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainError
 from ..base.files import write
-from .constraining import arm_of, known_arms
+from .constraining import arm_of, known_arms, said_elsewhere
 from .informing import OF, learnt_from
 from .printing import refuse_warnings, say_verdict
 from .reading import options_for_reading, prepared, reading_of, typed
@@ -168,12 +168,14 @@ def _about(seen: Seen) -> Iterator[str]:
     if seen.constraint is not None and len(seen.held) < count:
         of = listed(seen.notes[OF], 4)
         yield f"constraint: of {of}, and drawn there alone; others may have been held in other ways."
+    if said := said_elsewhere(seen.notes, uc.stack(seen.demonstrations).states):
+        yield f"constraint: {said}"
 
 
 def _open(policy: uc.Policy, demos: Sequence[uc.Demonstration]) -> str:
     """Of the policy that is drawn, at how many of the recorded states no recording tells it."""
     try:
-        share = uc.evaluation.diagnose(policy, demos).states_determined
+        share = uc.evaluation.diagnose(policy, demos).told_together
     except UnconstrainError:
         return "policy: where recordings tell it is not known for this learner."
     return f"policy: {uc.evaluation.verdicts.of_untold(1 - share)} ('unconstrain diagnose' says where)."

@@ -227,9 +227,7 @@ def say_fit(policy: uc.Policy, stream: uc.Stream, judged: Judged, learner: str, 
     )
     if verbose and solution.belief is not None:
         rows = sorted((one.risk, name) for name, one in solution.candidates.items())
-        told = [
-            [name, f"{risk:.4g}", uc.evaluation.diagnosis.WAYS.get(name.partition(", ")[0], "")] for risk, name in rows
-        ]
+        told = [[name, f"{risk:.4g}", uc.evaluation.diagnosis.in_words(name)] for risk, name in rows]
         print_table(["candidate", "estimated squared error", "what it is"], told)
     if known:
         _say_doubts(judged, learner)

@@ -146,6 +146,8 @@ class Diagnosis:
     states_determined : float
         Share of the recorded states at which the undetermined spread is below that from noise, or below a tenth of
         the typical action.
+    told_together : float
+        That, or if more the share at which all demonstrations together determine it, and one or two may be needed.
     free_share : float
         Estimated share of samples that nothing constrained.
     undecided_share : float
@@ -172,6 +174,7 @@ class Diagnosis:
     directions: int
     directions_determined: float
     states_determined: float
+    told_together: float
     free_share: float
     undecided_share: float
     regions: tuple[Region, ...]
@@ -246,6 +249,7 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
         directions=models * solution.directions,
         directions_determined=solution.determined_share,
         states_determined=float(known.mean()),
+        told_together=max(float(known.mean()), 0.0 if free is None else belief.told_together),
         free_share=solution.free_share,
         undecided_share=belief.undecided_share,
         regions=_regions(policy, demos, undetermined, known, typical),
@@ -287,13 +291,14 @@ def untold_at(policy: Policy, states: Array, typical: float, left: Array | None 
 
 
 def states_told(policy: Policy) -> float | None:
-    """Share of the states from which a policy has just learnt at which recordings tell it; None where not known."""
+    """:attr:`Diagnosis.told_together` of a policy that has just learnt; None where not known."""
     kept = policy.training_.kept
     if kept is None or policy.solution_.belief is None or policy.n_outputs_ == 1:
         return None
     states, actions = map(on_host, kept.whole[:2])
     typical = float(np.sqrt((actions**2).sum(axis=1).mean()))
-    return float((untold_at(policy.in_own_units(), states, typical) <= SMALL).mean()) if typical else None
+    told = float((untold_at(policy.in_own_units(), states, typical) <= SMALL).mean()) if typical else None
+    return None if told is None else max(told, policy.solution_.belief.told_together)
 
 
 def _typical(actions: Array, solution: Solution) -> float:
@@ -425,7 +430,7 @@ def _about_noise(found: Diagnosis) -> str:
     )
 
 
-WAYS = {
+_WAYS = {
     "direct": "ordinary regression, as constraints do not show",
     "softened hybrid": "consistent with the actions, and near to them",
     "noise-corrected": "consistent with the actions, with the noise taken out",
@@ -434,7 +439,11 @@ WAYS = {
     "likelihood": "samples look free, or constrained at random",
     "hybrid": "consistent with the actions, and as near to them as that allows",
 }
-"""What is told of each way of learning; the softness of softened hybrids follows after a comma."""
+
+
+def in_words(method: str) -> str:
+    """What is told of a way of learning, by its name with or without a softness after a comma; empty of others."""
+    return _WAYS.get(method.partition(", ")[0], "")
 
 
 def about_choice(method: str, candidates: Mapping[str, float]) -> str:
@@ -448,7 +457,7 @@ def about_choice(method: str, candidates: Mapping[str, float]) -> str:
         Estimated squared error of each, by name.
     """
     way, _, softness = method.partition(", ")
-    said = f"Learnt as {way}{f' (softness {softness})' * bool(softness)}: {WAYS.get(way, 'as asked for')}."
+    said = f"Learnt as {way}{f' (softness {softness})' * bool(softness)}: {in_words(way) or 'as asked for'}."
     if len(candidates) < 2:
         return f"{said} Nothing was compared with it."
     least = {}
@@ -466,13 +475,13 @@ def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[st
         f"demonstrate around {named(worst.state, states)} with motion along {named(worst.direction, actions)} left "
         f"free (standard deviation there: {worst.along:.0%} of a typical action; see '{worst.demonstration}')."
     )
+    if not open_:
+        return [f"Every recorded state is determined. If you record more: {advice}"]
     alone = sum(len(one.shown_by) < ENOUGH for one in found.regions)
     where = (
-        f"Not determined at {1.0 - found.states_determined:.0%} of the states, in {len(open_)} of {len(found.regions)} "
+        f"Not determined at {1 - found.states_determined:.0%} of the states, in {len(open_)} of {len(found.regions)} "
     )
     where += f"regions; in {alone} regions fewer than {ENOUGH} demonstrations moved along what is least known."
-    if not open_:
-        return [f"{where} Every recorded state is determined. If you record more: {advice}"]
     return [f"{where} {_least_shown(worst, states, actions)}", f"What would help most: {advice}"]
 
 

@@ -139,6 +139,8 @@ def of_explained(
         Mark.BAD: "Look at the recordings ('unconstrain inspect'): columns, clocks or units may be wrong.",
     }[mark]
     trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
+    if mark is Mark.GOOD and determined is not None and determined < PARTLY:
+        mark, word = Mark.DOUBTFUL, "good along it, not enough across it"
     return Verdict(mark, f"Explains {share:.0%} of {what}: {word}.", trust, across, f"{advice} {there}".rstrip())
 
 
@@ -185,8 +187,15 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
     mark, word = _graded(share, MOSTLY, PARTLY)
     words = {"good": "enough", "fair": "enough in most places", "poor": "not enough"}
     said = f"At {share:.0%} of the recorded states three demonstrations or more tell the policy: {words[word]}."
+    if mark is Mark.BAD and found.told_together >= PARTLY:
+        mark, said = (
+            Mark.DOUBTFUL,
+            f"Demonstrations tell the policy at {found.told_together:.0%} of the recorded states, ",
+        )
+        said += f"but at {share:.0%} whichever two are left out: it may hang on one or two."
     if found.noise_share > 3 * SMALL:
-        mark, said = Mark.DOUBTFUL, f"{said[:-1]}, though noise is {found.noise_share:.0%} of a typical action."
+        mark = Mark.BAD if mark is Mark.BAD else Mark.DOUBTFUL
+        said = f"{said[:-1]}, though noise is {found.noise_share:.0%} of a typical action."
     trust = "" if mark is Mark.BAD else f"The policy at these states, to about {found.noise_share:.0%} of noise."
     if mark is not Mark.GOOD:
         doubt += " 'fit' and 'score' may still explain much: they judge along recorded motion, this judges across it."
@@ -214,19 +223,24 @@ def of_constraint(learnt: LearntConstraint, *others: LearntConstraint) -> Verdic
         mark = Mark.DOUBTFUL
     if choice.lacking:
         then = "Record what is missing, then learn it again."
+    elif not choice.several:
+        then = "Learn it from several demonstrations, from other starts: what one does not do looks held."
     doubt = "; ".join(text.rstrip(".") for text in choice.doubts)
     still = "A direction in which nobody wanted to move looks held, too."
     return Verdict(mark, said, "What was held, near recorded states.", f"{doubt}. {still}" if doubt else still, then)
 
 
 def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool) -> Verdict:
-    """Add to a verdict on a constraint of some rank that positions keep to a mechanism, where that holds more."""
+    """Say of a constraint of some rank that positions keep to a mechanism, where that holds more; first if sure."""
     if named.rank <= rank:
         return found
-    keep = f"That is what velocities show. Positions {'' if sure else 'may '}keep to {named.title}, which holds "
-    keep += f"{named.rank} of {len(named.centre)}; as it turns on the way, velocities show less of it."
-    then = "Use it with 'unconstrain rollout --constraint', which follows the mechanism." if sure else found.next
-    return found._replace(said=f"{found.said} {keep}", next=then)
+    more = f"{named.rank} of {len(named.centre)}"
+    if not sure:
+        keep = f"Positions may keep to {named.title}, which holds {more}; as it turns, velocities show less of it."
+        return found._replace(said=f"{found.said} {keep}")
+    said = f"{more} directions were held, by {named.title}. It turns on the way, so velocities alone show {rank}"
+    then = "Use it with 'unconstrain rollout --constraint', which follows the mechanism."
+    return found._replace(said=said + found.said.partition(" directions were held")[2], next=then)
 
 
 WITHOUT_SUPPORT = Verdict(
@@ -252,13 +266,8 @@ def of_support(support: Array, times: Array | None, unknown: Array | None = None
     since = seconds[int(far.argmax())]
     mark = Mark.BAD if far.mean() > 0.5 else Mark.DOUBTFUL
     said = f"From {since:.2f} s on the movement is far from all data, {far.mean():.0%} of the time: extrapolated."
-    return Verdict(
-        mark,
-        said,
-        f"The first {since:.2f} s." if far.argmax() else "",
-        "What is far from data.",
-        "Start nearer, or demonstrate there.",
-    )
+    trust = f"The first {since:.2f} s." if far.argmax() else ""
+    return Verdict(mark, said, trust, "What is far from data.", "Start nearer, or demonstrate there.")
 
 
 def _of_open(open_: NDArray[np.bool_], most: float, seconds: Array) -> Verdict:

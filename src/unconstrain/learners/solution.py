@@ -87,6 +87,8 @@ class Belief(Shown):
         Estimated share of samples that were free, or held in a way that no other demonstration shows.
     suspects : ndarray of int, shape (K,)
         Samples that look wrong and were left out, by their places among those given.
+    told_together : float
+        Share of samples at which all actions along themselves determine the policy, those of one or two demonstrations.
     """
 
     noise: float
@@ -99,6 +101,7 @@ class Belief(Shown):
     candidates: dict[str, Judged] = field(default_factory=dict)
     undecided_share: float = 0.0
     suspects: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    told_together: float = 0.0
 
     def uncertainty(self, model: Model, states: Array) -> Uncertainty:
         """Posterior standard deviations of the prediction at N states.

@@ -2,7 +2,7 @@
 
 Examples
 --------
->>> uc.motion.rollout(lambda x: -x, [1.0], steps=3, dt=0.5).states[:, 0]
+>>> uc.motion.rollout(lambda x: -x, [1.0], steps=3, dt=0.5, method="euler").states[:, 0]
 array([1.  , 0.5 , 0.25])
 """
 

@@ -167,10 +167,11 @@ def _refuted(policy: Callable[[Array], Array], starts: Array, normals: Array, ne
     def stopped(states: Array) -> Array:
         return np.where(np.linalg.norm(states - middle, axis=1, keepdims=True) < far, policy(states), 0.0)
 
-    goal = np.median([run.states[-1] for run in rollout(stopped, starts[free[:, 0]], STEPS, dt)], axis=0)
+    runs = rollout(stopped, starts[free[:, 0]], STEPS, dt, method="euler")
+    goal = np.median([run.states[-1] for run in runs], axis=0)
     units = normals / np.where(free, 1.0, np.linalg.norm(normals, axis=1, keepdims=True))
     starts = starts - units * np.vecdot(units, starts - goal)[:, None]
-    runs = rollout(stopped, starts, STEPS, dt, lambda states, _: units[: len(states), None])
+    runs = rollout(stopped, starts, STEPS, dt, lambda states, _: units[: len(states), None], method="euler")
     ends = np.stack([run.states[-1] for run in runs])
     away = np.linalg.norm(ends - goal, axis=1) > near
     if not away.any():

@@ -63,12 +63,12 @@ def rollout(
     task: Task | None = None,
     name: str = "rollout",
     space: spaces.Space | None = None,
-    method: Method = "euler",
+    method: Method = "rk4",
     order: Literal[1, 2] = 1,
     obstacles: Sequence[Obstacle] = (),
     least_support: float = SUPPORTED,
 ) -> Demonstration | list[Demonstration]:
-    """Follow ``u = N(x, t) π(x)``, or ``u = A⁺b + N π`` under a task, by default with Euler steps ``x ← x + dt u``.
+    """Follow ``u = N(x, t) π(x)``, or ``u = A⁺b + N π`` under a task, by default with Runge-Kutta steps.
 
     Parameters
     ----------
@@ -91,8 +91,8 @@ def rollout(
     space : Space, optional
         Which states are angles or orientations (:mod:`unconstrain.spaces`); by default as a fitted policy knows.
     method : {"euler", "rk4", "adaptive"}
-        Of steps between samples: Euler's, as a control loop does; Runge and Kutta's of fourth order (on orientations of
-        a lower one); or that, halved until that changes it by less than a millionth of the way it goes.
+        Of steps between samples: Euler's, as a control loop does, from which circles grow; Runge and Kutta's of fourth
+        order (lower on orientations); or that, halved until that changes it by less than a millionth of its way.
     order : {1, 2}
         2: states are positions and velocities, actions accelerations; constraint and task hold the velocities, and are
         given the positions (:class:`.flow.SecondOrder`).
@@ -122,7 +122,7 @@ def rollout(
     Examples
     --------
     >>> plane = uc.constraints.Plane(normal=[0, 0, 1])
-    >>> uc.rollout(lambda x: -x, start=[1.0, 1.0, 1.0], steps=3, dt=0.5, constraint=plane).states
+    >>> uc.rollout(lambda x: -x, start=[1.0, 1.0, 1.0], steps=3, dt=0.5, constraint=plane, method="euler").states
     array([[1.  , 1.  , 1.  ],
            [0.5 , 0.5 , 1.  ],
            [0.25, 0.25, 1.  ]])

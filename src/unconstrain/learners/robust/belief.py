@@ -72,7 +72,7 @@ def solution(
         d * p,
         np.zeros(count),
         method=chosen.name,
-        belief=_as_free_as_known(belief, everything, model),
+        belief=_as_free_as_known(belief, everything, model, np.stack([one.together for one in told])),
     )
 
 
@@ -134,13 +134,15 @@ class _Told:
         shares, directions = np.linalg.eigh(self._known)
         self.determined = int((shares > 1.0).sum())
         self.open = self._axes @ directions[:, shares <= 1.0]
-        values, vectors = np.linalg.eigh(self._known + priors.precision[m])
-        self._both = (vectors / np.maximum(values, 1e-12 * values[-1])) @ vectors.T
+        prior = priors.precision[m]
+        self._both = _inverse(self._known + prior)
         noise = self._both @ self._known @ self._both
         self.from_noise = self._axes @ self._inflated(noise, chosen, samples, m) @ self._axes.T
-        off = self._axes @ self._disagreement(chosen, evidence, m)
-        open_ = self._both @ priors.precision[m] @ self._both
-        self.undetermined = self._axes @ open_ @ self._axes.T + off @ off.T
+        alone = self._whitened(sum(one.hessian[m] for one in evidence.consistent))
+        values, axes = np.linalg.eigh(alone)
+        off = self._axes @ self._disagreement(chosen, evidence, m, values, axes)
+        both = self._both, _inverse(_restricted(claimed, alone, axes[:, values > self._least]) + prior)
+        self.undetermined, self.together = (self._axes @ (b @ prior @ b) @ self._axes.T + off @ off.T for b in both)
 
     def _whitened(self, matrices: Array) -> Array:
         return np.asarray(self._axes.T @ matrices @ self._axes)
@@ -156,18 +158,22 @@ class _Told:
         wide = (stdtrit(count - 1, 0.975) / ndtri(0.975)) ** 2
         return np.asarray(0.5 * wide * (max(1.0, ratio) * noise + apart @ apart.T))
 
-    def _disagreement(self, chosen: Candidate, evidence: Evidence, m: int) -> Array:
+    def _disagreement(self, chosen: Candidate, evidence: Evidence, m: int, values: Array, axes: Array) -> Array:
         """Steps (P, P), as columns, from the chosen weights to the most consistent ones, beyond chance.
 
         Along each eigenvector of the information, by a t-test over the parts of the data.
         """
         slopes = evidence.gradients(vec(chosen.weights))[:, m] @ self._axes
-        values, axes = np.linalg.eigh(self._whitened(sum(one.hessian[m] for one in evidence.consistent)))
         parts = slopes @ axes
         mean, error = parts.sum(axis=0), np.sqrt(len(parts) * parts.var(axis=0, ddof=min(1, len(parts) - 1)))
         chance = stdtrit(max(len(parts) - 1, 1), 0.975) * error
         beyond = np.sqrt(np.maximum(mean**2 - chance**2, 0.0)) / (1.0 + np.maximum(values, 0.0))
         return np.asarray(axes * np.where(values > self._least, beyond, 0.0))
+
+
+def _inverse(precision: Array) -> Array:
+    values, vectors = np.linalg.eigh(precision)
+    return np.asarray((vectors / np.maximum(values, 1e-12 * values[-1])) @ vectors.T)
 
 
 def _restricted(evidence: Array, shown: Array, basis: Array) -> Array:
@@ -201,19 +207,21 @@ def _ratio(apart: Array, noise: Array, samples: Samples, m: int) -> float:
     return float(np.exp(np.average(logs[fine], weights=weights[fine]))) if fine.any() else 1.0
 
 
-def _as_free_as_known(belief: Belief, everything: Samples, model: Model) -> Belief:
-    """With no sample called free that may as well have been held, in a way that no other demonstration shows."""
+def _as_free_as_known(belief: Belief, everything: Samples, model: Model, together: Array) -> Belief:
+    """With no sample called free that may as well have been held, as no other shows; and what all leave together."""
     spread = belief.uncertainty(model, everything.states)
     open_, noise = (np.linalg.norm(one, axis=1) for one in (spread.undetermined, spread.from_noise))
     counts = everything.counts / everything.counts.sum()
     hidden = everything.groups.max() == 0 or hides_sphere(belief.noise**2, everything)
-    little = open_ < LITTLE_OPEN * np.sqrt(everything.energy)
+    of_all = replace(belief, undetermined=together).uncertainty(model, everything.states).undetermined
+    little, told = (one < LITTLE_OPEN * np.sqrt(everything.energy) for one in (open_, np.linalg.norm(of_all, axis=1)))
     known = ((open_ < noise) | little) & (not hidden)
     return replace(
         belief,
         free=np.where(known, belief.free, 0.5 * belief.free)[everything.places],
         free_share=float(counts @ (belief.free * known)),
         undecided_share=float(counts @ (belief.free * ~known)),
+        told_together=float(counts @ told) * bool(everything.groups.max() >= LEFT_OUT),
     )
 
 

@@ -209,7 +209,7 @@ def _trial(name: str, number: int, settings: Settings) -> list[dict[str, Any]]:
 def _demonstrations(task: Task, rng: np.random.Generator, constraint: uc.constraints.Constraint) -> Demos:
     count, steps, dt = task.shape
     starts = task.starts(rng, count).tolist()
-    return uc.rollout(task.policy, starts, steps, dt, constraint)
+    return uc.rollout(task.policy, starts, steps, dt, constraint, method="euler")
 
 
 def _judged(task: Task, features: FeatureMap | str, train: Demos, test: Demos) -> dict[str, float]:

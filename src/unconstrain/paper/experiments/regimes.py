@@ -179,7 +179,7 @@ def demonstrate(
     demos: list[uc.Demonstration] = []
     for start, drawn in zip(starts, draws, strict=True):
         constraints = None if drawn is None else [drawn]
-        demos += uc.rollout(flow, start[None], settings.steps, settings.dt, constraints, name=system)
+        demos += uc.rollout(flow, start[None], settings.steps, settings.dt, constraints, name=system, method="euler")
     return toy.split(demos, settings.test_share, rng)
 
 
@@ -399,6 +399,6 @@ def _by_arm(kind: str, count: int, rng: np.random.Generator) -> list[uc.Demonstr
         if len(part):
             demos += cast(
                 "list[uc.Demonstration]",
-                uc.rollout(JointLimitAvoidance(0.05, 1.8), part, 100, 0.5, constraint, name="arm"),
+                uc.rollout(JointLimitAvoidance(0.05, 1.8), part, 100, 0.5, constraint, name="arm", method="euler"),
             )
     return demos

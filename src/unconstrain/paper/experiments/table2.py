@@ -249,7 +249,8 @@ def demonstrate(
     policy = JointLimitAvoidance(settings.gain, settings.power)
     name = f"arm {CONSTRAINTS[held - 1]}"
     return cast(
-        "list[uc.Demonstration]", uc.rollout(policy, starts, settings.steps, settings.dt, constraint, name=name)
+        "list[uc.Demonstration]",
+        uc.rollout(policy, starts, settings.steps, settings.dt, constraint, name=name, method="euler"),
     )
 
 

@@ -87,7 +87,7 @@ def demonstrate(settings: ToySettings, rng: np.random.Generator, draw: Draw) -> 
     starts = rng.uniform(-settings.start, settings.start, (settings.demonstrations, 2))
     drawn = [draw(settings, rng) for _ in starts]
     constraints = [one for one in drawn if one is not None] or None
-    return uc.rollout(settings.system, starts, settings.steps, settings.dt, constraints, name="toy")
+    return uc.rollout(settings.system, starts, settings.steps, settings.dt, constraints, name="toy", method="euler")
 
 
 def split(

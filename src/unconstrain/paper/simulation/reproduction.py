@@ -164,7 +164,7 @@ def _plan(policy: Callable[[Array], Array], plate: Plate, start: Array, duration
     every = RECORD_EVERY * TIME_STEP
     samples = round(duration / every)
     try:
-        path = uc.rollout(policy, start, samples, every, plate.constraint, method="rk4").states
+        path = uc.rollout(policy, start, samples, every, plate.constraint).states
     except InvalidDataError:
         path = np.full((samples, 3), LARGEST)
     outside = np.abs(path @ plate.rotation[:, :2]).max(axis=1) > HALF_PLATE

@@ -209,5 +209,5 @@ def _stroke(plate: Plate, wipe: WipingPolicy, how: Strokes, rng: np.random.Gener
         return wipe(states) + next(drift)
 
     start = how.put_down(plate, wipe, rng)
-    track = uc.rollout(hand, start, how.samples * substeps, dt, plate.constraint)
+    track = uc.rollout(hand, start, how.samples * substeps, dt, plate.constraint, method="euler")
     return how.watched(track.states[::substeps], plate.name, rng)

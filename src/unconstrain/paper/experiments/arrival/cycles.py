@@ -61,7 +61,7 @@ def simulated(settings: Settings) -> list[dict[str, Any]]:
     wiped = {plate: demonstrate(plate, rng, strokes=how) for plate in PLATES if plate not in HELD_OUT}
     demos = list(wiped.values())
     policy, planes = _learnt(demos), [plate.constraint for plate in PLATES]
-    truth = uc.rollout(WipingPolicy(), _on_circle(PLATES), 400, DT, planes, method="rk4")
+    truth = uc.rollout(WipingPolicy(), _on_circle(PLATES), 400, DT, planes)
     guided = uc.Guided(policy, orbit="shown", demonstrations=[one for demo in demos for one in how.settled(demo)])
     return _followed(guided, [run[200:] for run in truth], planes, [plate.name for plate in PLATES], settings)
 
@@ -103,7 +103,7 @@ def _followed(
     asked = [measured(demo.states, normal, DT) for demo, normal in zip(shown, normals, strict=True)]
     steps = int((settings.turns + 3) / min(one["pace"] for one in asked) / DT * 1.2)
     starts = np.stack([_on(normal, demo.states) for demo, normal in zip(shown, normals, strict=True)])
-    runs = uc.rollout(guided, starts, steps, DT, planes, method="rk4")
+    runs = uc.rollout(guided, starts, steps, DT, planes)
     each = zip(names, asked, runs, normals, shown, strict=True)
     return [
         _row(name, was, run.states, normal) | price(guided.policy, guided, [demo])

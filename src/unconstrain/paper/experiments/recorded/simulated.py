@@ -323,7 +323,7 @@ def _rolled(
     dt: float,
     constraints: Sequence[uc.constraints.Constraint] | None,
 ) -> list[uc.Demonstration]:
-    return uc.rollout(policy, starts, steps, dt, constraints)
+    return uc.rollout(policy, starts, steps, dt, constraints, method="euler")
 
 
 def _free(policy: Policy, states: Array) -> uc.Demonstration:

@@ -114,7 +114,7 @@ def _followed(
     while True:
         try:
             dt = 1 / (fine * settings.rate)
-            path = uc.rollout(policy, start, fine * steps, dt, plane, name=name, least_support=0.0)
+            path = uc.rollout(policy, start, fine * steps, dt, plane, name=name, method="euler", least_support=0.0)
         except InvalidDataError:  # it runs away; show how it begins to
             steps = max(1, steps // 2)
         else:
