@@ -1,10 +1,12 @@
 """The command line as its users meet it: what it prints, what it writes, how it says no."""
 
+import cProfile
 import csv
 import io
 import json
 import os
 import pickle
+import pstats
 import re
 import subprocess
 import sys
@@ -268,6 +270,18 @@ def test_inspect_prints_json_for_programs(files):
     assert found[0]["zero_actions"] == 0
 
 
+@pytest.mark.parametrize("first", ["", "demo,"])
+def test_inspect_looks_at_each_of_many_columns_a_few_times(tmp_path, first):
+    columns, words = 4000, ["wipe"] if first else []
+    rows = [[*words, *[0.01 * at] * columns] for at in range(50)]
+    write(tmp_path / "wide.csv", first + ",".join(f"s{at}" for at in range(columns)), rows)
+    with cProfile.Profile() as profile:
+        said = run("inspect", tmp_path / "wide.csv")
+    assert pstats.Stats(profile).total_calls < 140 * columns  # what is imported first, too
+    assert "its columns s0, s1, " in " ".join(said.split())
+    assert "s29 and 3970 more. Say which with --state" in " ".join(said.split())
+
+
 def test_inspect_shows_columns_that_fit_cannot_guess(tmp_path):
     write(tmp_path / "odd.csv", "left,right,up", [[1, 2, 3], [4, 5, 6]])
     said = run("inspect", tmp_path / "odd.csv")
@@ -317,11 +331,27 @@ def test_what_is_learnt_goes_to_a_file_that_is_called_so(files, tmp_path, comman
     assert not (tmp_path / "p.csv").exists()
 
 
+@pytest.mark.parametrize(
+    ("units", "more", "said"),
+    [
+        (" [mm]; [mm]; [mm/s]; [mm/s]", (), " mm/s on each action, and"),
+        (" [mm]; [rad]; [mm/s]; [rad/s]", (), " on each action, in its unit, and"),
+        (" [mm]; [mm]; [mm/s]; [mm/s]", ("--scale", "1000,1000"), " on each action, in its unit, and"),
+    ],
+)
+def test_fit_says_the_unit_of_noise_where_actions_have_one(files, tmp_path, units, more, said):
+    head = ",".join(f"{name}{unit}" for name, unit in zip(("x", "y", "vx", "vy"), units.split(";"), strict=True))
+    for path in files:
+        (tmp_path / path.name).write_text(path.read_text().replace("x,y,vx,vy", head, 1))
+    asked = ("--state", "x,y", "--action", "vx,vy", "--model", "linear", *more, "-o", tmp_path / "p.npz")
+    assert re.search(rf"misfit are about [\d.e+-]+{re.escape(said)}", run("fit", *tmp_path.glob("*.csv"), *asked))
+
+
 def test_fit_says_how_the_default_learner_went(files, tmp_path):
     said = below(run("fit", *files, "--model", "linear", "-o", tmp_path / "p.npz")).splitlines()[2]
     assert re.fullmatch(
         r"Learnt as .*: .*\. Estimated squared error, against this: .* times for .* \('fit -v' says what these are\)\. "
-        r"Noise and misfit are about \S+ on each action, and \d+% of the samples were free.*\.",
+        r"Noise and misfit are about \S+ on each action, in its unit, and \d+% of the samples were free.*\.",
         said,
     )
 
@@ -956,6 +986,16 @@ def test_a_recording_of_other_columns_is_refused_by_score(policy, tmp_path):
     write(tmp_path / "other.csv", "t,a,b", [[0, 1, 2], [1, 2, 3]])
     said = refused("score", policy, tmp_path / "other.csv")
     assert said == f"{tmp_path}/other.csv has no column 'x', 'y', 'vx', 'vy'; it has a, b."
+
+
+def test_columns_that_are_called_otherwise_are_told_with_what_helps(policy, tmp_path):
+    swing, cure = np.random.default_rng(0).standard_normal((40, 4)), "Name those of this file with --state and --action"
+    np.savez(tmp_path / "swing.npz", positions=swing[:, :2], velocities=swing[:, 2:], times=DT * np.arange(40))
+    asked = ("score", policy, tmp_path / "swing.npz")
+    assert f"; it has positions1, positions2, velocities1, velocities2. {cure}, or all of its" in refused(*asked)
+    assert "swing" in run(*asked, "--state", "positions1,positions2", "--action", "velocities1,velocities2")
+    assert "swing" in run(*asked, "--columns", "x,y,vx,vy,t")
+    assert cure not in refused(*asked, "--state", "positions1,x", "--action", "velocities1,velocities2")
 
 
 def test_actions_that_are_no_velocities_cannot_be_rolled_out(tmp_path):

@@ -262,3 +262,18 @@ class TestCompact:
         assert compact('<g>\n<g data-key="a">\n<g>\n<path d="M 1 2 L 3 4"/>\n</g>\n</g>\n</g>') == (
             '\n<g data-key="a">\n<path d="M1 2l2 2"/>\n</g>\n'
         )
+
+
+@pytest.mark.parametrize("size", [(300.0, 200.0, 150.0), (0.3, 0.2, 0.01), (30.0, 40.0, 50.0)])
+def test_names_of_axes_in_space_lie_beyond_their_ticks(size):
+    turn = np.linspace(0, 6, 200)
+    track = np.column_stack([np.cos(turn), np.sin(turn), 0.3 * np.sin(2 * turn)]) * size
+    made = figures.movements([("training", track)], labels=("x [mm]", "y [mm]", "z [mm]"))
+    made.set_size_inches(660 / 72, 350 / 72)
+    made.draw_without_rendering()
+    for axis in (made.axes[0].xaxis, made.axes[0].yaxis, made.axes[0].zaxis):
+        name, *ticks = (
+            text.get_window_extent().get_points().mean(axis=0)
+            for text in (axis.label, *(tick.label1 for tick in axis.get_major_ticks()))
+        )
+        assert min(np.linalg.norm(tick - name) for tick in ticks) > 17  # pixels

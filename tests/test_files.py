@@ -13,6 +13,8 @@ import pytest
 
 from unconstrain.base import files
 from unconstrain.base.errors import ModelFileError, UnconstrainError, WriteError
+from unconstrain.evaluation.diagnosis import Place
+from unconstrain.recordings.remarks import titled
 
 posix = pytest.mark.skipif(os.name != "posix", reason="permissions and links as on POSIX")
 
@@ -240,3 +242,14 @@ def test_the_caller_chooses_the_error(tmp_path):
 def test_it_is_an_error_of_this_package_and_of_the_system():
     assert issubclass(WriteError, UnconstrainError)
     assert issubclass(WriteError, OSError)
+
+
+def test_a_recording_is_told_with_its_file_where_it_is_not_called_as_that():
+    assert [files.stem(name) for name in ("wipe.csv", "a/wipe.v2.csv.GZ", "wipe.v2.npz")] == [
+        "wipe",
+        "wipe.v2",
+        "wipe.v2",
+    ]
+    assert titled("wipe.v2", "wipe.v2.csv") == "'wipe.v2'"
+    assert titled("wipe", "wipe.v2.csv") == "'wipe' of wipe.v2.csv"
+    assert str(Place("wipe.v2", 1, None, "wipe.v2.csv", 4)) == "wipe.v2.csv row 4"

@@ -521,16 +521,18 @@ class TestFilesOfAnotherKind:
 
 
 @pytest.mark.parametrize("command", ["inspect", "fit", "diagnose"])
-def test_a_broken_file_is_left_out_by_its_name(folder, tmp_path, command):
+@pytest.mark.parametrize("name", ["w9", "w9.v2"])
+def test_a_broken_file_is_left_out_by_its_name(folder, tmp_path, command, name):
     for k in range(4):
         shutil.copy(folder / f"w{k}.csv", tmp_path)
-    (tmp_path / "w9.csv").write_text("garbage\n")
+    broken = tmp_path / f"{name}.csv"
+    broken.write_text("garbage\n")
     more = ("--model", "affine") if command != "inspect" else ()
     asked = (command, *sorted(tmp_path.glob("*.csv")), *more, *(["-o", tmp_path / "p.npz"] if command == "fit" else []))
-    assert refused(*asked).startswith(f"{tmp_path / 'w9.csv'}: a header but no rows")
-    assert refused(*asked, "--leave-out", "w8").startswith(f"{tmp_path / 'w9.csv'}: a header but no rows")
-    assert "3 demonstrations" in run(*asked, "--leave-out", "w9,w3") or command == "inspect"
-    told = json.loads(run(*asked, "--leave-out", "w9,w3", "--json", *(["--force"] if command == "fit" else [])))
+    assert refused(*asked).startswith(f"{broken}: a header but no rows")
+    assert refused(*asked, "--leave-out", "w8").startswith(f"{broken}: a header but no rows")
+    assert "3 demonstrations" in run(*asked, "--leave-out", f"{name},w3") or command == "inspect"
+    told = json.loads(run(*asked, "--leave-out", f"{name},w3", "--json", *(["--force"] if command == "fit" else [])))
     names = [one["name"] for one in told] if command == "inspect" else told.get("demonstrations", 3)
     assert names in (["w0", "w1", "w2"], 3)
 

@@ -208,6 +208,18 @@ def test_pauses_of_seven_tenths_cost_the_policy_next_to_nothing(learner, seeds):
 MOVED_IN_SPACE = uc.Recipe(("x", "y", "z"), differentiate="savgol")
 
 
+@pytest.mark.parametrize("shaken", [0.0, 0.4])
+@pytest.mark.parametrize(("pace", "found"), [(0.0, True), (0.15, False)])
+def test_a_pause_is_found_where_only_what_stands_still_trembles(pace, found, shaken):
+    """Some 100 mm/s for 6 seconds, with 3 of another pace in the middle."""
+    passed = np.cumsum(np.repeat([0.02, 0.02 * pace, 0.02], [150, 150, 150]))
+    track = 95.0 * np.column_stack([np.sin(passed), np.cos(passed)])
+    track[150:300] += shaken * np.random.default_rng(0).standard_normal((150, 2))
+    bounds = np.array(pauses(track))
+    assert bounds.shape == ((1, 2) if found else (0,))
+    assert not found or abs(bounds - [150, 300]).max() <= 10
+
+
 def test_a_pause_is_found_where_the_movement_after_it_creeps():
     for number, held in enumerate(swings(5)[1]):  # behind two of these planes hardly anything moves after the pause
         [(start, stop)] = pauses(held.values)

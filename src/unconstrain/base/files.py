@@ -15,9 +15,18 @@ from typing import BinaryIO
 from .display import legible
 from .errors import UnconstrainError, WriteError
 
+PACKINGS = (".gz", ".bz2", ".xz")
+"""Suffixes of files that are packed."""
+
 _LOCKS = importlib.import_module("fcntl") if os.name == "posix" else None
 _UNNAMED = getattr(os, "O_TMPFILE", 0) if Path("/proc/self/fd").is_dir() else 0
 _EXCHANGE = 2  # RENAME_EXCHANGE of renameat2(2)
+
+
+def stem(path: str | os.PathLike[str]) -> str:
+    """Name of a file without its suffix, and without that of the packing: as its demonstration is called."""
+    file = Path(path)
+    return Path(file.stem).stem if file.suffix.lower() in PACKINGS else file.stem
 
 
 def write(

@@ -12,6 +12,7 @@ import click
 import unconstrain as uc
 
 from ..base.errors import SettingError
+from ..base.files import stem
 from .reading import numbers, recordings_of
 
 CENTRES = 25
@@ -111,7 +112,7 @@ def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None) -> None:
         policy.fit_batches(stream)
         return
     uc.cluster.check_learner(policy.learner)  # before anybody is waited for
-    if stream.leave_out - {path.name.partition(".")[0] for path in stream.paths}:  # workers know their own files only
+    if stream.leave_out - {stem(path) for path in stream.paths}:  # workers know their own files only
         uc.readers.check_left_out(sorted(stream.leave_out), [one.name for one in recordings_of(stream)])
     with uc.cluster.connected(scheduler) as client:
         uc.cluster.fit_batches(policy, stream.parts(), client=client)

@@ -6,7 +6,6 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from hashlib import blake2b
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +39,7 @@ def provenance(paths: Iterable[str | Path], recipe: uc.Recipe, first: uc.Recordi
         "sources": [Path(path).name for path in sources],
         "digests": [*map(digest_of, sources)],
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "made with": f"unconstrain {version('unconstrain')}",
+        "made with": f"unconstrain {uc.__version__}",
     }
 
 

@@ -16,7 +16,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import counted, listed
+from ..base.display import bare, counted, listed
 from ..base.errors import InvalidDataError, SettingError
 from .endings import REFUSED, ending
 from .reading import next_command
@@ -211,7 +211,7 @@ def say_fit(policy: uc.Policy, stream: uc.Stream, judged: Judged, learner: str, 
     if getattr(policy, "features", None) == "auto":
         click.echo(f"Features of least estimated error: {policy.training_.model.features}.")
     if solution.belief is not None:
-        click.echo(_said_of_samples(solution))
+        click.echo(_said_of_samples(solution, () if policy.scale_ else stream.recipe.labels(stream.first.units)[1]))
         if known:
             _say_suspects(solution.belief.suspects, stream)
     elif learner != "direct":
@@ -280,13 +280,15 @@ def _say_suspects(rows: NDArray[np.intp], stream: uc.Stream | None) -> None:
             click.echo(f"Note: {line}", err=True)
 
 
-def _said_of_samples(solution: uc.Solution) -> str:
+def _said_of_samples(solution: uc.Solution, actions: Sequence[str]) -> str:
     """The candidate that a robust learner took, and its estimates of noise and free samples."""
+    units = {name[len(bare(name)) :].strip(" ()[]") for name in actions}
+    where = f"{max(units)} on each action" if len(units) == 1 and max(units) else "on each action, in its unit"
     risks, share = {name: one.risk for name, one in solution.candidates.items()}, solution.believed.undecided_share
     undecided = f" ({share:.0%} free or always held in the same way, which looks alike)" if share >= 0.01 else ""
     return (
         f"{uc.evaluation.diagnosis.about_choice(solution.method, risks)} Noise and misfit are about "
-        f"{solution.noise:.3g} on each action, and {solution.free_share:.0%} of the samples were free, or "
+        f"{solution.noise:.3g} {where}, and {solution.free_share:.0%} of the samples were free, or "
         f"held by less than that{undecided}."
     )
 

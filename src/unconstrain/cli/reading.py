@@ -19,6 +19,7 @@ import unconstrain as uc
 
 from ..base.display import bare
 from ..base.errors import NOTHING_LEFT, InvalidDataError, ModelFileError, ReadError, SettingError, UnconstrainError
+from ..base.files import stem
 from .progress import Progress
 
 MOST_GUESSED = 3
@@ -145,10 +146,9 @@ def _without_broken(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(command)
     def begun(*args: Any, files: Sequence[str], leave_out: tuple[str, ...], **given: Any) -> Any:
-        stems = {path: path.name.partition(".")[0] for path in (uc.readers.expand(files) if leave_out else ())}
-        broken = {
-            one for path, one in stems.items() if one in leave_out and not is_recording(path, reading_of(**given))
-        }
+        stems = {path: stem(path) for path in (uc.readers.expand(files) if leave_out else ())}
+        how = reading_of(**given)
+        broken = {one for path, one in stems.items() if one in leave_out and not is_recording(path, how)}
         files = [str(path) for path, one in stems.items() if one not in broken] if broken else files
         leave_out = tuple(name for name in leave_out if name not in broken)
         return command(*args, files=files, leave_out=leave_out, **given)
@@ -265,7 +265,7 @@ def of_files(recordings: Iterable[uc.Recording]) -> Iterator[None]:
         with suppress(UnconstrainError):
             files = {one.file: None for one in recordings if named and one.name == named[1] and one.file}
             if named and files:
-                own = any(Path(file).name.partition(".")[0] == named[1] for file in files)
+                own = any(stem(file) == named[1] for file in files)
                 title = " or ".join(files) if own else f"{named[0]} of {' or '.join(files)}"
                 error.args = (f"{title}{str(error)[named.end() :]}", *error.args[1:])
         raise
@@ -295,11 +295,10 @@ def _as_pattern(files: Sequence[str]) -> str:
 
 def likely_states(columns: Sequence[str]) -> tuple[str, ...]:
     """Columns that may be the states, where none are called so: the first x, y, z beside each other, or the first."""
-    plain = [bare(name).strip(" \"'").casefold() for name in columns]
-    for width in (3, 2):
-        for start in range(len(columns) - width + 1):
-            if "".join(name[-1:] for name in plain[start : start + width]) == "xyz"[:width]:
-                return tuple(columns[start : start + width])
+    ends = "".join(bare(name).strip(" \"'").casefold()[-1:] or " " for name in columns)
+    for axes in ("xyz", "xy"):
+        if axes in ends:
+            return tuple(columns[ends.index(axes) :][: len(axes)])
     return tuple(columns[:MOST_GUESSED])
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array, on_host
 from ..base.errors import InvalidDataError, MissingBeliefError
+from ..base.files import stem
 from ..learners import Solution, robust
 from ..models import Scale, choose_variance, cover
 from ..recordings import Demonstration, readers, stack
@@ -51,7 +51,7 @@ class Place(NamedTuple):
         time = "" if self.time is None else f" ({self.time:.4g} s)"
         if self.row is None:
             return f"{self.demonstration} sample {self.sample}{time}"
-        named = not self.file or Path(self.file).name.partition(".")[0] != self.demonstration
+        named = not self.file or stem(self.file) != self.demonstration
         place = [self.file, f"'{self.demonstration}'" if named else "", f"row {self.row}"]
         return f"{' '.join(filter(None, place))}{time}"
 

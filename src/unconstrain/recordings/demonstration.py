@@ -81,7 +81,9 @@ class Recording(Shown):
         if missing:
             has_not = f"'{self.name}' has no column {listed([*map(repr, missing)])}; it has {listed(self.columns)}"
             words = f", and of words, for group=, {listed(self.words)}" if self.words else ""
-            raise InvalidDataError(f"{has_not}{words}.{meant(missing, self.columns)}")
+            others = len(missing) == len(names) <= len(self.columns)
+            cure = " Name those of this file with states= and actions=, or all of its columns with columns=."
+            raise InvalidDataError(f"{has_not}{words}.{meant(missing, self.columns) or (cure if others else '')}")
         return self.values[:, [self._places[name] for name in names]]
 
     def resolve(self, names: Sequence[str]) -> tuple[str, ...]:

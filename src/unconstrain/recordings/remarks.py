@@ -1,7 +1,8 @@
 """What is worth saying about a recording."""
 
-from pathlib import Path
 from typing import NamedTuple
+
+from ..base.files import stem
 
 WARNINGS = (
     "angle-wrap",
@@ -53,4 +54,4 @@ class Remark(NamedTuple):
 
 def titled(name: str, file: str = "") -> str:
     """A recording by its name, and by its file where it is not called as that."""
-    return f"'{name}'" if name.startswith(Path(file).name.partition(".")[0]) else f"'{name}' of {file}"
+    return f"'{name}'" if name.startswith(stem(file)) else f"'{name}' of {file}"

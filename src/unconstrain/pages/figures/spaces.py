@@ -36,11 +36,11 @@ def movements(
         axes.add_collection3d(faces([corners], alpha=0.12, **keyed(key, **own.get(key, {}))))
     for key, states in tracks:
         axes.plot(*broken(states).T, **keyed(key, linewidth=0.9 if key == "training" else 1.3, **own.get(key, {})))
-    axes.set(xlabel=labels[0], ylabel=labels[1], zlabel=labels[2])
     seen = np.concatenate([states for _, states in tracks])
     low, high = np.nanmin(seen, axis=0), np.nanmax(seen, axis=0)
     size = np.maximum(high - low, 0.25 * max(float((high - low).max()), 1e-12))
-    for name, middle, half in zip("xyz", (low + high) / 2, 0.55 * size, strict=True):
+    for name, label, middle, half in zip("xyz", labels, (low + high) / 2, 0.55 * size, strict=True):
+        getattr(axes, f"set_{name}label")(label, labelpad=8)  # beyond the ticks
         getattr(axes, f"set_{name}lim")(middle - half, middle + half)
         getattr(axes, f"{name}axis").set_pane_color((0, 0, 0, 0))
         getattr(axes, f"{name}axis").set_major_locator(require_extra("matplotlib.ticker", "viz").MaxNLocator(4))

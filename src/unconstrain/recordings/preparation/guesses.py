@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from functools import wraps
+from functools import lru_cache, wraps
 
 VELOCITY_NAMES = ("v{}", "d{}", "{}_dot", "dot_{}", "{}dot", "{}_vel", "{}_velocity", "vel_{}")
 """How people call the velocity of a column."""
@@ -58,6 +58,7 @@ Guess = Callable[..., tuple[str, ...] | None]
 def _without_units(guess: Guess) -> Guess:
     """A guess by names without units in brackets, unless two would be the same then."""
 
+    @lru_cache(8)  # of many demonstrations of the same columns
     @wraps(guess)
     def guessed(columns: Sequence[str], *states: Sequence[str]) -> tuple[str, ...] | None:
         plain = {name: _UNIT.sub("", name) for name in columns}
@@ -118,13 +119,13 @@ def positions_in(columns: Sequence[str]) -> tuple[str, ...] | None:
 
 def numbered_as(letter: str, columns: Sequence[str]) -> tuple[str, ...] | None:
     """Columns of one letter and a number, None if there is none."""
-    return tuple(name for name in columns if re.fullmatch(rf"{letter}\d+", name)) or None
+    return tuple(filter(re.compile(rf"{letter}\d+").fullmatch, columns)) or None
 
 
 def _with_velocity(columns: Sequence[str], style: str) -> tuple[str, ...]:
-    known, velocities = set(columns), {style.format(name) for name in columns}
+    velocities, known = {style.format(name): name for name in columns}, set(columns)
     # Beside x, dx, ddx only x is a state: dx is its velocity.
-    return tuple(name for name in columns if style.format(name) in known and name not in velocities)
+    return tuple(name for velocity, name in velocities.items() if velocity in known and name not in velocities)
 
 
 def _families(columns: Sequence[str]) -> Mapping[str, tuple[str, ...]]:

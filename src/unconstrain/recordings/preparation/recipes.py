@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from ...base.arrays import Array, check_at_least
-from ...base.display import speed_of, with_unit
+from ...base.display import listed, speed_of, with_unit
 from ...base.errors import SettingError
 from ...models import spaces
 from ..demonstration import Recording
@@ -270,7 +270,7 @@ def _with_columns(recipe: Recipe, recording: Recording) -> Recipe:
         return replace(told, states=states, differentiate="savgol")
     raise SettingError(
         f"'{recording.name}': cannot tell {'the actions' if states else 'states and actions'} from its columns "
-        f"{', '.join(columns)}. Say which with states= and actions=, or take the velocity "
+        f"{listed(columns)}. Say which with states= and actions=, or take the velocity "
         "of the states with differentiate='savgol'."
     )
 

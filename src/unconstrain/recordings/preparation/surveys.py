@@ -117,7 +117,7 @@ def _survey(subject: Subject, asked: Recipe) -> Survey:
     gaps, remarks = find_gaps(known - known[:1], asked.max_gap_s), examine(subject)
     steady = _steady_intervals(known, gaps)
     typical = float(np.median(steady)) if steady.size else None
-    bad_cells = [int((~np.isfinite(column)).sum()) for column in recording.values.T]
+    bad_cells = len(recording) - np.count_nonzero(np.isfinite(recording.values), axis=0)
     return Survey(
         name=recording.name,
         columns=recording.columns,
@@ -127,7 +127,7 @@ def _survey(subject: Subject, asked: Recipe) -> Survey:
         jitter=float(steady.std() / typical) if typical else None,
         gaps=gaps,
         non_increasing=() if times is None else tuple((np.flatnonzero(~(np.diff(times) > 0)) + 1).tolist()),
-        missing={name: count for name, count in zip(recording.columns, bad_cells, strict=True) if count},
+        missing={name: count for name, count in zip(recording.columns, bad_cells.tolist(), strict=True) if count},
         zero_actions=_zero_actions(subject),
         warnings=tuple(remark for remark in remarks if remark.warns),
         notes=tuple(remark for remark in remarks if not remark.warns),

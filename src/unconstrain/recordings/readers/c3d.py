@@ -17,7 +17,7 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...base.errors import ReadError
-from .packed import stem
+from ...base.files import stem
 from .reading import Reading
 from .table import Format, Table, unique_names
 

@@ -63,7 +63,7 @@ class Parser:
         self.numbers = [at for at, kind in enumerate(layout.kinds) if kind in "ne" and at not in words]
         self.lists = {at: 0 for at, kind in enumerate(layout.kinds) if kind == "l" and at not in words}
         self._has_number: NDArray[np.bool_] = np.zeros(len(names), dtype=bool)
-        self._arrow = None if self.lists else _arrow()
+        self._arrow = None if self.lists or len(names) > 4000 else _arrow()  # which has a reader for each column
         # Of lines that are no rows pyarrow notices most by their cells, if there are several and the first is a number.
         self._not_plain = _NOT_PLAIN[:2] if len(names) > 1 and 0 in self.numbers else _NOT_PLAIN
 
@@ -139,13 +139,16 @@ class Parser:
     def _columns(self, rows: Sequence[Row]) -> Array:
         lines = [line for line, _ in rows]
         columns = list(zip(*(cells for _, cells in rows), strict=True))
-        plain = [self._column(columns[at], at, lines)[:, None] for at in self.numbers]
-        return np.hstack([np.empty((len(rows), 0)), *plain, *(self._list(columns[at], at, lines) for at in self.lists)])
+        plain, word = _numbers([cell for at in self.numbers for cell in columns[at]], self.layout.decimal)
+        plain = plain.reshape(len(self.numbers), len(rows)).T
+        if word is not None:
+            plain = np.column_stack([self._column(columns[at], at, lines) for at in self.numbers])
+        self._has_number[self.numbers] |= np.isfinite(plain).any(axis=0)
+        return np.hstack([plain, *(self._list(columns[at], at, lines) for at in self.lists)])
 
     def _column(self, cells: Sequence[str], at: int, lines: Sequence[int]) -> Array:
         numbers, word = _numbers(cells, self.layout.decimal)
-        self._has_number[at] |= bool(np.isfinite(numbers).any())
-        if word is not None and self._has_number[at]:
+        if word is not None and (self._has_number[at] or np.isfinite(numbers).any()):
             raise ReadError(
                 f"{self.path}, line {lines[word]}, column {self.names[at]!r}: got {cells[word][:40]!r}, "
                 "expected a number as elsewhere in this column."

@@ -14,9 +14,9 @@ from typing import Any
 from ...base.arrays import require_extra
 from ...base.display import meant
 from ...base.errors import ReadError
+from ...base.files import stem
 from .layout import find_block
 from .lines import Lines
-from .packed import stem
 from .reading import Reading
 from .table import Format, Table
 from .text import joined, tables_of_text

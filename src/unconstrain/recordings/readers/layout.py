@@ -11,31 +11,15 @@ import csv
 import math
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import compress, takewhile
 from typing import Any, NamedTuple
 
 from .table import unique_names
 
-NOTHING = (
-    "",
-    "NA",
-    "N/A",
-    "n/a",
-    "#N/A",
-    "<NA>",
-    "NaN",
-    "nan",
-    "-nan",
-    "-NaN",
-    "NAN",
-    "None",
-    "none",
-    "null",
-    "NULL",
-    "-",
-)
+NOTHING = {"", *"NA N/A n/a #N/A <NA> NaN nan -nan -NaN NAN None none null NULL -".split()}  # noqa: SIM905
 """Cells that stand for no number."""
 
 LISTS = re.compile(r"[\[(].*[\])]")
@@ -256,14 +240,17 @@ def _merged(one: str, other: str) -> str | None:
 
 
 def _kinds(cells: Sequence[str], decimal: str) -> str:
-    """Kinds of the cells of a row; one that is all numbers is known at once."""
-    try:
-        plain = decimal == "." and "_" not in "".join(cells) and not any(map(math.isnan, map(float, cells)))
-    except ValueError:
-        plain = False
-    return "n" * len(cells) if plain else "".join(_kind(cell, decimal) for cell in cells)
+    """Kinds of the cells of a row; parts that are all numbers are known at once."""
+    with suppress(ValueError):
+        if decimal == "." and "_" not in "".join(cells) and not any(map(math.isnan, map(float, cells))):
+            return "n" * len(cells)
+    if len(cells) > 16:  # of fewer each is looked at
+        middle = len(cells) // 2
+        return _kinds(cells[:middle], decimal) + _kinds(cells[middle:], decimal)
+    return "".join(_kind(cell, decimal) for cell in cells)
 
 
+@lru_cache(2**14)  # names are looked at again and again
 def _kind(cell: str, decimal: str) -> str:
     if cell in NOTHING:
         return "e"

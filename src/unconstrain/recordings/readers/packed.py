@@ -9,22 +9,21 @@ from pathlib import Path
 from typing import Any, BinaryIO, cast
 
 from ...base.errors import ReadError
+from ...base.files import PACKINGS
 
-PACKINGS: dict[bytes, tuple[str, Callable[[BinaryIO], Any]]] = {
-    b"\x1f\x8b": (".gz", lambda file: gzip.GzipFile(fileobj=file)),
-    b"BZh": (".bz2", bz2.BZ2File),
-    b"\xfd7zXZ\x00": (".xz", lzma.LZMAFile),
+OPENERS: dict[bytes, Callable[[BinaryIO], Any]] = {
+    b"\x1f\x8b": lambda file: gzip.GzipFile(fileobj=file),
+    b"BZh": bz2.BZ2File,
+    b"\xfd7zXZ\x00": lzma.LZMAFile,
 }
-"""First bytes of a packed file, the suffix of such, and what opens it."""
-
-SUFFIXES = tuple(suffix for suffix, _ in PACKINGS.values())
+"""First bytes of a packed file, and what opens it."""
 
 
 def open_packed(file: BinaryIO) -> BinaryIO:
     """What is in an open file, unpacked where it is packed."""
     head = file.read(8)
     file.seek(0)
-    unpack = next((opener for magic, (_, opener) in PACKINGS.items() if head.startswith(magic)), None)
+    unpack = next((opener for magic, opener in OPENERS.items() if head.startswith(magic)), None)
     return file if unpack is None else cast(BinaryIO, unpack(file))
 
 
@@ -46,11 +45,6 @@ def opened(path: Path) -> Iterator[BinaryIO]:
         raise ReadError(f"{path}: could not be read ({error.strerror or error}).") from error
 
 
-def stem(path: Path) -> str:
-    """Name of a file without its suffix, and without that of the packing."""
-    return Path(path.stem).stem if path.suffix.lower() in SUFFIXES else path.stem
-
-
 def suffix(path: Path) -> str:
     """Suffix of what is in a file, in small letters."""
-    return Path(path.stem if path.suffix.lower() in SUFFIXES else path.name).suffix.lower()
+    return Path(path.stem if path.suffix.lower() in PACKINGS else path.name).suffix.lower()

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .packed import opened, stem
+from ...base.files import stem
+from .packed import opened
 from .reading import Reading
 from .table import Format, Table
 from .trees import UNNAMED, Branch, tables_of

@@ -19,7 +19,7 @@ import numpy as np
 from ...base.arrays import require_extra
 from ...base.display import listed
 from ...base.errors import ReadError
-from .packed import stem
+from ...base.files import stem
 from .reading import Reading
 from .table import Format, Table
 

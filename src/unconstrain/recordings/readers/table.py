@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -186,7 +186,8 @@ class Assembly:
         """The recordings in a table, or in a block of it, as far as they are asked for."""
         roles = find_roles([*table.columns, *table.words], self.reading, self.path)
         times, remarks = self._times(table, roles)
-        places = [at for at, name in enumerate(table.columns) if name not in roles.taken]
+        taken = roles.taken
+        places = [at for at, name in enumerate(table.columns) if name not in taken]
         if not places:
             raise ReadError(f"{self.path}: no column of numbers; it has {listed([*table.columns, *table.words])}.")
         names = tuple(table.columns[at] for at in places)
@@ -199,7 +200,7 @@ class Assembly:
             {name: unit for name, unit in table.units.items() if name in names},
             table.attributes,
             legible(str(self.path)),
-            tuple(name for name in table.words if name not in roles.taken),
+            tuple(name for name in table.words if name not in taken),
         )
         groups = _groups(table, roles.group)
         tasks = table.words.get("task")
@@ -353,22 +354,24 @@ def _told_clock(names: Sequence[str], time: str) -> ClockColumns:
 
 def _labels(table: Table, roles: Roles) -> tuple[str, int]:
     """The column with the most values, one after the other, at whose changes other columns jump, and their number."""
-    most = ("", 0)
-    for name, cells in (*table.words.items(), *zip(table.columns, table.values.T, strict=True)):
+    most, head = ("", 0), table.values[:1000]
+    steady = np.count_nonzero(head[1:] != head[:-1], axis=0) <= len(head) // FEWEST_ROWS  # as few columns are
+    columns = ((table.columns[at], table.values[:, at]) for at in np.flatnonzero(steady))
+    for name, cells in (*table.words.items(), *columns):
         bounds = [] if name in roles.taken or name == roles.counter else _stretches(cells)
         if len(bounds) > max(1, most[1] - 1) and _jumps(table.values, np.array(bounds)):
             most = name, len(bounds) + 1
     return most
 
 
-def _stretches(cells: Sequence[Any] | Array) -> list[int]:
+def _stretches(cells: Collection[Any]) -> list[int]:
     """Rows where the value changes; none where a value comes again, or stands in too few rows."""
     values = cells if isinstance(cells, np.ndarray) else np.fromiter(cells, object, len(cells))
-    head, most = values[:1000], len(values) // FEWEST_ROWS
-    if np.count_nonzero(head[1:] != head[:-1]) > len(head) // FEWEST_ROWS:  # as in most columns
-        return []
     bounds = (np.flatnonzero(values[1:] != values[:-1]) + 1).tolist()
-    if len(bounds) >= most or np.diff([0, *bounds, len(values)]).min(initial=len(values)) < FEWEST_ROWS:
+    if (
+        len(bounds) >= len(values) // FEWEST_ROWS
+        or np.diff([0, *bounds, len(values)]).min(initial=len(values)) < FEWEST_ROWS
+    ):
         return []
     return bounds if len({str(values[at]) for at in (0, *bounds)}) == len(bounds) + 1 else []
 

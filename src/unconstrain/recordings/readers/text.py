@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 
 from ...base.display import listed
 from ...base.errors import ReadError
+from ...base.files import stem
 from ..remarks import Remark
 from .cells import Cells, Parser
 from .layout import Layout, find_layout, is_comment, split
 from .lines import Lines, head_of, lines_of, texts
-from .packed import opened, stem
+from .packed import opened
 from .reading import Reading
 from .table import Format, Table, find_roles, named_by
 
@@ -45,10 +46,9 @@ def read_text_blocks(path: Path, reading: Reading) -> Iterator[Table]:
             blocks = lines_of(file, path)
             head = head_of(blocks)
             layout = _layout(texts(head), path)
-            below = [block.after(layout.first) for block in head if block.next > layout.first]
-            for block in below:
-                block.text.decode()  # a header may be in another encoding, but not the table
-            inside = (block.before(layout.stop) for block in chain(below, blocks))
+            below = Lines(0, b"".join(block.text for block in head)).after(layout.first)
+            below.text.decode()  # a header may be in another encoding, but not the table
+            inside = (block.before(layout.stop) for block in chain([below], blocks))
             yield from tables_of_text(layout, inside, path, reading, stem(path))
     except UnicodeDecodeError as error:
         raise ReadError(f"{path}: not UTF-8 text ({error.reason}). Save it as a CSV file in UTF-8.") from error

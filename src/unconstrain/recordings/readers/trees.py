@@ -251,7 +251,9 @@ def _branches(branch: Branch) -> Iterator[Branch]:
                 yield Branch(inside, f"{_under(branch, name)}_{number}", branch.attributes, branch.labels)
 
 
-def _deep(arrays: Mapping[str, Any], leaves: Mapping[str, Leaf], clocks: set[str], branch: Branch, path: Path) -> Any:
+def _deep(
+    arrays: dict[str, Any], leaves: dict[str, Leaf], clocks: set[str], branch: Branch, path: Path
+) -> list[Branch]:
     """Arrays of three dimensions as demonstrations, each with what goes along; none where others are the samples."""
     found: list[Branch] = []
     flat = {name: each for name, each in arrays.items() if each.ndim < 3 or name in clocks}
@@ -263,10 +265,10 @@ def _deep(arrays: Mapping[str, Any], leaves: Mapping[str, Leaf], clocks: set[str
         if set(leaves) <= ({*along, *of_each} if are_parts else clocks):
             strange -= {name for name in strange & set(along) if _increases(along[name].astype(np.float64))}
             lie = len(deep) > 1 and not last and all(each.shape[2] == samples for each in deep.values())
+            axes = (2, 0, 1) if last else (0, 2, 1) if lie else (0, 1, 2)
+            turned = {name: np.asarray(each).transpose(axes) for name, each in deep.items()} | along
             for at in range(count):
-                members = {name: each[:, :, at] if last else each[at] for name, each in deep.items()}
-                members = {name: each.T for name, each in members.items()} if lie else members
-                members |= {name: each[at] for name, each in along.items()}
+                members = {name: each[at] for name, each in turned.items()}
                 name = f"{_under(branch, next(iter(deep)))}_{at + 1}"
                 found.append(Branch(members, name, branch.attributes, branch.labels))
     if found and strange:

@@ -75,7 +75,15 @@ def _slow(values: Array, shortest: int) -> list[tuple[int, int]]:
     usual = _usual(values, span)
     near = np.maximum(NOISE * _noise(values), 0.3 * usual / span)
     runs = _runs(values, span, SLOW * usual, shortest)
-    return _left([_around(values, *run, near) for run in runs], values, LEFT * np.ptp(values, axis=0))
+    exact = [_around(values, *run, np.maximum(near, _trembling(values[slice(*run)]))) for run in runs]
+    return _left(exact, values, LEFT * np.ptp(values, axis=0))
+
+
+def _trembling(values: Array) -> Array:
+    """How far rows are from one place by their own noise, shape (n,): nothing for columns that go on meanwhile."""
+    width, middle = NOISE * _noise(values), len(values) // 2
+    moved = np.abs(np.median(values[:middle], axis=0) - np.median(values[middle:], axis=0))
+    return np.where(moved < width, width, 0.0)
 
 
 def _motionless(values: Array, shortest: int) -> list[tuple[int, int]]:
