@@ -57,6 +57,16 @@ def test_a_potential_that_is_not_convex_is_found_out(part):
     assert found.said.startswith("not guaranteed: ")
 
 
+@pytest.mark.parametrize(("back", "holds"), [(0.9, True), (1.1, False)])
+def test_a_slope_may_be_taken_back_farther_out_but_not_more_than_it_is(back, holds):
+    guided = uc.Guided(two_goals, GOAL, demonstrations=SHOWN)
+    old, way = guided.potential_, np.array([[0.6, 0.0, 0.8]] * 2)
+    new = {"directions": way, "offsets": [0.1, 0.4], "weights": old.weights[0] * np.array([1.0, -back])}
+    parts = {name: np.concatenate([getattr(old, name), each]) for name, each in new.items()}
+    guided.aim_ = replace(guided.aim_, potential=replace(old, **parts))
+    assert uc.certify(guided, AROUND).holds == holds
+
+
 def test_an_affine_policy_is_guaranteed_by_its_eigenvalues():
     turns = np.array([[-1.0, 3.0, 0.0], [-3.0, -0.5, 0.0], [0.0, 0.0, -2.0]])
     found = uc.certify(lambda states: (states - GOAL) @ turns.T, AROUND)

@@ -155,7 +155,8 @@ def test_a_step_is_the_prediction(guided, learnt):
 
 def test_a_longer_step_can_be_asked_for(guided):
     by_itself = uc.Guided(drifting, GOAL, demonstrations=SHOWN).dt_
-    assert by_itself < 0.02 <= guided.dt_
+    assert by_itself < 1.0
+    assert guided.dt_ >= 0.02
     assert_allclose(uc.Guided(drifting, GOAL, demonstrations=SHOWN, dt=100.0).dt_, 100.0)
     assert by_itself / 10 <= uc.Guided(drifting, GOAL, demonstrations=SHOWN, dt=by_itself / 10).dt_ < by_itself
 
@@ -211,7 +212,8 @@ def test_a_potential_is_convex_and_least_at_the_goal():
     assert potential(GOAL[None])[0] == 0.0
     middle = potential((STARTS[::2] + STARTS[1::2]) / 2)
     assert (middle <= (potential(STARTS[::2]) + potential(STARTS[1::2])) / 2).all()
-    assert (potential.weights >= 0).all()
+    assert (potential.weights < 0).any()
+    assert potential.bends()[1].min() > -1e-9
     assert (potential.offsets >= 0).all()
 
 

@@ -266,7 +266,12 @@ def test_a_fit_itself_says_how_its_policy_moves(folder, tmp_path):
     found = json.loads(run(*asked, "--json"))
     told = re.search(r"un from the same starts: size (\S+) times", found["verdict"]["said"])
     assert float(told[1]) == pytest.approx(found["replayed"]["extent"], abs=0.006)
-    assert f"size {told[1]} times, pace" in run("info", tmp_path / "p.npz")
+    assert re.fullmatch(r"size \S+ times \(\S+ to \S+\), pace .*times.* the demonstrated", found["ran"])
+    assert f"{found['ran']}, typically" in found["verdict"]["said"]  # ranges go with the policy, to info and to exports
+    notes = json.loads(run("info", tmp_path / "p.npz", "--json"))
+    assert notes["from the same starts"] == found["ran"]
+    run("export", tmp_path / "p.npz", "-o", tmp_path / "p.c")
+    assert found["ran"] in " ".join((tmp_path / "p.h").read_text("utf-8").replace(" * ", " ").split())
 
 
 def test_what_a_page_cannot_draw_together_is_refused(folder, tmp_path):

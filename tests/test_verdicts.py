@@ -172,5 +172,5 @@ def test_a_column_that_is_not_there_has_a_neighbour(asked, meant):
 
 
 def test_what_is_like_nothing_has_none():
-    with pytest.raises(InvalidDataError, match=r"no column 'force'; it has x, y\.$"):
+    with pytest.raises(InvalidDataError, match=r"no column 'force'; it has x, y\. Name those of this file"):
         Recording(("x", "y"), np.zeros((2, 2)), name="a").select(["force"])

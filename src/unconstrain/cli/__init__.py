@@ -44,7 +44,6 @@ from .printing import (
     option_for_json,
     print_table,
     refuse_warnings,
-    said_of_replays,
     say_fit,
     say_scale,
     say_surveys,
@@ -227,7 +226,7 @@ def fit(
         say_fit(fitted, stream, judged, learner, verbose)
     refuse_warnings(reading["strict"])
     notes = provenance(paths, stream.recipe, stream.first, **reading)
-    uc.save(fitted, output, notes | {TOLD: told, RAN: said_of_replays(judged.replayed)})
+    uc.save(fitted, output, notes | {TOLD: told, RAN: judged.ran or None})
     written = {"policy": output} | _reported(fitted, stream, report, Path(output).stem)
     say_written(written, judged.to_json() if as_json else None)
 

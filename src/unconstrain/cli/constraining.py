@@ -233,8 +233,11 @@ def said_elsewhere(notes: Mapping[str, Any], states: Any) -> str:
     """Of a constraint, that most states are farther from where it was learnt than that is wide; or nothing."""
     import numpy as np
 
-    low, high = np.array(notes.get(WHERE, (-np.inf, np.inf)))
-    off = np.median(np.maximum(low - states, states - high).max(axis=1))
+    try:
+        low, high = np.array(notes.get(WHERE, (-np.inf, np.inf)), dtype=float)
+        off = np.median(np.maximum(low - states, states - high).max(axis=1))
+    except (TypeError, ValueError, OverflowError):  # a note that somebody else has written
+        return ""
     far = off > np.linalg.norm(high - low)
     return f"it was learnt at states that are {off:.3g} away from these: is it of another task?" * bool(far)
 

@@ -150,6 +150,7 @@ class Judged(NamedTuple):
 
     verdict: uc.evaluation.verdicts.Verdict
     replayed: Mapping[str, float | None] | None
+    ran: str
     demonstrations: int
     samples: int
     training: float
@@ -172,21 +173,14 @@ def judge_fit(policy: uc.Policy, stream: uc.Stream, told: float | None, schedule
     if scheduler is not None:
         count = len(stream.paths)
         return Judged(
-            uc.evaluation.verdicts.of_explained(held_out, count, told), None, count, 0, float("nan"), held_out
+            uc.evaluation.verdicts.of_explained(held_out, count, told), None, "", count, 0, float("nan"), held_out
         )
     count, samples, missed = _walked(policy, stream)
     demos, open_ = stream.beginning(), told is not None and told < uc.evaluation.verdicts.MOSTLY
     there = _least_known(policy, demos, stream.recipe) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
     found = uc.evaluation.verdicts.of_explained(held_out, count, told, there=there)
     ran = replayed(found, policy, demos, stream.recipe, None, stream.first.units, free=False)
-    return Judged(ran.verdict, ran.medians, count, samples, 1.0 - missed, held_out)
-
-
-def said_of_replays(medians: Mapping[str, float | None] | None) -> str | None:
-    """Size and pace from the same starts, in words; None where they were not compared."""
-    told = {"size": (medians or {}).get("extent"), "pace": (medians or {}).get("pace")}
-    shown = ", ".join(f"{name} {ratio:.2f} times" for name, ratio in told.items() if ratio is not None)
-    return f"{shown} the demonstrated" if shown else None
+    return Judged(ran.verdict, ran.medians, ran.in_words, count, samples, 1.0 - missed, held_out)
 
 
 def _least_known(policy: uc.Policy, demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe) -> str:

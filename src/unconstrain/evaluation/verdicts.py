@@ -286,13 +286,11 @@ def of_replays(found: Verdict, extents: Array, paces: Array, apart: str) -> Verd
     ``apart`` is how far the runs stray. Half of them may be off by :data:`OTHERWISE` either way, whatever the mean is,
     and none by :data:`FAR_OFF`.
     """
-    measured = {"size": extents[np.isfinite(extents)], "pace": paces[np.isfinite(paces)]}
-    logs = {name: np.log(np.maximum(ratios, 1e-9)) for name, ratios in measured.items() if len(ratios)}
-    if not logs:
+    measured = _measured(extents, paces)
+    if not measured:
         return found
-    told = ", ".join(f"{name} {_times(np.exp(ratios))}" for name, ratios in logs.items())
-    ran = f"un from the same starts: {told} the demonstrated, typically {apart} away"
-    off = {name: np.abs(ratios) for name, ratios in logs.items()}
+    ran = f"un from the same starts: {size_and_pace(extents, paces)}, typically {apart} away"
+    off = {name: np.abs(np.log(np.maximum(ratios, 1e-9))) for name, ratios in measured.items()}
     strays = {
         name: int((many > np.log(OTHERWISE)).sum())
         for name, many in off.items()
@@ -303,6 +301,17 @@ def of_replays(found: Verdict, extents: Array, paces: Array, apart: str) -> Verd
     counted = ", ".join(f"{name} of {count} of {len(extents)}" for name, count in strays.items())
     which = f"; more than {OTHERWISE - 1:.0%} off: {counted}" if len(extents) > 1 else ""
     return _strays(found, f"r{ran}{which}", " and ".join(strays))
+
+
+def size_and_pace(extents: Array, paces: Array) -> str:
+    """Those of :func:`of_replays` in words: the middle ones, and their ranges."""
+    told = ", ".join(f"{name} {_times(ratios)}" for name, ratios in _measured(extents, paces).items())
+    return f"{told} the demonstrated" if told else ""
+
+
+def _measured(extents: Array, paces: Array) -> dict[str, Array]:
+    finite = {"size": extents[np.isfinite(extents)], "pace": paces[np.isfinite(paces)]}
+    return {name: ratios for name, ratios in finite.items() if len(ratios)}
 
 
 def _times(ratios: Array) -> str:

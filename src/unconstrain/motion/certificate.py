@@ -92,7 +92,8 @@ def _guided(policy: Guided, states: Array, normals: Array) -> Certificate:
 def _closed(policy: Guided) -> bool:
     """Whether V is convex and grows in every direction."""
     potential, n = policy.potential_, len(policy.goal_)
-    if (potential.weights < 0).any() or (potential.offsets < 0).any():
+    bends = potential.bends()[1]
+    if bends.min() < -1e-9 * bends.max() or (potential.offsets < 0).any():
         return False
     around = np.random.default_rng(0).standard_normal((1000 * n, n))
     return bool((potential.gradient(policy.goal_ + 1e6 * np.vstack([around, -around])) != 0.0).any(axis=1).all())

@@ -146,16 +146,18 @@ class Orbit(Shown):
     def single(self) -> Callable[[ArrayLike, Array], None]:
         """The same for one state (n,) and its velocity (n,), which is changed in place."""
         rows, floor, sums = self._rows()
-        shape, maximum = (3, len(self.turn)), np.maximum
+        n, maximum = len(self.turn), np.maximum
         slow, fast, level, rim = PULL * self.rate, RUSH * self.rate, self.radius**2, MIDDLE * self.radius
         rate, least, most = self.rate, 1.0 - STRAY, 1.0 + STRAY
 
         def guide(x: ArrayLike, wanted: Array) -> None:
             # Of few numbers Python's sums take less time than NumPy's, and comparisons less than calls of min and max.
-            v, seen = wanted.tolist(), maximum(rows.dot(x), floor).dot(sums).reshape(shape).tolist()
+            v, seen = wanted.tolist(), maximum(rows.dot(x), floor).dot(sums).tolist()
+            around, slope = seen[n : 2 * n], seen[2 * n :]
             gz = gw = gv = wv = gg = ww = 0.0
-            for z, w, g, u in zip(*seen, v, strict=True):
-                gz, gw, gv, wv, gg, ww = gz + g * z, gw + g * w, gv + g * u, wv + w * u, gg + g * g, ww + w * w
+            for z, w, g, u in zip(seen, around, slope, v):  # noqa: B905
+                gz, gw, gv = gz + g * z, gw + g * w, gv + g * u
+                wv, gg, ww = wv + w * u, gg + g * g, ww + w * w
             steep, width = sqrt(gg) or _TINY, MIDDLE * sqrt(gz) if gz > level else rim  # ∇Vᵀ z = 2 V
             off, speed, across = 0.5 * (gz - level) / (steep if steep > width else width), gv / steep, gw / steep  # noqa: FURB136
             low, high = (-fast * off, -slow * off) if off > 0.0 else (-slow * off, -fast * off)
@@ -166,7 +168,7 @@ class Orbit(Shown):
             kept = (least * pace if now < least * pace else most * pace if now > most * pace else now) - now  # noqa: FURB136
             way = kept / longest
             out, share = (radial - speed - way * across) / steep, steep / width if steep < width else 1.0
-            wanted[:] = [share * (a + way * b + out * c) for a, b, c in zip(v, *seen[1:], strict=True)]
+            wanted[:] = [share * (a + way * b + out * c) for a, b, c in zip(v, around, slope)]  # noqa: B905
 
         return guide
 

@@ -190,7 +190,7 @@ def _reproduced(policy: Policy, demos: list[Demonstration], names: Sequence[str]
     runs = {}
     for key, held in (("roll-out, free", None), ("roll-out, new plane", lambda states, _: _rows(normal, states))):
         try:
-            runs[key] = rollout(policy, demo.states[0], len(demo), step, held, least_support=0.0, method="rk4")
+            runs[key] = rollout(policy, demo.states[0], len(demo), step, held, least_support=0.0)
         except InvalidDataError:  # it runs away
             continue
     picture = _drawn([("observed", _thin(demo)), *runs.items()], names)

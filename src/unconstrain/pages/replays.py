@@ -43,11 +43,12 @@ class Replay(NamedTuple):
 
 
 class Replayed(NamedTuple):
-    """A verdict, medians over those whose constraint is known, None where there are none, and all that were run."""
+    """A verdict; of those whose constraint is known, medians, None if there are none, and words; all that were run."""
 
     verdict: verdicts.Verdict
     medians: dict[str, float | None] | None
     runs: Sequence[Replay] = ()
+    in_words: str = ""
 
 
 def replayed(
@@ -78,7 +79,8 @@ def replayed(
     measured = {"extent": extents, "pace": paces[np.isfinite(paces)], "apart": apart}
     medians = {name: float(np.median(values)) if len(values) else np.nan for name, values in measured.items()}
     told = {name: value if np.isfinite(value) else None for name, value in medians.items()}
-    return Replayed(verdicts.of_replays(found, extents, paces, said), told, runs)
+    judged = verdicts.of_replays(found, extents, paces, said)
+    return Replayed(judged, told, runs, verdicts.size_and_pace(extents, paces))
 
 
 def replays(
@@ -106,7 +108,7 @@ def replays(
     task = held.target if getattr(held, "task", False) else None
     starts, steps = np.array([one.states[0] for one in chosen]), round(max(lasted) / dt) + 1
     own = [partial(_same, rows) for rows, _ in shapes] if held is None else held
-    runs = rollout(policy, starts, steps, dt, own, task=task, least_support=0.0, method="rk4")
+    runs = rollout(policy, starts, steps, dt, own, task=task, least_support=0.0)
     cut = [run[: round(seconds / dt) + 1] for run, seconds in zip(runs, lasted, strict=True)]
     return [
         _compared(one, run, along, held is not None or bool(rows.any()))

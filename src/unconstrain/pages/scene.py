@@ -102,7 +102,7 @@ class Scene(NamedTuple):
             If the movement leaves the finite numbers.
         """
         policy: Any = self.policy
-        track = rollout(policy, start, steps, dt, held, least_support=0.0, method="rk4")
+        track = rollout(policy, start, steps, dt, held, least_support=0.0)
         try:
             support = policy.support(track.states)
         except SettingError:  # of a policy that has none
