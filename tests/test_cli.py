@@ -851,7 +851,8 @@ def test_an_empty_file_and_one_without_rows_are_refused(tmp_path):
 )
 def test_an_unknown_column_is_answered_with_those_there_are(files, tmp_path, option):
     said = refused("fit", *files, *option, "-o", tmp_path / "p.npz")
-    assert said == f"{files[0]} has no column 'z'; it has x, y, vx, vy."
+    cure = " Name those of this file with --state and --action, or all of its columns with --columns."
+    assert said == f"{files[0]} has no column 'z'; it has x, y, vx, vy.{cure * (option[1] == 'z')}"
 
 
 @pytest.mark.parametrize("option", ["--group", "--time"])

@@ -1,5 +1,6 @@
 """The quadratic of the softened hybrid, minimised among models that contract: the guarantee is in the learning."""
 
+import warnings
 from dataclasses import dataclass, replace
 from typing import Any, Literal, Self
 
@@ -130,7 +131,9 @@ class _Program:
         size = np.trace(curved) / len(curved) or 1.0
         root = np.linalg.cholesky(curved / size + RIDGE * np.eye(len(curved)), upper=True)
         self._root.value, self._target.value = root, np.linalg.solve(root.T, change.T @ linear / size)
-        self._problem.solve(solver="CLARABEL")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # that it is inaccurate: what counts is exact below
+            self._problem.solve(solver="CLARABEL")
         if self._found.value is None:
             raise InvalidDataError(f"no contracting policy was found (Clarabel: {self._problem.status}).")
         found = np.zeros((n, n + 1))
