@@ -129,7 +129,22 @@ def test_a_policy_without_support_is_judged_in_words(folder, tmp_path):
 
 
 def test_an_export_says_what_support_is_called(folder, tmp_path):
-    assert "wipe_support()" in " ".join(run("export", folder / "same.npz", "-o", tmp_path / "wipe.c").split())
+    said = " ".join(run("export", folder / "same.npz", "-o", tmp_path / "wipe.c").split())
+    assert "wipe_support()" in said
+    assert re.search(r"Run from the same starts: size \S+ times", said)  # the last word before a robot moves
+    assert "in metres" not in said
+
+
+def test_an_export_for_ros_says_how_messages_become_the_unit_of_the_policy(folder, tmp_path):
+    assert "in metres" not in run("export", folder / "same.npz", "--ros2", tmp_path / "known")
+    assert "scale: 1000.0" in (tmp_path / "known" / "config" / "known.yaml").read_text("utf-8")
+    table = (folder / "same_10.csv").read_text("utf-8").replace(" [mm]", "")
+    (tmp_path / "plain.csv").write_text(table, "utf-8")
+    columns = ("--state", "x,y,z", "--differentiate", "--learner", "hybrid")
+    run("fit", tmp_path / "plain.csv", *columns, "-o", tmp_path / "plain.npz")
+    said = " ".join(run("export", tmp_path / "plain.npz", "--ros2", tmp_path / "wipe").split())
+    assert "messages are in metres or radians" in said
+    assert "scale: 1.0" in (tmp_path / "wipe" / "config" / "wipe.yaml").read_text("utf-8")
 
 
 def test_strokes_that_are_too_large_are_not_outweighed_by_others_that_are_too_small():
@@ -150,6 +165,11 @@ def test_one_that_is_another_movement_is_said_whatever_the_others_do():
     assert (found.mark, found.doubt) == (Mark.DOUBTFUL, "Its size over time.")
     assert "more than 20% off: size of 1 of 5." in found.said
     assert added([1.0, 1.0, 1.0, 1.0, 1.3]).mark is Mark.GOOD  # as people vary
+
+
+def test_sizes_that_are_no_movement_of_the_same_unit_are_called_so():
+    assert added([400.0, 410.0]).next.startswith("Compare units")
+    assert not added([4.0, 4.1]).next.startswith("Compare units")
 
 
 def test_what_is_poor_anyway_is_not_excepted_by_but():
@@ -258,6 +278,8 @@ def test_a_policy_of_some_strokes_says_of_which(folder, tmp_path):
     assert json.loads(run("info", tmp_path / "p.npz", "--json"))["learnt from"] == ["held_3", "held_4"]
     said = run("look", *files, tmp_path / "p.npz", "-o", tmp_path / "look.html")
     assert "policy: learnt from 2 of these 3 demonstrations, held_3, held_4." in said
+    said = run("look", files[2], tmp_path / "p.npz", "-o", tmp_path / "other.html")
+    assert "policy: learnt from none of these 1 demonstration." in said
 
 
 def test_a_fit_itself_says_how_its_policy_moves(folder, tmp_path):

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import click
 
 import unconstrain as uc
 
 from ..base.errors import SettingError
-from .informing import verdict_of
+from .informing import RAN, verdict_of
 from .printing import option_for_json, say_verdict, say_written
 from .reading import fitted_policy
 from .writing import check_outputs, option_for_force
@@ -29,6 +29,9 @@ _NEXT_C = "Stop the robot where {name}_support() is near 0. "
 _NEXT_C += "Let it test itself where it will run: cc -std=c99 -D{NAME}_SELF_TEST {file} -lm -o test && ./test"
 _NEXT_ONNX = "Run it on a recorded state, and compare with 'policy.predict'."
 _NEXT_ROS2 = "colcon build, then colcon test; let it run with the robot held still first."
+
+_UNIT = " Units: messages are in metres or radians, and 'scale' in {}/config makes them the policy's: 1.0 as written, "
+_UNIT += "1000.0 for millimetres."
 
 TARGETS = {
     ".c": Target("C source", "export_c", ("name", "single", "notes"), _NEXT_C),
@@ -81,12 +84,20 @@ def export(
         written[target.what] = output
     if header is not None:
         written["header"] = header
-    judged = verdict_of(learnt, notes)
-    far = "States far from all data, where its support is near 0."
-    judged = judged._replace(doubt=f"{far} {judged.doubt}".rstrip(), next=then)
+    judged = _judged(learnt, notes, ros2)._replace(next=then)
     if not as_json:
         say_verdict(judged)
     say_written(written, {"verdict": judged.to_json()} if as_json else None)
+
+
+def _judged(learnt: Any, notes: dict[str, Any], ros2: str | None) -> uc.evaluation.verdicts.Verdict:
+    """Of a policy that goes to a robot, also how it moved, and in which unit where nobody has said it."""
+    judged, ran, units = verdict_of(learnt, notes), notes.get(RAN), notes.get("units", {})
+    said = f"{judged.said} Run from the same starts: {ran}." if isinstance(ran, str) else judged.said
+    of_states = {units.get(name) for name in uc.Recipe.from_dict(notes.get("recipe", {})).states or ("",)}
+    unit = "" if ros2 is None or of_states in ({"mm"}, {"m"}, {"rad"}) else _UNIT.format(ros2)
+    far = "States far from all data, where its support is near 0."
+    return judged._replace(said=said, doubt=f"{far}{unit} {judged.doubt}".rstrip())
 
 
 def _check(output: str | None, kind: str, ros2: str | None, name: str | None, single: bool) -> None:

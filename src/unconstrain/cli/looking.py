@@ -163,7 +163,8 @@ def _about(seen: Seen) -> Iterator[str]:
     if seen.policy is not None:
         known = learnt_from(seen.policy, seen.notes, seen.recordings)
         if known is not None and len(known) < count:
-            yield f"policy: learnt from {len(known)} of these {counted(count, 'demonstration')}, {listed(known, 4)}."
+            named = f", {listed(known, 4)}" if known else ""
+            yield f"policy: learnt from {len(known) or 'none'} of these {counted(count, 'demonstration')}{named}."
         yield _open(seen.policy, seen.demonstrations)
     if seen.constraint is not None and len(seen.held) < count:
         of = listed(seen.notes[OF], 4)

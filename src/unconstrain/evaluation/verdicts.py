@@ -41,6 +41,9 @@ OTHERWISE = 1.2
 FAR_OFF = 1.5
 """Those of a single roll-out from which on not even the others speak for the policy."""
 
+OTHER_UNIT = 30.0
+"""Median size over that demonstrated, or the inverse, from which on units are likely to differ."""
+
 SMALL = 0.1
 """An undetermined spread below this share of the typical action is negligible."""
 
@@ -300,7 +303,10 @@ def of_replays(found: Verdict, extents: Array, paces: Array, apart: str) -> Verd
         return found._replace(said=f"{found.said} R{ran}.")
     counted = ", ".join(f"{name} of {count} of {len(extents)}" for name, count in strays.items())
     which = f"; more than {OTHERWISE - 1:.0%} off: {counted}" if len(extents) > 1 else ""
-    return _strays(found, f"r{ran}{which}", " and ".join(strays))
+    judged = _strays(found, f"r{ran}{which}", " and ".join(strays))
+    if np.median(off.get("size", 0.0)) > np.log(OTHER_UNIT):
+        return judged._replace(next="Compare units: recordings look as if in another one than the policy's.")
+    return judged
 
 
 def size_and_pace(extents: Array, paces: Array) -> str:
@@ -330,8 +336,8 @@ def _strays(found: Verdict, how: str, what: str) -> Verdict:
         mark=Mark.BAD if found.mark is Mark.BAD else Mark.DOUBTFUL,
         said=f"{found.said} {'But' if found.mark is Mark.GOOD else 'And'} {how}.",
         doubt=f"Its {what} over time. {found.doubt}".rstrip(),
-        next="Look at it ('unconstrain look'). In Python, uc.Guided keeps it to the goal or the cycle that was shown; "
-        "more demonstrations, or another --model, may come nearer.",
+        next="Look at it ('unconstrain look'). More demonstrations may come nearer, or another --model: 'auto' tries "
+        "several. In Python, uc.Guided keeps it to the goal or the cycle that was shown.",
     )
 
 
