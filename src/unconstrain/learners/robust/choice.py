@@ -42,9 +42,9 @@ consistent as the best of the others, and is compared no more.
 Residuals have the variance ``‖π‖² (σ² / ‖u‖² + κ²)`` under any constraint:
 noise of variance σ² turns the direction of a slow action, and people vary by
 a factor of standard deviation κ. Samples are weighted by its inverse up to
-‖π‖², so that the weight saturates at ``‖u‖ = σ / κ``, and by ``(1 + h)⁻⁴``
-with the leverage h of a held-out state, ``1 + h`` being the factor of the
-variance of its residual: what is far from all other demonstrations is
+‖π‖², so that the weight saturates at ``‖u‖ = σ / κ``, and by ``(1 + h)⁻²``
+with the leverage h of a held-out state, the inverse of the factor of the
+variance of its squared residual: what is far from all other demonstrations is
 extrapolated when it is held out, and no longer when all are learnt from.
 """
 
