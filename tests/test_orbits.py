@@ -7,8 +7,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 import unconstrain as uc
 from unconstrain.base.errors import SettingError
 from unconstrain.constraints.known import Plane
-from unconstrain.motion.descent import Descent
-from unconstrain.motion.orbit import Orbit
 from unconstrain.paper.experiments.arrival.cycles import measured
 
 MIDDLE = np.array([0.2, -0.1, 0.3])
@@ -46,13 +44,6 @@ STARTS += MIDDLE - NORMALS * (np.vecdot(NORMALS, STARTS) - RNG.uniform(-0.05, 0.
 @pytest.fixture(scope="module")
 def guided():
     return uc.Guided(steady, demonstrations=SHOWN)
-
-
-def test_some_that_were_slow_where_they_stopped_are_no_goal_of_cycles():
-    slow = [uc.Demonstration(d.states, d.actions * np.linspace(1.0, 0.1, len(d))[:, None], d.times) for d in SHOWN]
-    assert isinstance(uc.Guided(steady, demonstrations=[*slow[:4], *SHOWN[4:]]).aim_, Orbit)
-    ended = [uc.Demonstration(d.states - d.states[-1], d.actions, d.times) for d in slow]
-    assert isinstance(uc.Guided(steady, demonstrations=ended).aim_, Descent)  # all end at rest, in one place
 
 
 def off(guided, states):

@@ -274,8 +274,8 @@ def _kept(policy: Any) -> list[Demonstration]:
 
 
 def _repeat(demos: Sequence[Demonstration]) -> bool:
-    """Whether demonstrations go round, and some of them do not end at rest: the others were slow where they stopped."""
-    return not all(map(_rests, demos)) and turns(demos) >= _ROUND
+    """Whether demonstrations go round, and do not end at rest."""
+    return not any(map(_rests, demos)) and turns(demos) >= _ROUND
 
 
 def _rests(demo: Demonstration) -> bool:
