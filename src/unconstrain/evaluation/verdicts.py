@@ -191,10 +191,8 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
     words = {"good": "enough", "fair": "enough in most places", "poor": "not enough"}
     said = f"At {share:.0%} of the recorded states three demonstrations or more tell the policy: {words[word]}."
     if mark is Mark.BAD and found.told_together >= PARTLY:
-        mark, said = (
-            Mark.DOUBTFUL,
-            f"Demonstrations tell the policy at {found.told_together:.0%} of the recorded states, ",
-        )
+        mark = Mark.DOUBTFUL
+        said = f"Demonstrations tell the policy at {found.told_together:.0%} of the recorded states, "
         said += f"but at {share:.0%} whichever two are left out: it may hang on one or two."
     if found.noise_share > 3 * SMALL:
         mark = Mark.BAD if mark is Mark.BAD else Mark.DOUBTFUL

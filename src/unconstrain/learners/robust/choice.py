@@ -35,17 +35,16 @@ shows no bias of k: consistency is what it was learnt by, so it fits chance.
 Nor does one whose own variance is many times the motion: where nothing was
 constrained, hard hybrids follow rounding. One whose variance is many times
 what k misses along the actions shows k's bias only if it is the more
-consistent, and one whose variance is more than the motion only if it is so by
-more than a negligible share of the motion. Whoever knows the Jacobian is a candidate only if it is as
+consistent. Whoever knows the Jacobian is a candidate only if it is as
 consistent as the best of the others, and is compared no more.
 
 Residuals have the variance ``‖π‖² (σ² / ‖u‖² + κ²)`` under any constraint:
 noise of variance σ² turns the direction of a slow action, and people vary by
 a factor of standard deviation κ. Samples are weighted by its inverse up to
-‖π‖², so that the weight saturates at ``‖u‖ = σ / κ``, and by ``(1 + h)⁻²``
-with the leverage h of a held-out state, the inverse of the factor of the
-variance of its squared residual: what is far from all other demonstrations is
-extrapolated when it is held out, and no longer when all are learnt from.
+‖π‖², so that the weight saturates at ``‖u‖ = σ / κ``, and by the inverse of
+``1 + h`` with the leverage h of a held-out state, which is the factor of its
+variance from estimating the weights: predictions far from all other
+demonstrations say little.
 """
 
 from __future__ import annotations
@@ -67,7 +66,6 @@ from .constants import (
     COMPARED_STATES,
     LEAST_DEMONSTRATIONS,
     LEAST_MISFIT,
-    LEVERAGE_POWER,
     MOST_VARIANCE,
     MOST_VARIANCE_TO_LOSS,
     NEGLIGIBLE_LOSS,
@@ -173,12 +171,7 @@ class Comparison:
     def _reliable(self) -> Array:
         """Weight of each sample, (N,)."""
         noise = self._noise / (self._variation * self._squares)
-        return np.asarray(self._samples.counts * self._reached / (1.0 + noise))
-
-    @cached_property
-    def _reached(self) -> Array:
-        """Weight of each sample by how near other demonstrations come to its state, (N,)."""
-        return np.asarray((1.0 + self._leverage) ** -LEVERAGE_POWER)
+        return np.asarray(self._samples.counts / (1.0 + self._leverage) / (1.0 + noise))
 
     @cached_property
     def _corrected_losses(self) -> Array:
@@ -242,10 +235,8 @@ class Comparison:
         Whoever knows more of the constraints than the second was compared before, see :attr:`as_consistent`.
         """
         mine, its = self._candidates[one].softness, self._candidates[other].softness
-        unit, (loss, least) = self._samples.energy, self._losses[[other, one]].sum(axis=1)
-        most = MOST_VARIANCE_TO_LOSS * loss
-        if self._refuted[other, one]:
-            most = (MOST_VARIANCE if loss - least > NEGLIGIBLE_LOSS * unit else 1.0) * unit
+        more_consistent, loss = self._refuted[other, one], self._losses[other].sum()
+        most = MOST_VARIANCE * self._samples.energy if more_consistent else MOST_VARIANCE_TO_LOSS * loss
         stable = bool(self._variance[one] < most)
         return mine < 0.0 <= its or ((mine < its or mine == its <= 0.0) and stable and not self._refuted[one, other])
 
@@ -272,7 +263,7 @@ class Comparison:
 
     def _hidden(self, predictions: Array) -> Array:
         """Weighted component of predictions (..., n, d) in the directions that motion does not show."""
-        seen, weights = self._seen[self._places], self._reached[self._places]
+        seen, weights = self._seen[self._places], 1.0 / (1.0 + self._leverage[self._places])
         hidden = predictions - (seen @ predictions[..., None])[..., 0]
         return np.asarray(np.sqrt(weights / weights.sum())[:, None] * hidden)
 

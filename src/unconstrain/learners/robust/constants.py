@@ -149,18 +149,6 @@ MOST_VARIANCE = 20.0
 On 229 data sets of 59 kinds, among them what nothing constrains, without noise, the geometric mean of the squared
 error over that of the best candidate was 1.26 without, 1.18 with 20 and with 10, and the worst 140,000 and 10; the arm
 with six rows held is worse with 10. All with a distance of more than its variance, which without it are 1.21 with 20.
-Candidates that are more consistent by less than :data:`NEGLIGIBLE_LOSS`: once the mean squared action. With 20 one of
-eight free pendulums without noise was learnt by a candidate of 19,000 times the least error, with 0.1 and 1 by none.
-"""
-
-LEVERAGE_POWER = 2.0
-"""Held-out states count by this power of the inverse of one plus their leverage, that of the variance of their squares.
-
-With 1, 2, 4, 8 and 16 the error over that of the best candidate was 1.33, 1.27, 1.25, 1.24 and 1.24 on 144 data sets of
-the plane without noise, 1.088, 1.090, 1.079, 1.075 and 1.075 with 5 % noise, the same on twelve of the arm, and 1.165,
-1.161, 1.156 and 1.153 with 1, 2, 4 and 8 on 224 recorded movements and others, at worst 11.9, 8.8, 7.1 and 7.1.
-On 480 of the latter it was 1.149, 1.150 and 1.137 with 1, 2 and 4, but with 4 recorded wiping was learnt worse than by
-direct regression. To leave out the quarter of highest leverage is worse where all states are reached.
 """
 
 MOST_VARIANCE_TO_LOSS = 30.0
