@@ -1,5 +1,7 @@
 """The experiment of motion that arrives."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -37,6 +39,15 @@ def test_it_has_sentences_and_a_page_with_a_picture_of_every_shape(small):
     assert ">Line<" in page
     assert "Narrow hairpins" in page
     assert "LPV-DS (Figueroa and Billard 2018)" in page
+
+
+@needs_data
+def test_where_nothing_arrives_it_is_told_without_an_area(small):
+    none = [{**row, "area": None, "dtw": None} for row in small.rows]
+    ways = [{**row, "area": None} if row["way"] == "guided" else row for row in small.tables["ways"]]
+    said = arrival.headlines(replace(small, rows=none, tables={**small.tables, "ways": ways}))
+    assert any(line.startswith("area between path and stroke: nan mm²") for line in said)
+    assert any(line.startswith("guided paths sweep nan times the area of LPV-DS ones") for line in said)
 
 
 @needs_data

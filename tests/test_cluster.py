@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 from dask import array
 from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.base import clone
 
 import unconstrain as uc
 from samples import draw
@@ -68,6 +69,13 @@ def test_chunks_of_dask_are_the_same_as_one_array(kind, rows):
     same(found, serial)
 
 
+def test_widths_are_chosen_on_the_samples_that_one_process_chooses_on():
+    few, auto = (DATA.states[:120], DATA.actions[:120]), uc.LocallyLinearPolicy("auto", learner="hybrid")
+    serial, parallel = clone(auto).fit(*few), cluster.fit(auto, *chunked(15, *few))
+    assert serial.fields_.variance < uc.LocallyLinearPolicy(learner="hybrid").fit(*few).fields_.variance
+    same(parallel, serial)
+
+
 def test_it_learns_on_where_the_cluster_ended():
     policy = cluster.fit(uc.ParametricPolicy(uc.Affine(), uc.Hybrid()), *chunked(50, DATA.states, DATA.actions))
     policy.partial_fit(DATA.states[:10], DATA.actions[:10])
@@ -92,7 +100,7 @@ class Slow:
         self.number, self.folder = number, folder
 
     def __iter__(self):
-        (self.folder / f"{os.getpid()}").touch()
+        (self.folder / f"{os.getpid()} {self.number}").touch()
         time.sleep(0.1)
         rows = slice(50 * self.number, 50 * (self.number + 1))
         yield DATA.states[rows], DATA.actions[rows], None, DATA.groups[rows]
@@ -104,12 +112,19 @@ def test_a_worker_that_is_killed_half_way_changes_nothing(workers, tmp_path):
 
     killed = []
 
+    def read():
+        """Parts that each process has begun to read."""
+        parts = {}
+        for pid, part in (path.name.split() for path in tmp_path.iterdir()):
+            parts.setdefault(pid, set()).add(part)
+        return parts
+
     def kill():
         for _ in range(600):
-            pids = [int(path.name) for path in tmp_path.iterdir()]
+            pids = list(read())
             if len(pids) == 2:
                 time.sleep(0.25)
-                os.kill(pids[0], signal.SIGKILL)
+                os.kill(int(pids[0]), signal.SIGKILL)
                 killed.append(pids[0])
                 return
             time.sleep(0.02)
@@ -119,8 +134,8 @@ def test_a_worker_that_is_killed_half_way_changes_nothing(workers, tmp_path):
     parts = [Slow(number, tmp_path) for number in range(12)]
     parallel = cluster.fit_batches(POLICIES["kmeans"](), parts, client=workers)
     killer.join()
-    assert killed
-    assert len({path.name for path in tmp_path.iterdir()}) > 2, "another process took over"
+    [dead], parts = killed, read()
+    assert parts.pop(dead) & set().union(*parts.values()), "another process took over"
     same(parallel, serial)
 
 

@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import unconstrain as uc
 from unconstrain.base.errors import SettingError
 from unconstrain.constraints.known import Plane
+from unconstrain.motion.orbit import Orbit
 from unconstrain.paper.experiments.arrival.cycles import measured
 
 MIDDLE = np.array([0.2, -0.1, 0.3])
@@ -88,6 +89,17 @@ def test_a_policy_that_stands_still_or_turns_back_is_turned_round():
         velocities = guided(SHOWN[0].states)
         along = np.vecdot(velocities, SHOWN[0].actions) / (SHOWN[0].actions ** 2).sum(axis=1)
         assert along.min() > 0.7
+
+
+def test_strokes_that_go_round_have_a_goal_only_where_most_of_them_come_to_rest():
+    def stopped(demo):
+        slower = np.minimum(1.0, np.arange(len(demo))[::-1] / (len(demo) // 10))[:, None]
+        return uc.Demonstration(demo.states, slower * demo.actions, demo.times)
+
+    halves = [stopped(SHOWN[0]), stopped(SHOWN[0]), SHOWN[0], SHOWN[0]]
+    assert isinstance(uc.Guided(steady, demonstrations=halves).aim_, Orbit)
+    most = [*halves[:3], stopped(SHOWN[0])]
+    assert_allclose(uc.Guided(steady, demonstrations=most).goal_, SHOWN[0].states[-1], atol=1e-9)
 
 
 def test_where_a_plane_misses_the_cycle_the_nearest_place_is_reached(guided):

@@ -18,7 +18,7 @@ from .reading import numbers, recordings_of
 CENTRES = 25
 
 MODELS: dict[str, Callable[..., uc.Policy]] = {
-    "local": lambda variance=None, **chosen: uc.LocallyLinearPolicy(variance, **chosen),
+    "local": lambda variance="auto", **chosen: uc.LocallyLinearPolicy(variance, **chosen),
     "rbf": lambda centres=CENTRES, **chosen: uc.ParametricPolicy(uc.KMeansRBF(centres), **chosen),
     "auto": lambda **chosen: uc.ParametricPolicy("auto", **chosen),
     "affine": lambda **chosen: uc.ParametricPolicy(uc.Affine(), **chosen),
@@ -36,7 +36,7 @@ def options_for_model(command: Callable[..., Any]) -> Callable[..., Any]:
     command = click.option("--scale", type=scale_of, default="none", metavar=metavar, help=scale, callback=_levelled)(
         command
     )
-    variance = "Local: σ² of the receptive fields, squared unit of the states; by default from the data."
+    variance = "Local: σ² of the receptive fields, squared unit of the states; by default the best of five widths."
     command = click.option("--centres", type=click.IntRange(1), help=f"RBF: number of kernels; {CENTRES} by default.")(
         command
     )

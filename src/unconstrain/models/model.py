@@ -116,7 +116,7 @@ class Model(Shown):
         widest, found = choose_variance(coordinates, at_least), dict[str, Self]()
         for share in NARROWER:
             one = cls.local(coordinates, widest / share, at_least, centres, embedding)
-            if found and len(one.shares(coordinates[:1])[0]) > MOST_FIELDS:
+            if found and one.fields.shares(coordinates[:1]).shape[1] > MOST_FIELDS:
                 break
             found[f"1/{share}"] = one
         return found

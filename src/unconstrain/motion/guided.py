@@ -84,10 +84,10 @@ class Guided(Exportable, Shown):
     policy : callable
         States (N, n) to velocities (N, n).
     goal : array_like, shape (n,), optional
-        By default where the demonstrations end at rest.
+        By default where the demonstrations end at rest, if most do or they do not go round.
     orbit : array_like, shape (T, n), or "shown", optional
         States on the cycle, all around it; "shown" are those of the demonstrations, from which it is found by default
-        where they do not end at rest but go round.
+        where they go round and most do not end at rest.
     demonstrations : Demonstration or sequence of Demonstration, optional
         Movements that are likely, on which the correction is to be small. By default those that the policy has kept.
     dt : float, optional
@@ -274,8 +274,8 @@ def _kept(policy: Any) -> list[Demonstration]:
 
 
 def _repeat(demos: Sequence[Demonstration]) -> bool:
-    """Whether demonstrations go round, and do not end at rest."""
-    return not any(map(_rests, demos)) and turns(demos) >= _ROUND
+    """Whether demonstrations go round, and most do not end at rest."""
+    return 2 * sum(map(_rests, demos)) <= len(demos) and turns(demos) >= _ROUND
 
 
 def _rests(demo: Demonstration) -> bool:

@@ -172,7 +172,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         draft = self._draft(*_FITTED)
         seen = summed(partial(_seen, draft), parts)
         draft.__dict__.update(seen.noted)
-        again = copy(draft)._each_checked(parts[0], reset=False) if together else None
+        again = cluster.openings(partial(_opened, draft), parts, summed)
         draft._began(seen.look and seen.look.placed, learner, more=False, together=together, seen=again)
         draft.training_ = summed(partial(_gathered, draft), parts)
         return self._become(draft._solved(learner))
@@ -401,7 +401,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         *,
         more: bool,
         together: bool = True,
-        seen: Iterable[Batch] | None = None,
+        seen: Iterable[Batch],
     ) -> Self:
         """Choose all that has to be chosen before the first sample is summed, in one place or in several."""
         if look is None:
@@ -470,6 +470,10 @@ def _seen(draft: Policy, part: Iterable[Sequence[Any]]) -> Seen:
     mine = copy(draft)
     look = FirstLook.total(FirstLook.at(batch, mine._space) for batch in mine._each_checked(part))
     return Seen(look, {name: value for name, value in vars(mine).items() if name not in vars(draft)})
+
+
+def _opened(draft: Policy, part: Iterable[Sequence[Any]]) -> list[Batch]:
+    return list(Training.opening(copy(draft)._each_checked(part, reset=False)))
 
 
 def _gathered(draft: Policy, part: Iterable[Sequence[Any]]) -> Training:

@@ -111,6 +111,16 @@ def fit_batches(policy: P, parts: Sequence[Any], *, client: Any | None = None) -
     return policy.fit_parts([delayed(part, traverse=False) for part in parts], partial(_summed, client))
 
 
+def openings(
+    opened: Callable[[Any], list[Batch]], parts: Sequence[Any], summed: Callable[..., list[Batch]]
+) -> Iterator[Batch]:
+    """The first batches of each part in their order, fetched when needed, of twice as many parts each time."""
+    start, count = 0, 1
+    while start < len(parts):
+        yield from summed(opened, parts[start : start + count])
+        start, count = start + count, 2 * count
+
+
 def check_learner(learner: Any) -> None:
     """Refuse a learner that needs the samples, by a SettingError."""
     if getattr(learner, "needs_samples", False):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
@@ -97,6 +97,16 @@ class Training(Shown):
         at_rest = AT_REST * (look.fastest / units[0])
         longest = np.inf if more else longest_plausible(look.lengths)
         return cls(model, look.actions, split, at_rest, nothing, None, *units, longest).keeping(most)
+
+    @classmethod
+    def opening(cls, batches: Iterable[Batch]) -> Iterator[Batch]:
+        """The first of some batches, of about as many samples as are kept."""
+        room = cls.MOST_KEPT
+        for batch in batches:
+            yield batch
+            room -= batch.states.shape[0]
+            if room <= 0:
+                return
 
     def keeping(self, most: int | None) -> Training:
         """The same with samples kept from now on, as in :meth:`begin`."""

@@ -2,7 +2,7 @@
 
 import warnings
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal, Self
 
@@ -321,7 +321,7 @@ class Robust(_Maximising):
         beside = Comparison([found.best, *held], found.noise, samples).as_consistent if held else []
         return Comparison([*learnt, *beside], found.noise, samples) if beside else found
 
-    def suited(self, begun: Mapping[str, Training], seen: Iterable[Batch] | None) -> str:
+    def suited(self, begun: Mapping[str, Training], seen: Iterable[Batch]) -> str:
         """The name of the model in which the policy of least estimated error is learnt.
 
         Candidates are the best of each model, by the rule of :mod:`.choice`, which takes them for equally biased
@@ -331,20 +331,10 @@ class Robust(_Maximising):
         ----------
         begun : mapping
             Training in each model, by name, with nothing seen.
-        seen : iterable of Batch, optional
+        seen : iterable of Batch
             What to learn from; about the first 50,000 samples of it are looked at.
-
-        Raises
-        ------
-        SettingError
-            If nothing was seen.
         """
-        if seen is None:
-            raise SettingError(
-                "features, variance: 'auto' looks at the samples themselves, which stay where they are on a cluster. "
-                "Fit a part with fit(...) first, and take its features_ or fields_.variance."
-            )
-        first = list(_first(seen))
+        first = list(Training.opening(seen))
         keeping = {name: one.keeping(Training.MOST_KEPT) for name, one in begun.items()}
         trainings = {name: one.with_batches(first) for name, one in keeping.items()}
         samples = {name: held_out_together(one.samples.counted) for name, one in trainings.items()}
@@ -356,16 +346,6 @@ class Robust(_Maximising):
         least = min(one.variance for one in best.values())
         alike = [replace(one, name=name, softness=0.0) for name, one in best.items()]
         return Comparison(alike, np.minimum(noise, least), list(samples.values())).best.name
-
-
-def _first(batches: Iterable[Batch]) -> Iterator[Batch]:
-    """Batches up to the number of samples that may be kept."""
-    room = Training.MOST_KEPT
-    for batch in batches:
-        yield batch
-        room -= batch.states.shape[0]
-        if room <= 0:
-            return
 
 
 def _thinned(training: Training) -> tuple[str, ...]:

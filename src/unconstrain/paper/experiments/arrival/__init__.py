@@ -140,7 +140,7 @@ def headlines(result: Result) -> list[str]:
 
 def _of_shapes(rows: Sequence[Row], prices: Sequence[Row]) -> list[str]:
     def mean(key: str) -> float:
-        return float(np.mean([row[key] for row in rows]))
+        return float(np.mean([row[key] for row in rows if row[key] is not None] or [np.nan]))
 
     worst = max(rows, key=lambda row: row["nupe_ratio"])
     ratios = [row["area_ratio"] for row in rows if row["area_ratio"] is not None]
@@ -172,7 +172,7 @@ def by_way(rows: Sequence[Row]) -> dict[str, dict[str, float | None]]:
 
 def _beside(rows: Sequence[Row]) -> list[str]:
     """Guided beside what else arrives."""
-    areas = {way: np.array([row["area"] for row in rows if row["way"] == way]) for way in ("guided", *OTHERS)}
+    areas = {way: np.array([row["area"] for row in rows if row["way"] == way], float) for way in ("guided", *OTHERS)}
     said = []
     for way, name in OTHERS.items():
         ratios = areas["guided"] / areas[way]
