@@ -427,6 +427,20 @@ def test_settings_reach_the_policy(files, tmp_path):
     assert (found.features, found.learner) == (uc.KMeansRBF(9), uc.Hybrid(softness=0.1, threshold=0.0))
 
 
+def test_the_width_of_the_local_models_is_chosen_and_told(tmp_path):
+    spots = np.random.default_rng(0).uniform(-1.0, 1.0, (4, 40, 2))
+    for number, xy in enumerate(spots):
+        rows = np.column_stack([xy, np.sin(6.0 * xy)])
+        np.savetxt(tmp_path / f"{number}.csv", rows, delimiter=",", header="x,y,u,v", comments="")
+    columns = (*sorted(tmp_path.glob("*.csv")), "--state", "x,y", "--action", "u,v")
+    said = run("fit", *columns, "-o", tmp_path / "p.npz")
+    found, widest = storage.load(tmp_path / "p.npz").fields_, uc.LocallyLinearPolicy(learner="direct")
+    states, actions = np.concatenate(spots), np.sin(6.0 * np.concatenate(spots))
+    assert found.variance < widest.fit(states, actions).fields_.variance
+    assert f"local models of σ² {found.variance:.4g}" in said
+    assert f"local models of σ² {found.variance:.4g}" in run("info", tmp_path / "p.npz")
+
+
 def test_a_pattern_is_expanded_where_the_shell_did_not(folder, tmp_path):
     assert "8 demonstrations" in run("fit", folder / "swing_?.csv", "--model", "linear", "-o", tmp_path / "p.npz")
 

@@ -169,12 +169,12 @@ def test_commands_and_pages_say_the_same_share_of_the_same_files(browser, tmp_pa
     for k, table in enumerate(bent()):
         np.savetxt(tmp_path / f"{k}.csv", table, delimiter=",", header="t,x,y,z", comments="")
     files = sorted(tmp_path.glob("?.csv"))
-    run("fit", *files, "--state", "x,y,z", "--differentiate", "-o", tmp_path / "p.npz")
+    model = ("--variance", 0.12)  # in narrower fields no state of most of a movement is told
+    run("fit", *files, "--state", "x,y,z", "--differentiate", *model, "-o", tmp_path / "p.npz")
     looked = call("look", *files, tmp_path / "p.npz", "-o", tmp_path / "look.html").out
     share = re.search(r"at (\d+%) of the recorded states no recording tells the policy", " ".join(looked.split()))[1]
-    determined = json.loads(run("diagnose", *files, "--state", "x,y,z", "--differentiate", "--json"))[
-        "states_determined"
-    ]
+    diagnosed = run("diagnose", *files, "--state", "x,y,z", "--differentiate", *model, "--json")
+    determined = json.loads(diagnosed)["states_determined"]
     assert share == f"{1 - determined:.0%}"
     for told in (run("info", tmp_path / "p.npz"), run("export", tmp_path / "p.npz", "-o", tmp_path / "p.c")):
         assert f"at {share} of the recorded states no recording tells the policy" in " ".join(told.split())

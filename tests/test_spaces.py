@@ -375,6 +375,12 @@ def test_features_of_an_angle_see_its_cosine_and_sine(features, count):
     assert_allclose(policy.predict(states + 2 * np.pi * SHIFT), policy.predict(states), atol=1e-9)
 
 
+def test_widths_are_chosen_where_states_are_angles():
+    policy = uc.LocallyLinearPolicy("auto", learner="hybrid").fit_demonstrations(held("angle", 11)[:3])
+    states = drawn(Circle() * Euclidean(2), 100)
+    assert_allclose(policy.predict(states + 2 * np.pi * SHIFT), policy.predict(states), atol=1e-9)
+
+
 # In motion
 
 

@@ -13,7 +13,7 @@ import click
 
 import unconstrain as uc
 
-from .printing import print_table, say_verdict
+from .printing import models_of, print_table, say_verdict
 from .reading import innermost, loaded, reading_of
 
 TOLD = "determined share of states"
@@ -111,7 +111,7 @@ def _of(held: Any) -> dict[str, Any]:
         "learner": type(policy.learner).__name__ if not isinstance(policy.learner, str) else policy.learner,
         "learnt as": solution.method,
         "learnt as, in words": uc.evaluation.diagnosis.in_words(solution.method) or None,
-        "model": f"{len(solution.weights)} local models" if len(solution.weights) > 1 else str(policy.features_),
+        "model": models_of(policy),
         "explained held out": None if (share := policy.held_out_score()) != share else round(share, 4),
         "noise": None if solution.belief is None else solution.noise,
         "guided": held.aim_.promise if isinstance(held, uc.Guided) else None,

@@ -195,10 +195,17 @@ def _least_known(policy: uc.Policy, demonstrations: Sequence[uc.Demonstration], 
     return f"{least} All such places:\n{next_command('diagnose')}"
 
 
+def models_of(policy: uc.Policy) -> str:
+    """Number and width of the local models, or the features of the one."""
+    if isinstance(policy, uc.LocallyLinearPolicy) and len(policy.solution_.weights) > 1:
+        return f"{len(policy.solution_.weights)} local models of σ² {policy.fields_.variance:.4g}"
+    return str(policy.features_)
+
+
 def say_fit(policy: uc.Policy, stream: uc.Stream, judged: Judged, learner: str, verbose: bool) -> None:
     """Print what a policy explains, and what the data determined."""
     solution, known = policy.solution_, isfinite(judged.training)
-    models = f"{len(solution.weights)} local models" if len(solution.weights) > 1 else ""
+    models = models_of(policy) if len(solution.weights) > 1 else ""
     counts = f"{counted(judged.demonstrations, 'demonstration')}, {counted(judged.samples, 'sample')}" if known else ""
     if counts or models:
         click.echo(f"{', '.join(filter(None, (counts, models)))}.")
