@@ -35,7 +35,9 @@ shows no bias of k: consistency is what it was learnt by, so it fits chance.
 Nor does one whose own variance is many times the motion: where nothing was
 constrained, hard hybrids follow rounding. One whose variance is many times
 what k misses along the actions shows k's bias only if it is the more
-consistent. Whoever knows the Jacobian is a candidate only if it is as
+consistent. One that is more consistent by a tenth, beyond chance, shows k's
+bias whatever their softness: held-out motion has said that it is nearer to the
+policy. Whoever knows the Jacobian is a candidate only if it is as
 consistent as the best of the others, and is compared no more.
 
 Residuals have the variance ``‖π‖² (σ² / ‖u‖² + κ²)`` under any constraint:
@@ -66,6 +68,7 @@ from .constants import (
     COMPARED_STATES,
     LEAST_DEMONSTRATIONS,
     LEAST_MISFIT,
+    MORE_CONSISTENT,
     MOST_VARIANCE,
     MOST_VARIANCE_TO_LOSS,
     NEGLIGIBLE_LOSS,
@@ -232,13 +235,17 @@ class Comparison:
     def _may_show(self, one: int, other: int) -> bool:
         """Whether the first has less bias than the second, or as little as any, is stable, and not refuted by it.
 
-        Whoever knows more of the constraints than the second was compared before, see :attr:`as_consistent`.
+        Or is more consistent by a tenth, however soft both are. Whoever knows more of the constraints than the second
+        was compared before, see :attr:`as_consistent`.
         """
         mine, its = self._candidates[one].softness, self._candidates[other].softness
+        if mine < 0.0 <= its:
+            return True
         more_consistent, loss = self._refuted[other, one], self._losses[other].sum()
-        most = MOST_VARIANCE * self._samples.energy if more_consistent else MOST_VARIANCE_TO_LOSS * loss
-        stable = bool(self._variance[one] < most)
-        return mine < 0.0 <= its or ((mine < its or mine == its <= 0.0) and stable and not self._refuted[one, other])
+        less_biased = mine < its or mine == its <= 0.0
+        most = MOST_VARIANCE * self._samples.energy if more_consistent and less_biased else MOST_VARIANCE_TO_LOSS * loss
+        more_consistent &= its >= 0.0 and loss > MORE_CONSISTENT * self._losses[one].sum()
+        return bool((less_biased or more_consistent) and self._variance[one] < most and not self._refuted[one, other])
 
     @cached_property
     def _refuted(self) -> NDArray[np.bool_]:

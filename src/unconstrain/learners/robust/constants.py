@@ -160,6 +160,14 @@ kinds the mean was 1.163 without, 1.155 with 10, 1.156 with 30 and 1.163 with 30
 and 1.140.
 """
 
+MORE_CONSISTENT = 1.1
+"""Who misses less than another by this factor where held out, beyond chance, shows its bias whatever their softness.
+
+On 90 recorded sets of parametric policies the error over that of the best candidate was 1.095 without, 1.081 with 1.05,
+1.083 with 1.1 and 1.089 with 1.2, worst 2.2, 1.9, 1.9 and 2.2; on 90 of local ones 1.049 without and 1.048 with. On 600
+others, simulated, nothing changed with 1.05 to 1.2; with 1.0 one choice became 15 times worse.
+"""
+
 SHARE_OF_JACKKNIFE = 0.5
 """Of the jackknife's variance, which explains the distance of two candidates: it is biased upwards (Efron, Stein 1981).
 
