@@ -28,7 +28,6 @@ from seen import below
 from unconstrain import cli, storage
 from unconstrain.base.errors import MissingExtraError
 from unconstrain.cli import fitting
-from unconstrain.evaluation.verdicts import WITHOUT_SUPPORT
 from unconstrain.paper import experiments
 from unconstrain.paper import pages as report
 from unconstrain.paper.experiments import table1, washing
@@ -389,14 +388,15 @@ def test_each_model_has_features_of_its_own(files, tmp_path, model, features):
     assert storage.load(tmp_path / "p.npz").solution_.weights.shape == (1, 2, features)
 
 
-def test_what_is_missed_where_held_out_is_said_in_a_note(tmp_path):
+def test_what_is_missed_where_held_out_is_the_verdict(tmp_path):
     rng = np.random.default_rng(0)
     for k in range(4):  # nothing in common
         write(tmp_path / f"{k}.csv", "t,x,y,vx,vy", np.column_stack([np.arange(60), rng.standard_normal((60, 4))]))
     given = ["fit", str(tmp_path / "*.csv"), "-o", str(tmp_path / "p.npz"), "--model", "rbf"]
     result = CliRunner().invoke(cli.main, [*given, "--learner", "inconsistency"])
     assert result.exit_code == 0
-    assert "Note: much of the held-out motion is unexplained." in result.stderr, result.output
+    assert result.stdout.startswith("✖ The policy explains "), result.output
+    assert "or they have too little in common" in " ".join(result.stdout.split())
 
 
 def test_a_policy_is_no_recording(policy, tmp_path):
@@ -556,7 +556,7 @@ def test_a_report_of_more_than_memory_shows_its_beginning(folder, tmp_path, monk
 
 def test_score_prints_a_line_for_each_demonstration_and_all(policy, files):
     said = run("score", policy, *files[:2])
-    assert said.startswith("! Explains 100% of the motion, but it learnt from 2 of 2 demonstrations: a score\n")
+    assert said.startswith("! The policy explains 100% of the motion, but it learnt from 2 of 2\n")
     lines = below(said).splitlines()
     assert lines[0].split("  ")[0] == "demonstration"
     assert [line.split()[0] for line in lines[1:]] == ["swing_0", "swing_1", "all"]
@@ -605,7 +605,7 @@ def test_a_policy_saved_from_python_can_be_scored(files, tmp_path):
     demos = uc.prepare(uc.read(files))
     uc.save(uc.ParametricPolicy(uc.Affine()).fit_demonstrations(demos), tmp_path / "p.npz")
     said = run("score", tmp_path / "p.npz", files[0])
-    assert said.startswith("✔ Explains 100% of held-out motion, if none of it was learnt from: good.\n")
+    assert said.startswith("✔ The policy explains 100% of held-out motion, if none of it was learnt from:\n")
     assert below(said).splitlines()[1].startswith("swing_0")
 
 
@@ -654,7 +654,8 @@ def test_rollout_writes_what_it_would_print(policy, tmp_path):
     printed = run("rollout", policy, "--start", "0.5,0", "--steps", 5)
     assert run("rollout", policy, "--start", "0.5,0", "--steps", 5, "-o", "-") == printed
     said = run("rollout", policy, "--start", "0.5,0", "--steps", 5, "-o", tmp_path / "path.csv")
-    assert said == "\n".join([*WITHOUT_SUPPORT.lines(), "", f"movement: {tmp_path / 'path.csv'}", ""])
+    assert said.startswith("✔ Near demonstrations for all 0.08 s: supported.\n")
+    assert said.endswith(f"movement: {tmp_path / 'path.csv'}\n")
     assert (tmp_path / "path.csv").read_text() == printed
 
 
@@ -757,7 +758,7 @@ def test_export_calls_the_c_function_as_told(policy, tmp_path):
 
 def test_export_writes_a_package_for_ros(policy, tmp_path):
     said = run("export", policy, "--ros2", tmp_path / "swing", "--messages", "joints")
-    assert said.startswith("✔ Explains ")
+    assert said.startswith("✔ The policy explains ")
     assert said.endswith(f"ROS 2 package: {tmp_path / 'swing'}\n")
     assert 'joints: ["x", "y"]' in (tmp_path / "swing" / "config" / "swing.yaml").read_text()
     assert "swing: is there" in refused("export", policy, "--ros2", tmp_path / "swing")

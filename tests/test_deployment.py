@@ -325,6 +325,20 @@ def test_support_limits_and_steps_of_c_and_of_cpp_are_those_of_the_policy(kind, 
             assert_array_equal(found, ((limits[:, 0] <= at) & (at <= limits[:, 1])).all(axis=1))
 
 
+@pytest.mark.parametrize("kind", ["affine", "cubic", "kmeans", "local"])
+@pytest.mark.parametrize("scale", [None, (0.5, 1.0)])
+def test_the_speed_limit_cuts_no_demonstrated_motion_and_no_single_glitch_lifts_it(kind, scale, tmp_path):
+    at, turn = np.random.default_rng(0).uniform(-1, 1, (400, 2)) ** 3, np.array([[-1.0, -2.0], [2.0, -1.0]])
+    actions = 100.0 * at @ turn  # most of it is slow and in the middle
+    glitch = actions * np.where(np.arange(400) == 7, 30.0, 1.0)[:, None]
+    for moves in (actions, glitch):
+        policy = POLICIES[kind](uc.Direct()).set_params(scale=scale).fit(at, moves)
+        policy.export_c(tmp_path / "it.c")
+        found = float(re.search(r"it_speed_limit = (\S+);", (tmp_path / "it.c").read_text())[1])
+        most = np.linalg.norm(actions, axis=1).max()
+        assert most <= found <= 6.0 * most
+
+
 def test_the_header_says_what_the_numbers_are(policy, tmp_path):
     notes = {
         "recipe": {"states": ["x", "y"], "actions": None},

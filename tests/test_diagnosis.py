@@ -15,7 +15,7 @@ from test_cli import call, refused, run, write
 from test_report import References
 from unconstrain.base.errors import InvalidDataError, SettingError
 from unconstrain.evaluation import verdicts
-from unconstrain.evaluation.diagnosis import Diagnosis, diagnose, sentences
+from unconstrain.evaluation.diagnosis import Diagnosis, about_recordings, diagnose, sentences
 from unconstrain.pages import diagnosis, fit
 
 TURN = np.array([[-0.3, 1.0], [-1.0, -0.3]])
@@ -291,6 +291,12 @@ def test_what_fit_and_diagnose_call_told_is_told(kind, seed):
     states, wanted = uc.stack(demos).states, np.vstack([one.truth.policy for one in demos])
     missed = np.sqrt(((policy(states) - wanted) ** 2).sum() / (wanted**2).sum())
     fit, whole = verdicts.of_explained(policy.held_out_score(), 5, told), verdicts.of_diagnosis(found)
+    said = about_recordings(fit, demos, ("x", "y", "z"))
+    assert ("Each demonstration lies on a plane of its own, up to " in said.trust) == (kind == "own planes")
+    assert ("All demonstrations lie on one plane or parallel ones, of normal (x = " in said.doubt) == (
+        kind == "one plane"
+    )
+    assert ("as all lie on one plane" in whole.said) == (kind == "one plane")
     if kind == "own planes":
         assert missed < 0.3
         assert told > 0.5
@@ -303,6 +309,30 @@ def test_what_fit_and_diagnose_call_told_is_told(kind, seed):
         assert whole.mark is verdicts.Mark.BAD
         assert fit.mark is not verdicts.Mark.GOOD
         assert "at 100% of the recorded states no recording tells" in fit.doubt
+
+
+def test_strokes_on_planes_of_their_own_are_not_called_bad_recordings(fitted):
+    found = replace(diagnose(*fitted), states_determined=0.0, told_together=0.0, noise_share=0.0)
+    assert verdicts.of_diagnosis(replace(found, planes=0)).mark is verdicts.Mark.BAD
+    own = verdicts.of_diagnosis(replace(found, planes=12))
+    assert own.mark is verdicts.Mark.DOUBTFUL
+    assert own.said.startswith("Recordings: at 0% of their states")
+    assert own.said.endswith("not enough to be sure, though each lies on a plane of its own.")
+
+
+def test_strokes_that_come_to_rest_are_told_with_the_option_that_trims_it():
+    def stroke(rest):
+        speed = np.r_[np.full(60, 10.0), np.full(rest, 0.05)]
+        states = np.cumsum(speed) * 0.01
+        return uc.Demonstration(states[:, None] * [1.0, 0.0], speed[:, None] * [1.0, 0.0], name=f"s{rest}")
+
+    poor, demos = verdicts.Verdict(verdicts.Mark.BAD, "Poor.", next="Look."), [stroke(40), stroke(40), stroke(2)]
+    said = about_recordings(poor, demos, ("x", "y")).next
+    assert said.startswith("2 of 3 demonstrations come to rest at an end")
+    assert said.endswith(": --still 2 leaves that out. Look.")
+    trimmed = [uc.preparation.trim(one, still=2.0) for one in demos]
+    assert about_recordings(poor, trimmed, ("x", "y")).next == "Look."
+    assert about_recordings(poor._replace(mark=verdicts.Mark.GOOD), demos, ("x", "y")).next == "Look."
 
 
 @pytest.mark.parametrize(("count", "told"), [(2, False), (3, True)])

@@ -5,7 +5,7 @@ from importlib import resources
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 import unconstrain as uc
 from conftest import POLICIES
@@ -49,7 +49,8 @@ def test_the_module_says_what_the_policy_says_inside_and_far_outside(policy, bro
     try:
         assert_allclose(found["support"], policy.support(states), atol=1e-9)
     except SettingError:
-        assert found["support"] == [None] * 40
+        form = policy.closed_form()  # the box that an exported C file knows
+        assert_array_equal(found["support"], (np.abs(states - form.origin) <= form.reach).all(axis=1))
 
 
 def test_the_module_is_in_the_units_of_the_data(browser, tmp_path):

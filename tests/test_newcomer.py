@@ -15,7 +15,7 @@ import unconstrain as uc
 from test_cli import call, refused, run, write
 from test_formats import workbook
 from unconstrain.base.display import listening
-from unconstrain.cli import looking, progress
+from unconstrain.cli import informing, looking, progress
 from unconstrain.pages import fit as fit_page
 
 HEAD = "Zeit [s],X [mm],Y [mm]"
@@ -309,6 +309,9 @@ def test_a_movement_where_the_policy_is_not_determined_is_not_supported(folder, 
         assert ran.code == 0
         assert ran.out.startswith(f"{sign} Near demonstrations")
         assert ("no recording tells the policy" in text(ran)) == (sign == "!")
+    one_line = tmp_path.parent / "one_line.npz"  # what all recordings together tell, as fit notes it, is no doubt
+    uc.save(uc.load(one_line), one_line, uc.storage.load_notes(one_line) | {informing.TOLD: 1.0})
+    assert run("rollout", one_line, *start, "--plane", f"{along[0]},{along[1]}").startswith("✔ Near demonstrations")
 
 
 def test_a_start_where_nothing_was_demonstrated_is_refused_unless_told_to_go_on(policy, tmp_path):

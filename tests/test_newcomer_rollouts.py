@@ -109,6 +109,46 @@ def test_a_policy_that_leaves_the_finite_numbers_does_not_pass_in_silence(folder
     assert "But run from the same starts it leaves the finite numbers." in verdict.said
 
 
+def test_a_cycle_that_shrinks_is_told_by_its_last_round(folder):
+    class Shrinking(Ovals):
+        def __call__(self, states):
+            x, y, z = np.asarray(states).T
+            return np.column_stack([-3.6 * y - 0.1 * x, 0.9 * x - 0.1 * y, -1.5 * z])
+
+    recipe = uc.Recipe(states=("x", "y", "z"), differentiate="savgol")
+    demos = uc.prepare(uc.read(str(folder / "held_*.csv")), recipe)
+    for policy, shrinks in ((Ovals(), False), (Shrinking(), True)):
+        verdict, found = replayed(Verdict(Mark.GOOD, "Good."), policy, demos, recipe, None, MM)[:2]
+        assert (found["last_round"] < 0.8) == shrinks
+        assert ("last round over first of" in verdict.said) == shrinks
+        assert (verdict.mark is Mark.DOUBTFUL) == shrinks
+
+
+def test_the_last_round_is_judged_whatever_the_size_of_the_whole_is():
+    for last, mark in ((0.6, Mark.DOUBTFUL), (0.9, Mark.GOOD), (np.nan, Mark.GOOD)):
+        found = of_replays(Verdict(Mark.GOOD, "Good."), np.full(3, 0.9), np.full(3, 1.0), "3 mm", np.full(3, last))
+        assert found.mark is mark
+        assert (f"last round over first {last:.2f} times the demonstrated" in found.said) == np.isfinite(last)
+
+
+def test_a_look_at_a_policy_that_moves_otherwise_begins_with_that(folder, tmp_path):
+    held = sorted(folder.glob("held_*.csv"))
+    assert run("look", *held, "-o", tmp_path / "a.html").startswith("✔ 3 demonstrations, nothing odd")
+    said = run("look", *held, folder / "slow.npz", "-o", tmp_path / "b.html")
+    assert said.startswith("! 3 demonstrations, nothing odd")
+    assert "But run from the same starts: size" in " ".join(said.split())
+
+
+def test_a_wrong_plane_is_named_as_the_likely_cause_of_a_bad_score(folder):
+    normal = np.random.default_rng(3).standard_normal(3) * [0.1, 0.1, 0.0] + [0.0, 0.0, 1.0]
+    for plane, wrong in ((normal, False), ([1.0, 0.2, 0.0], True)):
+        given = "--plane=" + ",".join(map(str, plane))
+        found = json.loads(run("score", folder / "same.npz", folder / "held_3.csv", given, "--json"))
+        assert found["verdict"]["said"].startswith("The constraint given forbids") == wrong
+        assert found["verdict"]["next"].startswith("Score without it") == wrong
+        assert not (wrong and found["verdict"]["mark"] == "good")
+
+
 def test_a_score_says_that_what_was_learnt_is_too_slow(folder):
     found = score(folder, "slow")
     assert found["replayed"]["pace"] == pytest.approx(0.7, rel=0.15)
@@ -121,11 +161,21 @@ def test_a_roll_out_on_a_plane_says_that_the_plane_passes_through_the_start(fold
     assert "passes through the start" not in " ".join(run("rollout", folder / "same.npz", *how).split())
 
 
-def test_a_policy_without_support_is_judged_in_words(folder, tmp_path):
+def test_a_start_far_from_all_data_is_refused_for_a_policy_without_kernels_too(folder, tmp_path):
     learnt = ("--state", "x,y,z", "--differentiate", "--model", "affine", "--learner", "direct")
     run("fit", *sorted(folder.glob("same_*.csv")), *learnt, "-o", tmp_path / "affine.npz")
-    said = run("rollout", tmp_path / "affine.npz", "--start", "60,10,0", "-o", tmp_path / "path.csv")
-    assert "cannot be told" in " ".join(said.split())
+    start = ("rollout", tmp_path / "affine.npz", "--steps", 3, "-o", tmp_path / "path.csv", "--start")
+    assert run(*start, "60,10,0").startswith("✔ Near demonstrations")
+    assert refused(*start, "9000,10,0", "--force").startswith(
+        "--start: nothing was demonstrated near 9000, 10, 0 (support 0)."
+    )
+    assert run(*start, "9000,10,0", "--least-support", 0, "--force").startswith("✖ From 0.00 s on the movement is far")
+
+
+def test_a_score_of_recordings_far_from_all_that_was_learnt_says_so(folder, tmp_path):
+    far = write(tmp_path / "far.csv", HEAD, np.add(oval(3), [0.0, 9000.0, 0.0, 0.0]))
+    for recording, said in ((folder / "held_3.csv", False), (far, True)):
+        assert ("are they of another task?" in call("score", folder / "same.npz", recording).err) == said
 
 
 def test_an_export_says_what_support_is_called(folder, tmp_path):
@@ -216,6 +266,13 @@ def test_a_hinge_holds_two_directions_wherever_it_is_spoken_of(door):
         )
         assert "1 of 3 directions were held" not in told
         assert "Mechanism: a circle (hinge) about" in told or "mechanism a circle (hinge) about" in told
+
+
+def test_the_table_of_info_counts_what_is_held_as_its_verdict_does(door, folder, tmp_path):
+    told = json.loads(run("info", door[0] / "c.npz", "--json"))
+    assert told["held"] == "2 of 3 directions"
+    run("constraint", folder / "held_3.csv", "--state", "x,y,z", "--differentiate", "-o", tmp_path / "plate.npz")
+    assert json.loads(run("info", tmp_path / "plate.npz", "--json"))["held"] == "1 of 3 directions"
 
 
 def test_a_roll_out_keeps_to_the_mechanism_that_was_named(door, tmp_path):

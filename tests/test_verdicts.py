@@ -148,10 +148,22 @@ class TestInfo:
         assert "swing_0.csv: is a recording, not a policy. " in ran.stderr
 
 
+def test_fit_and_score_agree_on_a_policy_that_is_not_told_across(folder, tmp_path):
+    again = (tmp_path / "again.csv").write_text((folder / "swing_0.csv").read_text() + "\n") and tmp_path / "again.csv"
+    said = json.loads(call("score", folder / "p.npz", again, "--json").stdout)["verdict"]
+    assert said["mark"] == "doubtful"
+    assert "held-out motion: good along it, not enough across it." in said["said"]
+    assert verdicts.of_score(1.0, 5, told=0.5).mark is Mark.DOUBTFUL
+    assert verdicts.of_score(1.0, 5, told=0.9).mark is Mark.GOOD
+    assert verdicts.of_score(1.0, 5, 0.95, told=0.5).mark is Mark.GOOD  # under the constraint that is all there is
+
+
 def test_a_fit_tells_programs_what_it_tells_people(folder):
     told = json.loads((folder / "fit.json").read_text())
     assert told["verdict"]["mark"] == "doubtful"  # one circle three times: nothing was seen across it
-    assert told["verdict"]["said"] == "Explains 100% of held-out motion: good along it, not enough across it."
+    assert (
+        told["verdict"]["said"] == "The policy explains 100% of held-out motion: good along it, not enough across it."
+    )
     assert told["held_out"] == pytest.approx(1.0, abs=1e-6)
     assert (told["demonstrations"], told["samples"]) == (3, 120)
     assert told["policy"].endswith("p.npz")

@@ -266,28 +266,30 @@ def score(
     with shown("reading"):
         demonstrations, recipe, recordings = prepared(files, reading, notes)
     refuse_warnings(reading["strict"])
-    held = held_of(plane, constraint, recipe, uc.stack(demonstrations).states, learnt.n_outputs_, "one for each action")
+    states = uc.stack(demonstrations).states
+    held = held_of(plane, constraint, recipe, states, learnt.n_outputs_, "one for each action")
+    if 2 * (_support(learnt, states) < uc.models.SUPPORTED).sum() > len(states):
+        click.echo(f"Note: {policy}: learnt far from most of these states: are they of another task?", err=True)
 
     def scores(of: uc.Demonstration | Sequence[uc.Demonstration], name: str, samples: int) -> dict[str, Any]:
         found = {"demonstration": name, "samples": samples, "ninc": uc.ninconsistency(learnt, of)}
-        if held is None:
-            return found
-        return found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(learnt, of, held)}
+        return found if held is None else found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(learnt, of, held)}
 
     with shown("scoring"):
         rows = [scores(demo, demo.name, len(demo)) for demo in demonstrations]
         whole = scores(demonstrations, "all", sum(map(len, demonstrations)))
     under = None if held is None else 1.0 - whole["ncpe"]
     known = learnt_from(learnt, notes, recordings)
-    count = None if known is None else len(known)
-    verdict = uc.evaluation.verdicts.of_score(1.0 - whole["ninc"], len(demonstrations), under, count)
+    more = under, None if known is None else len(known), notes.get(TOLD)
+    judged = uc.evaluation.verdicts.of_score(1.0 - whole["ninc"], len(demonstrations), *more)
     with shown("running it from the same starts"):
-        found = replayed(verdict, learnt, demonstrations, recipe, held, recordings[0].units)
+        found = replayed(judged, learnt, demonstrations, recipe, held, recordings[0].units)
+    verdict = uc.evaluation.verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0))
     if as_json:
         told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known}
-        click.echo(json.dumps({**told, "replayed": found.medians, "verdict": found.verdict.to_json()}, indent=2))
+        click.echo(json.dumps({**told, "replayed": found.medians, "verdict": verdict.to_json()}, indent=2))
         return
-    say_verdict(found.verdict)
+    say_verdict(verdict)
     rows.append(whole)
     head = ["demonstration", "samples", "normalised inconsistency", *([] if held is None else ["nPOE", "nCPE"])]
     print_table(head, [[str(v) if not isinstance(v, float) else f"{v:.4g}" for v in one.values()] for one in rows])
@@ -358,7 +360,7 @@ def rollout(
     named = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))
     kept = "the plane" if plane is not None else getattr(held, "title", "")
     through = f" {kept[:1].upper()}{kept[1:]} passes through the start." if kept else ""
-    verdict = _supported(learnt, path, why, round_, through)
+    verdict = _supported(learnt, path, why, round_, through, uc.storage.load_notes(policy).get(TOLD))
     accelerations = named.actions or tuple(f"a{name}" for name in (named.states or ())[:places])
     columns = ["t", *(named.states or ()), *(accelerations if how["order"] == 2 else named.directions)]
     if output != "-":
@@ -461,14 +463,23 @@ def _obstacle(given: tuple[float, ...], n: int) -> uc.motion.obstacles.Ellipsoid
 
 
 def _check_start(policy: uc.Policy, start: tuple[float, ...], least: float) -> None:
-    """Refuse to begin where nothing was demonstrated; policies without support begin anywhere."""
+    """Refuse to begin where nothing was demonstrated."""
+    support = float(_support(policy, [start])[0])
+    if support < least:
+        raise InvalidDataError(
+            f"--start: nothing was demonstrated near {', '.join(f'{one:.4g}' for one in start)} (support "
+            f"{support:.2g}). Start nearer, demonstrate there, or go on in spite of it with --least-support 0."
+        )
+
+
+def _support(policy: uc.Policy, states: Any) -> Any:
+    """How near data is to states (N, n), (N,); of a policy without kernels 1 within six standard deviations, else 0."""
+    import numpy as np
+
     with suppress(SettingError):
-        support = float(policy.support([start])[0])
-        if support < least:
-            raise InvalidDataError(
-                f"--start: nothing was demonstrated near {', '.join(f'{one:.4g}' for one in start)} (support "
-                f"{support:.2g}). Start nearer, demonstrate there, or go on in spite of it with --least-support 0."
-            )
+        return policy.support(states)
+    form = policy.closed_form()
+    return (np.abs(form.embedding(np.array(states)) - form.origin) <= 2 * form.reach).all(axis=1) * 1.0
 
 
 def _as_far_as_it_goes(policy: uc.Policy, start: list[float], **how: Any) -> tuple[Any, str, DivergedError | None]:
@@ -488,16 +499,13 @@ def _as_far_as_it_goes(policy: uc.Policy, start: list[float], **how: Any) -> tup
 
 
 def _supported(
-    policy: uc.Policy, path: Any, why: str, obstacles: Sequence[uc.motion.obstacles.Ellipsoid], held: str
+    policy: uc.Policy, path: Any, why: str, obstacles: Sequence[Any], held: str, told: float | None
 ) -> uc.evaluation.verdicts.Verdict:
-    """How near data is along a movement, which an affine or polynomial policy does not know; then ``held``."""
+    """How near data is along a movement, and whether it tells the policy, if not everywhere; then ``held``."""
     verdicts = uc.evaluation.verdicts
-    try:
-        ended = verdicts.of_early_end(why, float(path.times[-1])) if why else None
-        untold = uc.evaluation.diagnosis.untold(policy, path)
-        found = ended or verdicts.of_support(policy.support(path.states), path.times, untold)
-    except SettingError:
-        found = verdicts.WITHOUT_SUPPORT
+    ended = verdicts.of_early_end(why, float(path.times[-1])) if why else None
+    untold = None if (told or 0.0) >= verdicts.MOSTLY else uc.evaluation.diagnosis.untold(policy, path)
+    found = ended or verdicts.of_support(_support(policy, path.states), path.times, untold)
     found = found._replace(said=f"{found.said}{held}")
     if not obstacles:
         return found

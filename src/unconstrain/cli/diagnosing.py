@@ -57,7 +57,8 @@ def diagnose(
     refuse_warnings(reading["strict"])
     states = recipe.states or ()
     actions = recipe.actions or recipe.directions
-    verdict = uc.evaluation.verdicts.of_diagnosis(found)
+    judged = uc.evaluation.verdicts.of_diagnosis(found)
+    verdict = uc.evaluation.diagnosis.about_recordings(judged, demonstrations, states)
     if as_json:
         named = {"states": states, "actions": actions, "verdict": verdict.to_json()}
         click.echo(json.dumps(found.to_json() | named, indent=2))

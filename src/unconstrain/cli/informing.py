@@ -74,7 +74,7 @@ def info(file: str, as_json: bool) -> None:
     """
     held, notes = loaded(file, uc.Policy | uc.LearntConstraint | uc.Guided), uc.storage.load_notes(file)
     rest = {name: value for name, value in notes.items() if name not in ("recipe", "units", "digests", HELD_BY, WHERE)}
-    told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held), **rest}
+    told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held, notes), **rest}
     if as_json:
         click.echo(json.dumps(told | {"verdict": verdict_of(held, notes).to_json()}, indent=2))
         return
@@ -96,11 +96,11 @@ def _columns(notes: Mapping[str, Any]) -> dict[str, Any]:
     } if states else {"states": None}  # fmt: skip
 
 
-def _of(held: Any) -> dict[str, Any]:
+def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
     """What was learnt, and how; a guided policy is told by the one in it."""
     if isinstance(held, uc.LearntConstraint):
-        choice = held.choice_
-        return {"held": f"{held.rank_} of {choice.actions} directions", "features": choice.name, "noise": held.noise_}
+        count = verdict_of(held, notes).said.partition(" were held")[0]
+        return {"held": count, "features": held.choice_.name, "noise": held.noise_}
     policy = innermost(held)
     solution = getattr(policy, "solution_", None)
     if solution is None:

@@ -17,7 +17,7 @@ from ..base.display import counted, listed
 from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainError
 from ..base.files import write
 from .constraining import arm_of, known_arms, said_elsewhere
-from .informing import OF, learnt_from
+from .informing import OF, TOLD, learnt_from
 from .printing import refuse_warnings, say_verdict
 from .reading import options_for_reading, prepared, reading_of, typed
 from .speaking import as_typed
@@ -83,7 +83,13 @@ def look(
     surveys = uc.preparation.survey_set(seen.recordings, seen.recipe)
     odd = any(one.warnings for one in surveys)
     then = "Open the page; what it marks says what cures it." if odd else "Open the page."
-    say_verdict(uc.evaluation.verdicts.of_surveys(surveys)._replace(next="" if live else then))
+    verdict = uc.evaluation.verdicts.of_surveys(surveys)
+    if seen.policy is not None:
+        from ..pages.look import replayed
+
+        units = seen.recordings[0].units
+        verdict = replayed(verdict, seen.policy, seen.demonstrations, seen.recipe, None, units, free=False).verdict
+    say_verdict(verdict._replace(next="" if live else then))
     for line in _about(seen):
         click.echo(line)
     samples = sum(map(len, seen.demonstrations))
@@ -165,21 +171,14 @@ def _about(seen: Seen) -> Iterator[str]:
         if known is not None and len(known) < count:
             named = f", {listed(known, 4)}" if known else ""
             yield f"policy: learnt from {len(known) or 'none'} of these {counted(count, 'demonstration')}{named}."
-        yield _open(seen.policy, seen.demonstrations)
+        told = seen.notes.get(TOLD)
+        open_ = "where recordings tell it is not known" if told is None else uc.evaluation.verdicts.of_untold(1 - told)
+        yield f"policy: {open_} ('unconstrain diagnose' says where)."
     if seen.constraint is not None and len(seen.held) < count:
         of = listed(seen.notes[OF], 4)
         yield f"constraint: of {of}, and drawn there alone; others may have been held in other ways."
     if said := said_elsewhere(seen.notes, uc.stack(seen.demonstrations).states):
         yield f"constraint: {said}"
-
-
-def _open(policy: uc.Policy, demos: Sequence[uc.Demonstration]) -> str:
-    """Of the policy that is drawn, at how many of the recorded states no recording tells it."""
-    try:
-        share = uc.evaluation.diagnose(policy, demos).told_together
-    except UnconstrainError:
-        return "policy: where recordings tell it is not known for this learner."
-    return f"policy: {uc.evaluation.verdicts.of_untold(1 - share)} ('unconstrain diagnose' says where)."
 
 
 def _free(seen: Seen) -> Any:

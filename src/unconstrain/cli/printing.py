@@ -180,7 +180,8 @@ def judge_fit(policy: uc.Policy, stream: uc.Stream, told: float | None, schedule
     there = _least_known(policy, demos, stream.recipe) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
     found = uc.evaluation.verdicts.of_explained(held_out, count, told, there=there)
     ran = replayed(found, policy, demos, stream.recipe, None, stream.first.units, free=False)
-    return Judged(ran.verdict, ran.medians, ran.in_words, count, samples, 1.0 - missed, held_out)
+    verdict = uc.evaluation.diagnosis.about_recordings(ran.verdict, demos, stream.recipe.states or ())
+    return Judged(verdict, ran.medians, ran.in_words, count, samples, 1.0 - missed, held_out)
 
 
 def _least_known(policy: uc.Policy, demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe) -> str:
@@ -231,7 +232,7 @@ def say_fit(policy: uc.Policy, stream: uc.Stream, judged: Judged, learner: str, 
         told = [[name, f"{risk:.4g}", uc.evaluation.diagnosis.in_words(name)] for risk, name in rows]
         print_table(["candidate", "estimated squared error", "what it is"], told)
     if known:
-        _say_doubts(judged, learner)
+        say(uc.preparation.doubts(judged.demonstrations, 1.0 - judged.training))
 
 
 def _say_determined(solution: uc.Solution, learner: str) -> None:
@@ -245,18 +246,6 @@ def _say_determined(solution: uc.Solution, learner: str) -> None:
     )
     if solution.determined_share == 0.0:
         click.echo("Note: nothing was determined, so this is the same as --learner direct.", err=True)
-
-
-def _say_doubts(judged: Judged, learner: str) -> None:
-    say(uc.preparation.doubts(judged.demonstrations, 1.0 - judged.training))
-    poor = judged.held_out < uc.evaluation.verdicts.GOOD
-    if poor and 1.0 - judged.held_out > 0.05 + 2.0 * (1.0 - judged.training):
-        faster = "" if learner == "robust" else "--speed-power 2 or "
-        click.echo(
-            "Note: much of the held-out motion is unexplained. If the noise at low speed is large, try a wider "
-            f"--window, {faster}--still; otherwise the demonstrations may have too little in common.",
-            err=True,
-        )
 
 
 def say_scale(policy: uc.Policy, recipe: uc.Recipe) -> None:

@@ -107,7 +107,8 @@ def c_source(
         raise SettingError(f"name: got {name!r}, expected a name in C: a letter, then letters, digits, underscores.")
     fill = {"name": name, "NAME": name.upper(), "macro": f"{name.upper()}_SELF_TEST", "file": file}
     fill |= _sizes(form, described) | _numbers(form, name, policy, single)
-    fill |= _correction(form, name, _single if single else _double)
+    said = _single if single else _double
+    fill |= {"speed_limit": said(max(described.fastest, _fastest(form, policy)))} | _correction(form, name, said)
     fill["under"] = filled("under.h", fill) if form.correction else ""
     header = filled("header.h", fill)
     return Source(header, header + "\n" + "".join(filled(f"{part}.c", fill) for part in _parts(form)))
@@ -171,7 +172,6 @@ def _numbers(form: ClosedForm, name: str, policy: Callable[[Array], Array], sing
         "origin": braced(form.origin),
         "reach": braced(form.reach),
         "limits": braced(_limits(form)),
-        "speed_limit": said(_fastest(form, policy)),
         "maps": braced(form.maps),
         "map": braced(form.maps[0]),
         "constants": braced(form.maps[:, :, 0]),

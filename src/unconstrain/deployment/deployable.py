@@ -3,6 +3,7 @@
 import os
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -201,7 +202,9 @@ class Deployable(Exportable):
         told = {"recipe": {"states": None if names is None else list(names)}} | dict(notes or {})
         learner = type(self.learner).__name__ if self.learner is not None else "Robust"
         method = getattr(self.solution_, "method", "")
-        return Description.of(form, f"{learner}: {method}" if method else learner, told)
+        unit = 1.0 if self.scale_ is None else float(self.scale_.actions.max())
+        described = Description.of(form, f"{learner}: {method}" if method else learner, told)
+        return replace(described, fastest=unit * self.training_.fastest)
 
     def __getstate__(self) -> Any:
         """Leave out buffers, which are made again where they are needed."""

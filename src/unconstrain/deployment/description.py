@@ -27,12 +27,15 @@ class Description:
         Units of some columns.
     lines : mapping of str to str
         What else is to be said, by what it is of.
+    fastest : float
+        At least the largest size of a demonstrated action, where that is known.
     """
 
     states: Sequence[str]
     actions: Sequence[str]
     units: Mapping[str, str] = field(default_factory=dict)
     lines: Mapping[str, str] = field(default_factory=dict)
+    fastest: float = 0.0
 
     @classmethod
     def of(cls, form: ClosedForm, learnt: str = "", notes: Mapping[str, Any] | None = None) -> Self:

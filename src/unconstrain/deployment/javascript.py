@@ -26,7 +26,7 @@ def export_javascript(form: ClosedForm, path: str | os.PathLike[str]) -> None:
 def javascript(form: ClosedForm) -> str:
     """JavaScript expression of an object with functions ``policy``, ``support``, and ``under`` of a projection as well.
 
-    Where there are no kernels, ``support`` is null.
+    Where there are no kernels, ``support`` is 1 within the reach of the data and 0 outside.
     """
     return f"(function () {{\n{template('policy.js')}\nreturn policyOf({formula(form)});\n}})()"
 
@@ -36,6 +36,7 @@ def formula(form: ClosedForm) -> str:
     plain: dict[str, Any] = {"origin": form.origin.tolist(), "maps": form.maps.tolist()}
     more = {"exponents": form.exponents, "monomials": form.monomials, "precision": form.precisions}
     plain |= {name: values.tolist() for name, values in more.items() if values is not None}
+    plain |= {} if form.precisions is not None else {"reach": form.reach.tolist()}
     if form.embedding.frame is not None:
         plain["frame"] = form.embedding.frame.tolist()
         plain["factors"] = [_factor(factor) for factor in form.embedding.space.factors]

@@ -18,6 +18,7 @@ from ..models import Scale, choose_variance, cover
 from ..recordings import Demonstration, readers, stack
 from .verdicts import ENOUGH as ENOUGH
 from .verdicts import SMALL as SMALL
+from .verdicts import Mark, Verdict
 
 if TYPE_CHECKING:
     from ..policies import Policy
@@ -33,6 +34,12 @@ FREE, CONSTRAINED = 0.5, 0.1
 
 MOST_NAMED = 8
 """So many samples that look wrong are named."""
+
+FLAT, ONE = 0.1, 0.03
+"""Held are directions of less spread than the first share of the longest, and all on one plane below the second."""
+
+SLOW, LONG = 0.2, 0.1
+"""Slower than the first share of a usual speed is rest, for more than the second share of the samples a long one."""
 
 
 class Place(NamedTuple):
@@ -159,6 +166,8 @@ class Diagnosis:
     suspects : tuple of Place
         Samples that look wrong beside their neighbours in time, and were left out; none where the policy was fitted to
         others.
+    planes : int
+        How many :func:`planes_of` finds.
     undetermined, from_noise : ndarray, shape (N,)
         Length of the standard deviations at each recorded state, as a share of the typical action.
     free : ndarray, shape (N,), optional
@@ -180,6 +189,7 @@ class Diagnosis:
     regions: tuple[Region, ...]
     movements: tuple[Movement, ...]
     suspects: tuple[Place, ...]
+    planes: int
     undetermined: Array
     from_noise: Array
     free: Array | None
@@ -255,10 +265,53 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
         regions=_regions(policy, demos, undetermined, known, typical),
         movements=_movements(demos, undetermined, known, free),
         suspects=() if free is None else tuple(places_of(belief.suspects, zip(_names(demos), demos, strict=True))),
+        planes=len(planes_of(demos)),
         undetermined=undetermined,
         from_noise=from_noise,
         free=free,
     )
+
+
+def flat(states: Array, share: float = FLAT) -> tuple[Array, Array]:
+    """Directions, in rows, along which states (T, n) hardly spread, zero where they do (n, n), and most (2, n)."""
+    _, spread, axes = np.linalg.svd(states - states.mean(axis=0), full_matrices=False)
+    beyond = states.shape[1] - len(axes)
+    spread, axes = np.pad(spread, (0, beyond)), np.pad(axes, ((0, beyond), (0, 0)))
+    return axes * (spread < share * spread[0])[:, None], axes[:2]
+
+
+def planes_of(demonstrations: Sequence[Demonstration]) -> Array:
+    """Normals (K, 3) of the planes that demonstrations in space keep to: one, if it or parallel ones are all.
+
+    There are none where some keep to no plane or to a line, or where their planes differ as their places do.
+    """
+    whole, states = np.vstack([one.states for one in demonstrations]), [one.states for one in demonstrations]
+    if whole.shape[1] != 3 or demonstrations[0].actions.shape[1] != 3:
+        return whole[:0]
+    centred, each = np.vstack([one - one.mean(axis=0) for one in states]), np.array([flat(one)[0] for one in states])
+    common, together = flat(centred, ONE)[0], whole.var(axis=0).sum() < 2.0 * centred.var(axis=0).sum()
+    if common[2].any() and not common[1].any():
+        return common[2:]
+    return each[:, 2] if together and each[:, 2].any(axis=1).all() and not each[:, 1].any() else whole[:0]
+
+
+def about_recordings(found: Verdict, demonstrations: Sequence[Demonstration], states: Sequence[str]) -> Verdict:
+    """Add to a verdict which planes demonstrations keep to, and if it is not good where they are at rest."""
+    planes, trust, doubt = planes_of(demonstrations), found.trust, found.doubt
+    if len(planes) == 1:
+        doubt = f"All demonstrations lie on one plane or parallel ones, of normal {named(planes[0], states)}: none "
+        doubt += f"tells what is across it; others at other tilts would. {found.doubt}"
+    elif len(planes):
+        apart = np.degrees(np.arccos(min(float(np.abs(planes @ planes.T).min()), 1.0)))
+        trust = f"{trust} Each demonstration lies on a plane of its own, up to {apart:.0f}° from the others.".strip()
+    speeds = [np.linalg.norm(one.actions, axis=1) for one in demonstrations]
+    slow = SLOW * float(np.quantile(np.concatenate(speeds), 0.9))
+    rest = [np.ptp(np.flatnonzero(each > slow)) < (1 - LONG) * len(each) for each in speeds if (each > slow).any()]
+    found = found._replace(trust=trust, doubt=doubt)
+    if found.mark is Mark.GOOD or not any(rest):
+        return found
+    said = f"{sum(rest)} of {len(speeds)} demonstrations come to rest at an end, where they tell no policy: --still"
+    return found._replace(next=f"{said} {slow:.2g} leaves that out. {found.next}")
 
 
 def untold(policy: Policy, movement: Demonstration) -> Array | None:
@@ -469,20 +522,17 @@ def about_choice(method: str, candidates: Mapping[str, float]) -> str:
 
 
 def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> list[str]:
-    open_ = [one for one in found.regions if one.determined < 1.0]
     worst = found.regions[0]
     advice = (
         f"demonstrate around {named(worst.state, states)} with motion along {named(worst.direction, actions)} left "
         f"free (standard deviation there: {worst.along:.0%} of a typical action; see '{worst.demonstration}')."
     )
-    if not open_:
+    if not (count := sum(one.determined < 1.0 for one in found.regions)):
         return [f"Every recorded state is determined. If you record more: {advice}"]
-    alone = sum(len(one.shown_by) < ENOUGH for one in found.regions)
-    where = (
-        f"Not determined at {1 - found.states_determined:.0%} of the states, in {len(open_)} of {len(found.regions)} "
-    )
-    where += f"regions; in {alone} regions fewer than {ENOUGH} demonstrations moved along what is least known."
-    return [f"{where} {_least_shown(worst, states, actions)}", f"What would help most: {advice}"]
+    where = f"Not determined at {1 - found.states_determined:.0%} of the states, in {count} of {len(found.regions)} "
+    where += f"regions; in {sum(len(one.shown_by) < ENOUGH for one in found.regions)} regions fewer than {ENOUGH} "
+    where += f"demonstrations moved along what is least known. {_least_shown(worst, states, actions)}"
+    return [where, f"What would help most: {advice}"]
 
 
 def _least_shown(region: Region, states: Sequence[str], actions: Sequence[str]) -> str:

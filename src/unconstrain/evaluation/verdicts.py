@@ -41,6 +41,9 @@ OTHERWISE = 1.2
 FAR_OFF = 1.5
 """Those of a single roll-out from which on not even the others speak for the policy."""
 
+FORBIDDEN = 0.05
+"""Share of recorded motion that a constraint given would not allow, from which on it is likely another."""
+
 OTHER_UNIT = 30.0
 """Median size over that demonstrated, or the inverse, from which on units are likely to differ."""
 
@@ -92,7 +95,9 @@ class Verdict(NamedTuple):
         return said
 
 
-def _graded(share: float, good: float = GOOD, fair: float = FAIR) -> tuple[Mark, str]:
+def _graded(share: float, good: float = GOOD, fair: float = FAIR, told: float | None = None) -> tuple[Mark, str]:
+    if share >= good and told is not None and told < PARTLY:
+        return Mark.DOUBTFUL, "good along it, not enough across it"
     if share >= good:
         return Mark.GOOD, "good"
     return (Mark.DOUBTFUL, "fair") if share >= fair else (Mark.BAD, "poor")
@@ -100,81 +105,76 @@ def _graded(share: float, good: float = GOOD, fair: float = FAIR) -> tuple[Mark,
 
 def of_untold(share: float) -> str:
     """Say at which share of the recorded states the policy is not determined."""
-    return f"at {share:.0%} of the recorded states no recording tells the policy in some direction"
+    return f"at {max(share, 0.0):.0%} of the recorded states no recording tells the policy in some direction"
 
 
-def of_explained(
-    share: float,
-    demonstrations: int,
-    determined: float | None = None,
-    what: str = "held-out motion",
-    there: str = "",
-) -> Verdict:
-    """Judge how much of some motion a policy explains, along the motion.
+def of_explained(share: float, demonstrations: int, determined: float | None = None, there: str = "") -> Verdict:
+    """Judge how much of held-out motion a policy explains, along the motion.
 
-    Parameters
-    ----------
-    share : float
-        1 − the share left unexplained; NaN where nothing could be held out.
-    demonstrations : int
-        Fewer than three give no verdict.
-    determined : float, optional
-        Share of the recorded states at which recordings tell the policy.
-    what : str
-        The motion.
-    there : str
-        What to record where fewer show it.
+    ``share`` is 1 − the share left unexplained, NaN where nothing could be held out; fewer than three demonstrations
+    give no verdict. ``determined`` is the share of the recorded states at which recordings tell the policy, and
+    ``there`` what to record where fewer show it.
     """
     across = "What constraints hid: no recording shows it, so no score does."
     if determined is not None and determined < MOSTLY and demonstrations >= ENOUGH:
         across = f"Across the motion: {of_untold(1 - determined)}"
         across += "." if there else "; 'unconstrain diagnose' says where."
     if demonstrations < ENOUGH or not np.isfinite(share):
-        seen = f"explains {share:.0%} of {what}, but " if np.isfinite(share) else ""
+        seen = f"the policy explains {share:.0%} of held-out motion, but " if np.isfinite(share) else ""
         few = f"{seen}no verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
         return Verdict(Mark.DOUBTFUL, few[0].upper() + few[1:], doubt=across, next=MORE)
-    mark, word = _graded(share)
+    mark, word = _graded(share, told=determined)
     missed = f"where the policy predicts, it misses about {np.sqrt(max(1 - share, 0)):.0%} of a typical action"
     advice = {
-        Mark.GOOD: "Score it on recordings that were held in other ways.",
-        Mark.DOUBTFUL: "'unconstrain diagnose' says where it fails: by noise, which a wider --window takes out, or as "
+        "fair": "'unconstrain diagnose' says where it fails: by noise, which a wider --window takes out, or as "
         "demonstrations have little in common.",
-        Mark.BAD: "Look at the recordings ('unconstrain inspect'): columns, clocks or units may be wrong.",
-    }[mark]
+        "poor": "Look at the recordings ('unconstrain inspect'): columns, clocks or units may be wrong, or they have "
+        "too little in common.",
+    }.get(word, "Score it on recordings that were held in other ways.")
     trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
-    if mark is Mark.GOOD and determined is not None and determined < PARTLY:
-        mark, word = Mark.DOUBTFUL, "good along it, not enough across it"
-    return Verdict(mark, f"Explains {share:.0%} of {what}: {word}.", trust, across, f"{advice} {there}".rstrip())
+    said = f"The policy explains {share:.0%} of held-out motion: {word}."
+    return Verdict(mark, said, trust, across, f"{advice} {there}".rstrip())
 
 
-def of_score(share: float, demonstrations: int, under: float | None = None, learnt: int | None = None) -> Verdict:
+def of_score(
+    share: float, demonstrations: int, under: float | None = None, learnt: int | None = None, told: float | None = None
+) -> Verdict:
     """Judge how much of recordings that were not learnt from a policy explains; one is enough to see it fail.
 
     ``under`` is the same under their constraint, 1 − nCPE, where that is known: then the smaller one is judged. Of
-    ``learnt`` of them, where that is known, the policy learnt.
+    ``learnt`` of them, where that is known, the policy learnt; ``told`` is as ``determined`` in :func:`of_explained`.
     """
-    mark, word = _graded(share if under is None else min(share, under))
+    mark, word = _graded(share, told=told) if under is None else _graded(min(share, under))
     few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
     known = "" if under is None else f", and {under:.0%} under the constraint given (1 − nCPE)"
     counted = (
         "Movement under other constraints. Noise, and motion faster or slower than learnt, count as missed in nCPE."
     )
     if learnt:
-        said = f"Explains {share:.0%} of the motion{known}, but it learnt from {learnt} of {_count(demonstrations)}: "
-        then = "Hold some out of the fit (--leave-out, --episodes), and score these."
-        return Verdict(Mark.DOUBTFUL, f"{said}a score on what was learnt from is too good.", next=then)
+        said = f"The policy explains {share:.0%} of the motion{known}, but it learnt from {learnt} of "
+        said += f"{_count(demonstrations)}: a score on what was learnt from is too good."
+        return Verdict(Mark.DOUBTFUL, said, next="Hold some out of the fit (--leave-out, --episodes), and score these.")
     unknown = ", if none of it was learnt from" if learnt is None else ""
+    across = "What constraints hid in these recordings, too: --plane or --constraint tells it."
+    if told is not None and told < MOSTLY:
+        across = f"Across the motion: {of_untold(1 - told)}. --plane or --constraint tells more."
     return Verdict(
         mark,
-        f"Explains {share:.0%} of held-out motion{known}{unknown}: {word}.",
+        f"The policy explains {share:.0%} of held-out motion{known}{unknown}: {word}.",
         "" if mark is Mark.BAD else "Movement like this, along the directions that were recorded.",
-        "What constraints hid in these recordings, too: --plane or --constraint tells it."
-        if under is None
-        else counted,
+        across if under is None else counted,
         f"Score it under other constraints.{few}"
         if mark is Mark.GOOD
         else "'unconstrain diagnose' says what to record.",
     )
+
+
+def of_forbidden(found: Verdict, share: float) -> Verdict:
+    """Add to a score under a constraint that it would not allow some share of the recorded motion, nPOE, if much."""
+    mark = Mark.BAD if found.mark is Mark.BAD else Mark.DOUBTFUL
+    said = f"The constraint given forbids {share:.0%} of this motion (nPOE): likely another held it. {found.said}"
+    then = "Score without it, or give what held them ('unconstrain constraint' learns that)."
+    return found if share <= FORBIDDEN else found._replace(mark=mark, said=said, next=then)
 
 
 def of_diagnosis(found: Diagnosis) -> Verdict:
@@ -189,17 +189,22 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
         return Verdict(Mark.DOUBTFUL, said, doubt=doubt, next=MORE)
     mark, word = _graded(share, MOSTLY, PARTLY)
     words = {"good": "enough", "fair": "enough in most places", "poor": "not enough"}
-    said = f"At {share:.0%} of the recorded states three demonstrations or more tell the policy: {words[word]}."
+    said = f"Recordings: at {share:.0%} of their states three demonstrations or more tell the policy: {words[word]}."
     if mark is Mark.BAD and found.told_together >= PARTLY:
         mark = Mark.DOUBTFUL
-        said = f"Demonstrations tell the policy at {found.told_together:.0%} of the recorded states, "
+        said = f"Recordings: all together tell the policy at {found.told_together:.0%} of their states, "
         said += f"but at {share:.0%} whichever two are left out: it may hang on one or two."
+    elif found.planes == 1:
+        said = f"{said[:-1]}, as all lie on one plane or on parallel ones."
+    elif mark is Mark.BAD and found.planes:
+        mark, said = Mark.DOUBTFUL, f"{said[:-1]} to be sure, though each lies on a plane of its own."
     if found.noise_share > 3 * SMALL:
         mark = Mark.BAD if mark is Mark.BAD else Mark.DOUBTFUL
         said = f"{said[:-1]}, though noise is {found.noise_share:.0%} of a typical action."
     trust = "" if mark is Mark.BAD else f"The policy at these states, to about {found.noise_share:.0%} of noise."
     if mark is not Mark.GOOD:
-        doubt += " 'fit' and 'score' may still explain much: they judge along recorded motion, this judges across it."
+        doubt += " 'fit' and 'score' may still explain much: they judge a policy along the motion, this judges "
+        doubt += "recordings across it."
     then = "Record what the list below says, the first first." if share < 1 else "Demonstrate where nobody was."
     return Verdict(mark, said, trust, doubt, then)
 
@@ -244,14 +249,6 @@ def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool) -> Verdict:
     return found._replace(said=said + found.said.partition(" directions were held")[2], next=then)
 
 
-WITHOUT_SUPPORT = Verdict(
-    Mark.DOUBTFUL,
-    "How near demonstrations are cannot be told: this model has no support, it goes on everywhere.",
-    next="Compare it with what was demonstrated; 'unconstrain fit --model local' learns a policy that knows.",
-)
-"""Of a movement of an affine or polynomial policy."""
-
-
 def of_support(support: Array, times: Array | None, unknown: Array | None = None) -> Verdict:
     """Judge a movement of a policy by how near data is along it, (T,) each; times are steps where not known.
 
@@ -280,17 +277,17 @@ def _of_open(open_: NDArray[np.bool_], most: float, seconds: Array) -> Verdict:
     return Verdict(Mark.DOUBTFUL, said, trust, "Directions that are not determined there.", then)
 
 
-def of_replays(found: Verdict, extents: Array, paces: Array, apart: str) -> Verdict:
+def of_replays(found: Verdict, extents: Array, paces: Array, apart: str, lasts: Sequence[float] = ()) -> Verdict:
     """Add to a verdict how a policy moves from the starts of demonstrations, held as they were.
 
-    ``extents`` and ``paces`` are size and turns of each run over those of its demonstration, NaN where there are none;
-    ``apart`` is how far the runs stray. Half of them may be off by :data:`OTHERWISE` either way, whatever the mean is,
-    and none by :data:`FAR_OFF`.
+    ``extents`` and ``paces`` are size and turns of each run over those of its demonstration, NaN where there are none,
+    and ``lasts`` the size of the last round over that of the first, over the same; ``apart`` is how far the runs stray.
+    Half of them may be off by :data:`OTHERWISE` either way, whatever the mean is, and none by :data:`FAR_OFF`.
     """
-    measured = _measured(extents, paces)
+    measured = _measured(extents, paces, lasts)
     if not measured:
         return found
-    ran = f"un from the same starts: {size_and_pace(extents, paces)}, typically {apart} away"
+    ran = f"un from the same starts: {size_and_pace(extents, paces, lasts)}, typically {apart} away"
     off = {name: np.abs(np.log(np.maximum(ratios, 1e-9))) for name, ratios in measured.items()}
     strays = {
         name: int((many > np.log(OTHERWISE)).sum())
@@ -307,15 +304,15 @@ def of_replays(found: Verdict, extents: Array, paces: Array, apart: str) -> Verd
     return judged
 
 
-def size_and_pace(extents: Array, paces: Array) -> str:
+def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> str:
     """Those of :func:`of_replays` in words: the middle ones, and their ranges."""
-    told = ", ".join(f"{name} {_times(ratios)}" for name, ratios in _measured(extents, paces).items())
+    told = ", ".join(f"{name} {_times(ratios)}" for name, ratios in _measured(extents, paces, lasts).items())
     return f"{told} the demonstrated" if told else ""
 
 
-def _measured(extents: Array, paces: Array) -> dict[str, Array]:
-    finite = {"size": extents[np.isfinite(extents)], "pace": paces[np.isfinite(paces)]}
-    return {name: ratios for name, ratios in finite.items() if len(ratios)}
+def _measured(*given: Sequence[float] | Array) -> dict[str, Array]:
+    named = zip(("size", "pace", "last round over first"), map(np.asarray, given), strict=True)
+    return {name: found for name, ratios in named if len(found := ratios[np.isfinite(ratios)])}
 
 
 def _times(ratios: Array) -> str:

@@ -19,7 +19,7 @@ from ..recordings import Demonstration, Recipe, stack
 from ..risks import action_projection, project
 from . import figures, html
 from .diagnosis import unknown
-from .replays import FLAT, Replay
+from .replays import Replay
 from .replays import replayed as replayed
 
 if TYPE_CHECKING:
@@ -168,7 +168,7 @@ def _replays(runs: Sequence[Replay], said: str, names: Sequence[str]) -> list[ht
         return []
     keys = ["hybrid" if one.held else "roll-out, free" for one in runs]
     drawn = [("training", one.done) for one in runs] + [(key, one.run) for key, one in zip(keys, runs, strict=True)]
-    caption = html.words("fit_replays", held=keys.count("hybrid"), every=len(runs), flat=f"{FLAT:.0%}")
+    caption = html.words("fit_replays", held=keys.count("hybrid"), every=len(runs), flat=f"{diagnosis.FLAT:.0%}")
     shown = [key for key in ("training", "hybrid", "roll-out, free") if key in {name for name, _ in drawn}]
     labels = {"training": "demonstrations", "hybrid": "roll-outs, held alike"}
     picture = html.picture(

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Array
 from ..base.errors import DivergedError
-from ..evaluation import verdicts
+from ..evaluation import diagnosis, verdicts
 from ..models import spaces
 from ..motion import rollout
 from ..recordings import Demonstration
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 MOST, STEPS = 20, 1000
 """Demonstrations, and steps of each, that are run at most: seconds."""
 
-FLAT = 0.1
-"""A demonstration is held along directions in which it spreads by less than this share of its longest."""
+ROUNDS = 1.5
+"""Rounds, at least, of which the last is compared with the first."""
 
 
 class Replay(NamedTuple):
@@ -34,6 +34,8 @@ class Replay(NamedTuple):
     """Of the roll-out, root mean square distance from its middle, over that of the demonstration."""
     pace: float
     """Turns of the roll-out over those of the demonstration; NaN where that made less than one."""
+    last: float
+    """Size of the last round of the roll-out over its first, over the same of the demonstration; NaN without two."""
     apart: float
     """Mean distance of the states of the roll-out to the nearest of the demonstration, unit of the states."""
     held: bool
@@ -73,14 +75,14 @@ def replayed(
     if not known:
         unknown = " Its size and pace over time: not compared, as what held these recordings is not known."
         return Replayed(found._replace(doubt=found.doubt + unknown) if runs else found, None, runs)
-    extents, paces, apart = np.array([one[:3] for one in known]).T
+    extents, paces, lasts, apart = np.array([one[:4] for one in known]).T
     unit = {units.get(name, "") for name in recipe.states or ()}
     said = f"{np.median(apart):.3g} {unit.pop() if len(unit) == 1 else ''}".rstrip()
-    measured = {"extent": extents, "pace": paces[np.isfinite(paces)], "apart": apart}
-    medians = {name: float(np.median(values)) if len(values) else np.nan for name, values in measured.items()}
-    told = {name: value if np.isfinite(value) else None for name, value in medians.items()}
-    judged = verdicts.of_replays(found, extents, paces, said)
-    return Replayed(judged, told, runs, verdicts.size_and_pace(extents, paces))
+    measured = {"extent": extents, "pace": paces, "last_round": lasts, "apart": apart}
+    finite = {name: values[np.isfinite(values)] for name, values in measured.items()}
+    told = {name: float(np.median(values)) if len(values) else None for name, values in finite.items()}
+    judged = verdicts.of_replays(found, extents, paces, said, lasts)
+    return Replayed(judged, told, runs, verdicts.size_and_pace(extents, paces, lasts))
 
 
 def replays(
@@ -97,14 +99,14 @@ def replays(
     chosen = [one for one in demos if one.times is not None and len(one) > 2 and np.ptp(one.states, axis=0).any()]
     if recipe.actions is not None or n != d or demos[0].space != spaces.Euclidean(n) or not chosen:
         return []
-    chosen = chosen if free or held is not None else [one for one in chosen if _flat(one.states)[0].any()]
+    chosen = chosen if free or held is not None else [one for one in chosen if diagnosis.flat(one.states)[0].any()]
     if not chosen:
         return []
     chosen = [chosen[k] for k in np.linspace(0, len(chosen) - 1, min(len(chosen), MOST)).astype(int)]
     clocks = [np.asarray(one.times, np.float64) for one in chosen]
     lasted = [float(times[-1] - times[0]) for times in clocks]
     dt = max(float(np.median(np.diff(clocks[0]))), max(lasted) / STEPS)
-    shapes = [_flat(one.states) for one in chosen]
+    shapes = [diagnosis.flat(one.states) for one in chosen]
     task = held.target if getattr(held, "task", False) else None
     starts, steps = np.array([one.states[0] for one in chosen]), round(max(lasted) / dt) + 1
     own = [partial(_same, rows) for rows, _ in shapes] if held is None else held
@@ -121,27 +123,28 @@ def _same(rows: Array, states: Array, _times: Array) -> Array:
     return np.broadcast_to(rows, (len(states), *rows.shape))
 
 
-def _flat(states: Array) -> tuple[Array, Array]:
-    """Directions, in rows, along which states (T, n) hardly spread, zero where they do (n, n), and most (2, n)."""
-    _, spread, axes = np.linalg.svd(states - states.mean(axis=0), full_matrices=False)
-    beyond = states.shape[1] - len(axes)
-    spread, axes = np.pad(spread, (0, beyond)), np.pad(axes, ((0, beyond), (0, 0)))
-    return axes * (spread < FLAT * spread[0])[:, None], axes[:2]
-
-
 def _compared(done: Demonstration, run: Demonstration, plane: Array, held: bool) -> Replay:
     """As seen along two directions in rows, (2, n)."""
     both = done.states, run.states
     size = [float(np.sqrt(one.var(axis=0).sum())) for one in both]
     turns = [_turns((one - one.mean(axis=0)) @ plane.T) for one in both]
-    pace = turns[1] / turns[0] if abs(turns[0]) >= 1 else np.nan
+    pace = turns[1][-1] / turns[0][-1] if abs(turns[0][-1]) >= 1 else np.nan
+    lasting = [_lasting(one, done) for one, done in zip(both, turns, strict=True)]
     apart = cKDTree(done.states).query(run.states)[0].mean()
-    return Replay(size[1] / size[0], float(pace), float(apart), held, done, run)
+    return Replay(size[1] / size[0], float(pace), lasting[1] / lasting[0], float(apart), held, done, run)
 
 
-def _turns(points: Array) -> float:
-    """How often points (T, 2) go round the origin."""
+def _turns(points: Array) -> Array:
+    """How often points (T, 2) have gone round the origin, (T,)."""
     if points.shape[1] < 2:
-        return 0.0
+        return np.zeros(len(points))
     angles = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
-    return float((angles[-1] - angles[0]) / (2 * np.pi))
+    return np.asarray((angles - angles[0]) / (2 * np.pi))
+
+
+def _lasting(states: Array, turns: Array) -> float:
+    """Size of the last round over that of the first; NaN where there are too few."""
+    if abs(turns[-1]) < ROUNDS:
+        return np.nan
+    first, last = states[np.abs(turns) <= 1], states[np.abs(turns[-1] - turns) <= 1]
+    return float(np.sqrt(last.var(axis=0).sum() / first.var(axis=0).sum()))

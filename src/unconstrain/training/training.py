@@ -171,6 +171,11 @@ class Training(Shown):
         return replace(begun.with_batches(batches), longest=self.longest)
 
     @property
+    def fastest(self) -> float:
+        """A length that no plausible action at first look exceeded, by its largest coordinate."""
+        return min(self.longest, float(np.sqrt(self.actions)) * self.action_unit * self.at_rest / AT_REST)
+
+    @property
     def moments(self) -> Moments:
         """Sums over the features φ(x) of all folds, in the units of what was given."""
         return self.gathered.whole.in_units(self.action_unit, self.weight_unit)

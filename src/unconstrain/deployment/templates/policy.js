@@ -6,10 +6,10 @@
  *     action = sum_m s_m(x) (A_m z + b_m),   s_m = exp(e_m) / sum_k exp(e_k),   e_m = slope_m . z + offset_m.
  *
  * Returns policy(state), an array of actions; support(state): 1 at the centre of a kernel, 0 far from all of them,
- * and null where the policy has no kernels; and under(state, projection), what is left of the action under a constraint
+ * and of a policy without kernels 1 within the reach of its data, 0 outside; and under(state, projection), what is left of the action under a constraint
  * with this projection onto its null space, an array of rows. A correction lets the policy arrive, free and so.
  */
-function policyOf({ origin, maps, exponents, monomials, precision, frame, factors, correction }) {
+function policyOf({ origin, maps, exponents, monomials, precision, reach, frame, factors, correction }) {
   const size = origin.length, actions = maps[0].length, terms = maps[0][0].length;
 
   /** Entries of the rotation matrix of a quaternion, by rows, over the square root of two. */
@@ -118,7 +118,10 @@ function policyOf({ origin, maps, exponents, monomials, precision, frame, factor
   const under = (state, projection) => corrected(state, (v) => projection.map((row) => dot(row, v)));
 
   function support(state) {
-    if (!exponents || !precision) return null;
+    if (!exponents || !precision) {
+      const z = relative(state);
+      return Number(reach.every((each, i) => Math.abs(z[i]) <= each));
+    }
     const z = relative(state);
     const nearest = Math.max(...exponents.map((slopes) => dot(slopes, z)));
     return Math.exp(Math.min(0, nearest - 0.5 * precision.reduce((sum, each, i) => sum + each * z[i] * z[i], 0)));
