@@ -4,6 +4,7 @@ import json
 import re
 import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -475,7 +476,7 @@ def test_on_the_arm_the_sponge_stays_on_the_plate_and_keeps_the_beat(simulated):
 
 
 def test_without_physics_the_stand_in_demonstrates_and_says_so():
-    result = washing.run(washing.Settings(simulator="kinematic", duration=8.0, steps=20, trials=2))
+    result = washing.run(washing.Settings(simulator="kinematic", duration=6.0, strokes=3, steps=2, trials=2))
     assert result.tables["reproduction"] == []
     assert washing.headlines(result)[0] == washing.WITHOUT_PHYSICS
     error = {method: mean_of(result, method, "ncpe", seen=False) for method in METHODS}
@@ -492,7 +493,7 @@ def test_a_plate_out_of_reach_is_refused_before_anything_long_begins():
 
 def test_a_further_plate_is_wiped_and_not_learnt_from():
     seen = []
-    settings = washing.Settings(plate=(8.0, -6.0), trials=1, duration=8.0, steps=20, cycles=2)
+    settings = washing.Settings(plate=(8.0, -6.0), trials=1, duration=4.0, strokes=5, steps=2, cycles=2)
     result = washing.run(settings, progress=lambda *now: seen.append(now))
     assert seen == [(done, 5) for done in range(1, 6)]  # one set of demonstrations, and four plates for the arm
     assert {row["seen"] for row in result.rows if row["surface"] == "+8° about x, -6° about y"} == {False}
@@ -661,8 +662,9 @@ def test_the_arm_moves_as_section_4b_says():
 
 @pytest.fixture(scope="module")
 def small_constraints(once):
-    settings = constraints.Settings(trials=1, noise=(0.05,), blocks=(20,), mechanisms=8)
+    settings = constraints.Settings(trials=1, noise=(0.05,), blocks=(8,), mechanisms=2)
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(constraints.mechanisms, "normals", partial(constraints.mechanisms.normals, rate=4.0))
         patch.setenv("UNCONSTRAIN_DATA", str(DATA))
         return once("small constraints", lambda: constraints.run(settings))
 

@@ -3,6 +3,7 @@
 import ctypes
 import subprocess
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -30,22 +31,23 @@ def cycle(states):
 
 ROUND = uc.rollout(cycle, [[0.5, 0.0, 0.0], [0.0, 0.45, 0.02], [0.0, -0.55, 0.0]], 120, 0.05, method="rk4")
 DOWN = uc.rollout(spiral, RNG.uniform(-0.6, 0.6, (6, 3)), 120, 0.05)
-POLICY = uc.LocallyLinearPolicy(learner="direct").fit_demonstrations(ROUND)
-"""Goes round: far from what arrives at a goal."""
-
-GUIDED = {
-    "goal": uc.Guided(POLICY, goal=[0.05, 0.0, 0.0], demonstrations=DOWN).moved(BY),
-    "cycle": uc.Guided(POLICY, demonstrations=ROUND).moved(BY),
-}
 STATES = np.concatenate([BY + width * RNG.uniform(-1, 1, (30, 3)) for width in (0.01, 0.5, 30.0)])
 STATES = STATES.astype(np.float32).astype(np.float64)
 NORMALS = RNG.standard_normal((90, 3))
 PROJECTIONS = uc.null_space_projection(NORMALS[:, None])
 
 
-@pytest.fixture(params=GUIDED)
+@cache
+def learnt(kind):
+    """A policy that goes round, far from what arrives at a goal, and is guided to one or stays."""
+    policy = uc.LocallyLinearPolicy(learner="direct").fit_demonstrations(ROUND)
+    aim = {"goal": [0.05, 0.0, 0.0], "demonstrations": DOWN} if kind == "goal" else {"demonstrations": ROUND}
+    return uc.Guided(policy, **aim).moved(BY)
+
+
+@pytest.fixture(params=["goal", "cycle"])
 def guided(request):
-    return GUIDED[request.param]
+    return learnt(request.param)
 
 
 def assert_same(free, held, guided, rtol):
@@ -119,4 +121,4 @@ def test_what_has_no_formula_is_said():
     with pytest.raises(SettingError, match="which has no formula to export"):
         uc.Guided(spiral, demonstrations=demos).closed_form()
     with pytest.raises(SettingError, match="scaler: a guided policy is guided in the units of its own states"):
-        GUIDED["goal"].closed_form(scaler=object())
+        learnt("goal").closed_form(scaler=object())

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -68,7 +69,7 @@ class Flow:
         """``A⁺b + N π`` (K, d), π (K, d) and N (K, d, d)."""
         with self.told(state, time):
             matrices = self.matrices(state, time)
-            projections = null_space_projection(matrices)
+            projections = _projections(np.asarray(matrices, np.float64).tobytes(), matrices.shape).copy()
             wanted = self._wanted(state, projections)
         actions = _without_rounding(project(projections, wanted), wanted)
         actions = self.turned(state, actions, projections) + self.drift(matrices, state, time)
@@ -261,6 +262,12 @@ def _adaptive(flow: Flow, state: Array, time: float, dt: float, slope: Array, le
 
 
 STEPS = {"euler": _euler, "rk4": _rk4, "adaptive": _adaptive}
+
+
+@lru_cache(maxsize=1)
+def _projections(matrices: bytes, shape: tuple[int, ...]) -> Array:
+    """N (K, d, d) of A; those of the last step are kept, since most constraints do not vary."""
+    return null_space_projection(np.frombuffer(matrices).reshape(shape))
 
 
 def _slope(flow: Flow, state: Array, time: float) -> Array:

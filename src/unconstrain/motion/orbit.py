@@ -97,21 +97,22 @@ class Orbit(Shown):
 
     def spare(self, states: Array, velocities: Array, slope: Array) -> Array:
         """By how much the surface attracts more than it has to where ``N ∇V`` (N, n) is so, as a share of that."""
-        off = self.potential(states) - 0.5 * self.radius**2
-        share = np.minimum(1.0, np.linalg.norm(slope, axis=1) / self._width(states))
+        height = self.potential(states)
+        off, steep = height - 0.5 * self.radius**2, np.linalg.norm(slope, axis=1)
+        share = np.minimum(1.0, steep / self._width(height))
         least = share**2 * PULL * self.rate * off**2
         nearer = -off * np.vecdot(slope, velocities)
         return (nearer - least) / np.maximum(np.abs(nearer) + least, np.finfo(float).tiny)
 
     def guided(self, states: Array, wanted: Array, projections: Array | None = None) -> Array:
         """Velocities (N, n) for those that are wanted, both in the null space of projections N (N, n, n)."""
-        slope, round_ = self.potential.gradient(states), (states - self.potential.goal) @ self.turn.T
+        (height, slope), round_ = self.potential.both(states), (states - self.potential.goal) @ self.turn.T
         if projections is not None:
             slope, round_ = project(projections, slope), project(projections, round_)
         steep, tiny = np.linalg.norm(slope, axis=1), np.finfo(float).tiny
         outward = slope / np.maximum(steep, tiny)[:, None]
-        width = self._width(states)
-        off = (self.potential(states) - 0.5 * self.radius**2) / np.maximum(steep, width)
+        width = self._width(height)
+        off = (height - 0.5 * self.radius**2) / np.maximum(steep, width)
         speed = np.vecdot(outward, wanted)
         bounds = np.sort([-PULL * self.rate * off, -RUSH * self.rate * off], axis=0)
         along = wanted - speed[:, None] * outward
@@ -134,9 +135,9 @@ class Orbit(Shown):
         rates = (flat[:, 1] * np.cos(angle) - flat[:, 0] * np.sin(angle)) / size
         return float(1.0 / np.abs(1.0 / rates).mean()) if rates.all() else 0.0
 
-    def _width(self, states: Array) -> Array:
-        """Where ``‖N ∇V‖`` is less, V is nearly level, and motion slower in proportion, (N,)."""
-        return MIDDLE * np.sqrt(np.maximum(2.0 * self.potential(states), self.radius**2))
+    def _width(self, height: Array) -> Array:
+        """Where V is so high (N,) and ``‖N ∇V‖`` is less, V is nearly level, and motion slower in proportion, (N,)."""
+        return MIDDLE * np.sqrt(np.maximum(2.0 * height, self.radius**2))
 
     @property
     def dt(self) -> float:

@@ -19,8 +19,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
-from functools import reduce
+from dataclasses import dataclass, replace
+from functools import lru_cache, reduce
 from itertools import combinations, combinations_with_replacement
 from operator import add, sub
 from typing import Any, Literal
@@ -96,7 +96,7 @@ class Moments(Shown):
     @property
     def sums(self) -> tuple[Array, ...]:
         """The five sums, in the order of the fields."""
-        return tuple(getattr(self, field.name) for field in fields(self))
+        return self.weight, self.energy, self.cross, self.gram, self.consistent
 
     def in_features(self, change: Array) -> Moments:
         """Moments of other features that are linear in these, ``φ' = T_m φ``.
@@ -343,7 +343,7 @@ def _metrics(xp: Any, features: Array, directions: Array) -> tuple[Array, Array]
 
 def _halves(xp: Any, table: Array) -> Array:
     """Products of the columns, each pair once."""
-    first, second = (beside(index, table) for index in np.triu_indices(table.shape[1]))
+    first, second = (beside(index, table) for index in _pairs(table.shape[1]))
     halves: Array = xp.take(table, first, axis=1) * xp.take(table, second, axis=1)
     return halves
 
@@ -359,9 +359,16 @@ def _sum_of_each_with_each(weights: Array, first: Array, second: Array) -> Array
         return weights.T @ room
 
 
+@lru_cache(maxsize=8)  # a fit asks for those of its sizes a hundred times
+def _pairs(size: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Pairs k ≤ m; not to be changed."""
+    return np.triu_indices(size)
+
+
+@lru_cache(maxsize=8)
 def _places(size: int) -> NDArray[np.intp]:
-    """Where each entry of a symmetric matrix is among its pairs k ≤ m, row by row."""
+    """Where each entry of a symmetric matrix is among its pairs k ≤ m, row by row; not to be changed."""
     places = np.zeros((size, size), dtype=np.intp)
-    row, column = np.triu_indices(size)
+    row, column = _pairs(size)
     places[row, column] = places[column, row] = np.arange(len(row))
     return places

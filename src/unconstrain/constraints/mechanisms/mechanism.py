@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import accumulate
 from typing import Any, ClassVar, NamedTuple, Self, TypeVar
 
 import numpy as np
@@ -200,8 +201,9 @@ class Mechanism(Shown):
         return (self.sentence,)
 
     def _named(self, numbers: Array) -> dict[str, Array]:
-        ends = np.cumsum(self.sizes, dtype=np.intp)
-        return dict(zip(self.form.chart, np.split(numbers, ends)[:-1], strict=True))
+        sizes = self.sizes
+        parts = zip(self.form.chart, sizes, accumulate(sizes), strict=True)
+        return {name: numbers[end - size : end] for name, size, end in parts}
 
 
 def on_one_side(mechanisms: Sequence[M]) -> list[M]:
