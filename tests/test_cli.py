@@ -1018,7 +1018,7 @@ def test_actions_that_are_no_velocities_cannot_be_rolled_out(tmp_path):
     rows = record((0.5, 0.5))
     write(tmp_path / "one.csv", "t,x,y,u", rows[:, :4])
     run("fit", tmp_path / "one.csv", "--state", "x,y", "--action", "u", "--model", "linear", "-o", tmp_path / "p.npz")
-    said = refused("rollout", tmp_path / "p.npz", "--start", "0,0")
+    said = refused("rollout", tmp_path / "p.npz", "--start", "0.5,0.5")
     assert said.endswith("a rollout expects actions that are velocities of the state.")
 
 
