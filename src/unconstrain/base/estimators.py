@@ -18,6 +18,8 @@ def checked_states(estimator: Any, X: ArrayLike, *, reset: bool = False, convert
     InvalidDataError
         If they are anything else.
     """
+    if not reset and _is_plain(estimator, X):
+        return as_matrix(X, "states", convert=convert)
     if isinstance(X, list | tuple):
         X = as_matrix(X, "states")  # our words for ragged rows
     try:
@@ -31,3 +33,10 @@ def checked_states(estimator: Any, X: ArrayLike, *, reset: bool = False, convert
     except ValueError as error:
         raise InvalidDataError(str(error)) from error
     return as_matrix(table, "states", convert=convert)
+
+
+def _is_plain(estimator: Any, X: Any) -> bool:
+    """Whether there is nothing that scikit-learn would say, in half a millisecond, of a table."""
+    if type(X) is not np.ndarray or X.dtype != np.float64 or X.ndim != 2 or not len(X):
+        return False
+    return X.shape[1] == getattr(estimator, "n_features_in_", None) and not hasattr(estimator, "feature_names_in_")
