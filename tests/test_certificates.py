@@ -1,5 +1,6 @@
 """What is guaranteed of motion, and what refutes it."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -95,6 +96,14 @@ def test_a_movement_that_does_not_arrive_is_a_counterexample():
     plane = None if found.normal is None else Plane(found.normal)
     ends = [uc.rollout(two_goals, start, 400, 0.05, plane).states[-1] for start in (found.start, -found.start)]
     assert np.linalg.norm(ends[0] - ends[1]) > 0.5
+
+
+def test_where_most_movements_end_is_told_and_that_they_end_nowhere():
+    def seldom(states):
+        return np.where(states[:, :1] > 1.0, two_goals(states / 2.0), inwards(states))
+
+    assert "movements do not end in one place" in uc.certify(lambda x: cycle(x) + 1e-3 * x**2, AROUND).said
+    assert re.search(r"of 60 movements ([1-9]|1\d) do not end at \(0\.3", uc.certify(seldom, AROUND).said)
 
 
 def test_nothing_is_promised_of_a_policy_that_only_seems_to_arrive():
