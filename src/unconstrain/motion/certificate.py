@@ -180,7 +180,8 @@ def _refuted(policy: Callable[[Array], Array], starts: Array, normals: Array, ne
     at = int(away.argmax())
     said = f"of {len(starts)} movements {away.sum()} do not end at ({_listed(goal)})"
     said = said if 2 * away.sum() <= len(away) else "movements do not end in one place"
-    return _against(f"not guaranteed (see uc.Guided): {said}; one is at ({_listed(ends[at])}) after {STEPS * dt:.3g} s", starts[at], units[at])
+    said = f"not guaranteed (see uc.Guided): {said}; one is at ({_listed(ends[at])}) after {STEPS * dt:.3g} s"
+    return _against(said, starts[at], units[at])
 
 
 def _against(said: str, start: Array, normal: Array) -> Certificate:
