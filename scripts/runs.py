@@ -316,7 +316,7 @@ RUNS = {
     "arrival_cycles": Run(
         "unconstrain reproduce arrival --only cycles --out results/cycles", "cycles/arrival.json", arrival_cycles
     ),
-    "regimes": Run("unconstrain reproduce regimes --out results", "regimes.json", regimes),
+    "regimes": Run("unconstrain reproduce regimes --trials 4 --out results", "regimes.json", regimes),
     "recorded": Run("unconstrain reproduce recorded --trials 8 --out results", "recorded.json", recorded),
     "constraints": Run("unconstrain reproduce constraints --out results", "constraints.json", constraints),
     "bench": Run("make bench BENCH='--out results/bench.json'", "bench.json", bench),
