@@ -85,7 +85,7 @@ def look(
     then = "Open the page; what it marks says what cures it." if odd else "Open the page."
     verdict = uc.evaluation.verdicts.of_surveys(surveys)
     if seen.policy is not None:
-        from ..pages.look import replayed
+        from ..pages.fit import replayed
 
         units = seen.recordings[0].units
         verdict = replayed(verdict, seen.policy, seen.demonstrations, seen.recipe, None, units, free=False).verdict

@@ -66,16 +66,16 @@ class Potential(Shown):
 
     def __call__(self, states: Array) -> Array:
         """V at N states, shape (N,), in squared units of the state per second."""
-        return self.both(states)[0]
+        return self._height(self._beyond(states))
 
     def gradient(self, states: Array) -> Array:
         """∇V at N states, shape (N, n)."""
-        return self.both(states)[1]
+        return self._slope(self._beyond(states))
 
     def both(self, states: Array) -> tuple[Array, Array]:
         """V (N,) and ∇V (N, n)."""
-        beyond = np.maximum((states - self.goal) @ self.directions.T - self.offsets, 0.0)
-        return 0.5 * beyond**2 @ self.weights, beyond @ (self.weights[:, None] * self.directions)
+        beyond = self._beyond(states)
+        return self._height(beyond), self._slope(beyond)
 
     @property
     def curvature(self) -> float:
@@ -89,6 +89,15 @@ class Potential(Shown):
         order = np.argsort(self.offsets, kind="stable")
         weights = np.where(which[order] == np.arange(len(directions))[:, None], self.weights[order], 0.0)
         return directions, np.cumsum(weights, axis=1)
+
+    def _beyond(self, states: Array) -> Array:
+        return np.maximum((states - self.goal) @ self.directions.T - self.offsets, 0.0)
+
+    def _height(self, beyond: Array) -> Array:
+        return 0.5 * beyond**2 @ self.weights
+
+    def _slope(self, beyond: Array) -> Array:
+        return beyond @ (self.weights[:, None] * self.directions)
 
     def _summary(self) -> tuple[str, ...]:
         return counted(len(self.goal), "state"), counted(len(self.weights), "slope")

@@ -18,7 +18,6 @@ from ..evaluation import verdicts
 from ..recordings import Demonstration, Recording, stack
 from .alone import assembled, literal
 from .live import serve as serve
-from .replays import replayed as replayed
 from .rrd import recorded as recorded
 from .scene import Scene as Scene
 from .scene import patches_of

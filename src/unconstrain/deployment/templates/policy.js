@@ -118,11 +118,8 @@ function policyOf({ origin, maps, exponents, monomials, precision, reach, frame,
   const under = (state, projection) => corrected(state, (v) => projection.map((row) => dot(row, v)));
 
   function support(state) {
-    if (!exponents || !precision) {
-      const z = relative(state);
-      return Number(reach.every((each, i) => Math.abs(z[i]) <= each));
-    }
     const z = relative(state);
+    if (!exponents || !precision) return Number(reach.every((each, i) => Math.abs(z[i]) <= each));
     const nearest = Math.max(...exponents.map((slopes) => dot(slopes, z)));
     return Math.exp(Math.min(0, nearest - 0.5 * precision.reduce((sum, each, i) => sum + each * z[i] * z[i], 0)));
   }
