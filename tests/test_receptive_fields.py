@@ -111,7 +111,7 @@ def test_fields_are_checked():
         ReceptiveFields([[1.0, 2.0]], -1.0)
 
 
-def test_the_variance_is_chosen_by_what_is_held_out():
+def test_the_variance_is_chosen_by_what_is_held_out(monkeypatch):
     rng = np.random.default_rng(0)
     starts, times = rng.normal(0.0, 0.05, (8, 1)), np.linspace(0.0, 6.0, 60)
     states = np.concatenate([np.column_stack([times, start + np.sin(2.0 * times)]) for start in starts])
@@ -119,10 +119,12 @@ def test_the_variance_is_chosen_by_what_is_held_out():
     winding = np.column_stack([np.ones(480), 2.0 * np.cos(2.0 * states[:, 0])]) + rng.normal(0.0, 0.05, (480, 2))
     straight = states @ [[-1.0, 0.5], [-0.5, -1.0]] + rng.normal(0.0, 0.05, (480, 2))
     usual = uc.LocallyLinearPolicy(learner="direct").fit(states, straight, groups=groups).fields_.variance
-    chosen = [
-        uc.LocallyLinearPolicy("auto", learner="direct").fit(states, actions, groups=groups)
-        for actions in (winding, straight)
-    ]
+    compared, tried = uc.Robust.compared, list[int]()
+    monkeypatch.setattr(uc.Robust, "compared", lambda self, *of: tried.append(1) or compared(self, *of))
+    winds = uc.LocallyLinearPolicy("auto", learner="direct").fit(states, winding, groups=groups)
+    assert len(tried) == 5
+    chosen = [winds, uc.LocallyLinearPolicy("auto", learner="direct").fit(states, straight, groups=groups)]
+    assert len(tried) == 5 + 3  # two that are worse in turn
     assert chosen[0].fields_.variance <= usual / 4
     assert chosen[1].fields_.variance == usual
     given = uc.LocallyLinearPolicy(chosen[0].fields_.variance, learner="direct").fit(states, winding, groups=groups)

@@ -6,7 +6,7 @@ from copy import copy, deepcopy
 from dataclasses import replace
 from functools import partial
 from itertools import chain
-from typing import Any, Literal, Self, TypeAlias
+from typing import Any, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -65,6 +65,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
     n_outputs_: int
     _flat: bool
     _space: spaces.Space
+    _nested: ClassVar[bool] = False
 
     @abstractmethod
     def places(self, look: FirstLook) -> Mapping[str, Model]:
@@ -410,7 +411,9 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         split = Split.begin(self.validation if self.validation is not None else Folds(), look, more)
         keep = None if learner.needs_samples else Training.MOST_KEPT if learner.uses_samples and together else 0
         begun = {name: Training.begin(look, one, split, keep, more=more) for name, one in places}
-        self.training_ = begun[next(iter(begun)) if len(begun) == 1 else Robust().suited(begun, seen)]
+        several = len(begun) > 1
+        name = Robust().suited(begun, seen, nested=self._nested) if several else next(iter(begun))
+        self.training_ = begun[name]
         return self
 
     def _learnt(self, batches: Iterable[Batch], learner: Learner) -> Self:

@@ -20,8 +20,8 @@ class LocallyLinearPolicy(Policy):
     ----------
     variance : float or "auto", optional
         The fields' σ², by default a quarter of the states' total variance, more where that takes over 100 fields.
-        "auto" chooses among that and halves of it, down to a sixteenth, by estimated error: movements that wind need
-        narrower fields.
+        "auto" halves that, down to a sixteenth, until two in turn are worse by estimated error: movements that wind
+        need narrower fields.
     at_least : float
         Fields are added until every sample has at least this weight in one.
     centres : array_like, shape (M, n), optional
@@ -49,6 +49,8 @@ class LocallyLinearPolicy(Policy):
     >>> uc.LocallyLinearPolicy(9.0, learner="hybrid").fit(states, actions).predict([[1.0, 2.0]]).round(3)
     array([[-1., -2.]])
     """
+
+    _nested = True
 
     def __init__(
         self,

@@ -2,7 +2,7 @@
 
 import warnings
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal, Self
 
@@ -321,7 +321,7 @@ class Robust(_Maximising):
         beside = Comparison([found.best, *held], found.noise, samples).as_consistent if held else []
         return Comparison([*learnt, *beside], found.noise, samples) if beside else found
 
-    def suited(self, begun: Mapping[str, Training], seen: Iterable[Batch]) -> str:
+    def suited(self, begun: Mapping[str, Training], seen: Iterable[Batch], *, nested: bool = False) -> str:
         """The name of the model in which the policy of least estimated error is learnt.
 
         Candidates are the best of each model, by the rule of :mod:`.choice`, which takes them for equally biased
@@ -333,19 +333,29 @@ class Robust(_Maximising):
             Training in each model, by name, with nothing seen.
         seen : iterable of Batch
             What to learn from; about the first 50,000 samples of it are looked at.
+        nested : bool
+            Whether each model is finer than the one before: those after two that are worse are not tried.
         """
         first = list(Training.opening(seen))
-        keeping = {name: one.keeping(Training.MOST_KEPT) for name, one in begun.items()}
-        trainings = {name: one.with_batches(first) for name, one in keeping.items()}
-        samples = {name: held_out_together(one.samples.counted) for name, one in trainings.items()}
-        any_ = next(iter(samples.values()))
-        if _trivial(any_):
-            return next(iter(samples))
-        best = {name: self.compared(samples[name], one).best for name, one in trainings.items()}
-        noise = noise_of_each(any_.actions, any_.groups, _most_noise(any_), any_.noise)
-        least = min(one.variance for one in best.values())
-        alike = [replace(one, name=name, softness=0.0) for name, one in best.items()]
-        return Comparison(alike, np.minimum(noise, least), list(samples.values())).best.name
+        best, views = dict[str, Candidate](), list[Samples]()
+        chosen = next(iter(begun))
+        for name, one in begun.items():
+            training = one.keeping(Training.MOST_KEPT).with_batches(first)
+            views.append(held_out_together(training.samples.counted))
+            if _trivial(views[0]):
+                break
+            best[name] = replace(self.compared(views[-1], training).best, name=name, softness=0.0)
+            chosen = _of_least_risk(list(best.values()), views)
+            if nested and chosen not in list(best)[-2:]:
+                break
+        return chosen
+
+
+def _of_least_risk(best: Sequence[Candidate], views: Sequence[Samples]) -> str:
+    """The name of the candidate of least risk, of those that were learnt each from its own view of the samples."""
+    any_ = views[0]
+    noise = noise_of_each(any_.actions, any_.groups, _most_noise(any_), any_.noise)
+    return Comparison(best, np.minimum(noise, min(one.variance for one in best)), views).best.name
 
 
 def _thinned(training: Training) -> tuple[str, ...]:
