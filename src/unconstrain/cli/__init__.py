@@ -26,6 +26,7 @@ from ..base.errors import (
     SupportEndsWarning,
     UnconstrainError,
 )
+from ..base.estimators import innermost
 from ..base.files import write
 from ..paper import experiments
 from .certifying import certify
@@ -33,7 +34,7 @@ from .constraining import constraint, held_of, options_for_held
 from .converting import convert, example
 from .diagnosing import diagnose
 from .exporting import export
-from .fitting import alpha_of, default_learner, learn, learner_of, options_for_model, policy_of
+from .fitting import alpha_of, default_learner, guide_of, guided, learn, learner_of, options_for_model, policy_of
 from .informing import RAN, TOLD, info, learnt_from, provenance
 from .looking import look, play
 from .printing import (
@@ -179,6 +180,13 @@ def _guessed(recipe: uc.Recipe, first: uc.Recording) -> tuple[str, ...]:
     default="auto",
     help="What a fold holds out together; auto: demonstrations, or samples of a single one.",
 )
+@click.option(
+    "--guided",
+    "to",
+    type=guide_of,
+    metavar="AUTO|CYCLE|A,B,...",
+    help="Keep it to a goal, its states here, or to the cycle, from anywhere; auto takes what was shown.",
+)
 @click.option("--report", type=click.Path(dir_okay=False), help="Also write an HTML report there.")
 @option_for_force
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on the dask cluster of this scheduler.")
@@ -197,6 +205,7 @@ def fit(
     speed_power: float,
     folds: int,
     hold_out: Any,
+    to: Any,
     report: str | None,
     force: bool,
     scheduler: str | None,
@@ -218,20 +227,23 @@ def fit(
         stream = stream_of(paths, speed_power, progress, **reading)
         with of_files(recordings_of(stream)):
             learn(fitted, stream, scheduler)
-            judged = judge_fit(fitted, stream, told := uc.evaluation.diagnosis.states_told(fitted), scheduler)
+            moving = guided(fitted, to, stream.beginning())
+            judged = judge_fit(moving, stream, told := uc.evaluation.diagnosis.states_told(fitted), scheduler)
     if not as_json:
         say_verdict(judged.verdict)
         click.echo(f"Learnt from {said_recipe(stream.recipe, stream.first)}.")
         say_scale(fitted, stream.recipe)
         say_fit(fitted, stream, judged, learner, verbose)
+        if moving is not fitted:
+            click.echo(f"Guided: {moving.aim_.promise}")
     refuse_warnings(reading["strict"])
     notes = provenance(paths, stream.recipe, stream.first, **reading)
-    uc.save(fitted, output, notes | {TOLD: told, RAN: judged.ran or None})
-    written = {"policy": output} | _reported(fitted, stream, report, Path(output).stem)
+    uc.save(moving, output, notes | {TOLD: told, RAN: judged.ran or None})
+    written = {"policy": output} | _reported(moving, stream, report, Path(output).stem)
     say_written(written, judged.to_json() if as_json else None)
 
 
-def _reported(policy: uc.Policy, stream: uc.Stream, report: str | None, title: str) -> dict[str, str]:
+def _reported(policy: uc.Policy | uc.Guided, stream: uc.Stream, report: str | None, title: str) -> dict[str, str]:
     """Write the page of a fit, if there is to be one; what and where."""
     if report is None:
         return {}
@@ -262,7 +274,8 @@ def score(
     """
     from ..pages.fit import replayed
 
-    learnt, notes = fitted_policy(policy), uc.storage.load_notes(policy)
+    moving, notes = fitted_policy(policy), uc.storage.load_notes(policy)
+    learnt = innermost(moving)
     with shown("reading"):
         demonstrations, recipe, recordings = prepared(files, reading, notes)
     refuse_warnings(reading["strict"])
@@ -272,8 +285,8 @@ def score(
         click.echo(f"Note: {policy}: learnt far from most of these states: are they of another task?", err=True)
 
     def scores(of: uc.Demonstration | Sequence[uc.Demonstration], name: str, samples: int) -> dict[str, Any]:
-        found = {"demonstration": name, "samples": samples, "ninc": uc.ninconsistency(learnt, of)}
-        return found if held is None else found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(learnt, of, held)}
+        found = {"demonstration": name, "samples": samples, "ninc": uc.ninconsistency(moving, of)}
+        return found if held is None else found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(moving, of, held)}
 
     with shown("scoring"):
         rows = [scores(demo, demo.name, len(demo)) for demo in demonstrations]
@@ -283,7 +296,7 @@ def score(
     more = under, None if known is None else len(known), notes.get(TOLD)
     judged = uc.evaluation.verdicts.of_score(1.0 - whole["ninc"], len(demonstrations), *more)
     with shown("running it from the same starts"):
-        found = replayed(judged, learnt, demonstrations, recipe, held, recordings[0].units)
+        found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units)
     verdict = uc.evaluation.verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0))
     if as_json:
         told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known}
@@ -347,16 +360,18 @@ def rollout(
     It stops where demonstrations no longer support it, and says so; where they do not support the start, it is refused.
     """
     check_outputs(() if output == "-" else (output,), (policy, constraint), force)
-    learnt, recipe = fitted_policy(policy), uc.Recipe.from_dict(uc.storage.load_notes(policy).get("recipe", {}))
+    moving, recipe = fitted_policy(policy), uc.Recipe.from_dict(uc.storage.load_notes(policy).get("recipe", {}))
+    learnt = innermost(moving)
     if len(start) != learnt.n_features_in_:
         raise SettingError(f"--start: got {len(start)} numbers, expected {learnt.n_features_in_}, one for each state.")
-    _check_start(learnt, start, how["least_support"])
+    if moving is learnt:  # a guided policy arrives from anywhere
+        _check_start(learnt, start, how["least_support"])
     places = learnt.n_outputs_ if how["order"] == 2 else len(start)  # what a constraint is a function of
     at = replace(recipe, states=recipe.states and recipe.states[:places])
     held = held_of(plane, constraint, at, [start[:places]], learnt.n_outputs_, "one for each action")
     task = held.target if isinstance(held, uc.LearntConstraint) and held.task else None
     round_ = [_obstacle(given, len(start)) for given in obstacles]
-    path, why, trouble = _as_far_as_it_goes(learnt, list(start), constraint=held, task=task, obstacles=round_, **how)
+    path, why, trouble = _as_far_as_it_goes(moving, list(start), constraint=held, task=task, obstacles=round_, **how)
     named = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))
     kept = "the plane" if plane is not None else getattr(held, "title", "")
     through = f" {kept[:1].upper()}{kept[1:]} passes through the start." if kept else ""

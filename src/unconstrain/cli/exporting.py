@@ -71,7 +71,7 @@ def export(
     header = str(Path(output).with_suffix(".h")) if output is not None and kind == ".c" else None
     _check(output, kind, ros2, name, single)
     check_outputs((output, header, ros2), (policy,), force)
-    learnt, notes = fitted_policy(policy, uc.Policy | uc.Guided), uc.storage.load_notes(policy)
+    learnt, notes = fitted_policy(policy), uc.storage.load_notes(policy)
     written, then = {}, _NEXT_ROS2
     if ros2 is not None:
         learnt.export_ros2(ros2, name, messages=messages, notes=notes)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, Literal
 
@@ -13,6 +13,7 @@ import unconstrain as uc
 
 from ..base.errors import SettingError
 from ..base.files import stem
+from .printing import of_option
 from .reading import numbers, recordings_of
 
 CENTRES = 25
@@ -104,6 +105,20 @@ def policy_of(model: str, variance: float | None, centres: int | None, scale: An
         if value is not None:
             chosen[option] = value
     return MODELS[model](scale=scale, **chosen)
+
+
+def guide_of(text: str) -> str | tuple[float, ...]:
+    """To what a policy is guided: auto, cycle, or a goal."""
+    return text if text in ("auto", "cycle") else numbers(text)
+
+
+def guided(policy: uc.Policy, to: str | tuple[float, ...] | None, shown: Sequence[uc.Demonstration]) -> Any:
+    """Keep a policy to a goal or a cycle; or leave it as it is."""
+    if to is None:
+        return policy
+    with of_option("--guided"):
+        goal, orbit = (None if isinstance(to, str) else to), ("shown" if to == "cycle" else None)
+        return uc.Guided(policy, goal, orbit, demonstrations=shown)
 
 
 def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None) -> None:

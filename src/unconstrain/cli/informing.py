@@ -13,8 +13,9 @@ import click
 
 import unconstrain as uc
 
+from ..base.estimators import innermost
 from .printing import models_of, print_table, say_verdict
-from .reading import innermost, loaded, reading_of
+from .reading import loaded, reading_of
 
 TOLD = "determined share of states"
 """Note of the share of the recorded states at which recordings tell the policy in every direction."""
@@ -53,10 +54,12 @@ def digest_of(path: Path) -> str:
         return f"{size}-{blake2b(head + file.read(ENDS), digest_size=8).hexdigest()}"
 
 
-def learnt_from(policy: uc.Policy, notes: Mapping[str, Any], recordings: Sequence[uc.Recording]) -> list[str] | None:
+def learnt_from(
+    policy: uc.Policy | uc.Guided, notes: Mapping[str, Any], recordings: Sequence[uc.Recording]
+) -> list[str] | None:
     """Which recordings a policy learnt from, by their files and names; None where it does not say from what it did."""
     sources = notes.get("digests")
-    learnt = [str(name).partition("/") for name in policy.training_.split.fold_of]
+    learnt = [str(name).partition("/") for name in innermost(policy).training_.split.fold_of]
     if not sources or not learnt:
         return None
     known = {(sources[int(number)], name) for number, _, name in learnt if number.isdecimal()}

@@ -108,7 +108,7 @@ class Seen(NamedTuple):
     demonstrations: Sequence[uc.Demonstration]
     recipe: uc.Recipe
     recordings: Sequence[uc.Recording]
-    policy: uc.Policy | None
+    policy: uc.Policy | uc.Guided | None
     constraint: uc.LearntConstraint | None
     roles: Mapping[str, Any]
     """How files are read, as the policy or constraint remembers it."""
@@ -127,9 +127,9 @@ def _seen(paths: Sequence[str | Path], reading: dict[str, Any]) -> Seen:
     if not recorded:
         found = ", ".join(map(str, paths))
         raise ReadError(f"{found}: holds no recording to look at; add some: unconstrain look {found} wipe_*.csv")
-    policies = [one for one in models.values() if isinstance(one, uc.Policy)]
     constraints = [one for one in models.values() if isinstance(one, uc.LearntConstraint)]
-    ordered = sorted(models, key=lambda path: isinstance(models[path], uc.Policy))  # a policy's notes last: they hold
+    policies = [one for one in models.values() if not isinstance(one, uc.LearntConstraint)]
+    ordered = sorted(models, key=lambda path: models[path] in policies)  # a policy's notes last: they hold
     own = {path: uc.storage.load_notes(path) for path in ordered}
     columns = {uc.Recipe.from_dict(one.get("recipe", {})).states for one in own.values()}
     if max(len(policies), len(constraints), len(columns)) > 1:
@@ -238,7 +238,7 @@ def _model(path: str | Path) -> Any:
     known_arms()
     if Path(path).suffix.lower() == ".npz":
         with suppress(ModelFileError):
-            return uc.load(path, uc.Policy | uc.LearntConstraint)  # type: ignore[arg-type]
+            return uc.load(path, uc.Policy | uc.LearntConstraint | uc.Guided)  # type: ignore[arg-type]
     return None
 
 

@@ -18,6 +18,7 @@ import unconstrain as uc
 
 from ..base.display import bare, counted, listed
 from ..base.errors import InvalidDataError, SettingError
+from ..base.estimators import innermost
 from .endings import REFUSED, ending
 from .reading import next_command
 from .speaking import as_typed, meant_of
@@ -162,13 +163,14 @@ class Judged(NamedTuple):
         return {name: None if value != value else value for name, value in plain.items()}
 
 
-def judge_fit(policy: uc.Policy, stream: uc.Stream, told: float | None, scheduler: str | None) -> Judged:
+def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | None, scheduler: str | None) -> Judged:
     """Walk through the demonstrations once more; on a cluster only the sums are there.
 
     ``told`` is the share of the recorded states at which recordings tell the policy, None where not known.
     """
     from ..pages.fit import replayed
 
+    policy = innermost(moving)
     held_out = policy.held_out_score()
     if scheduler is not None:
         count = len(stream.paths)
@@ -179,7 +181,7 @@ def judge_fit(policy: uc.Policy, stream: uc.Stream, told: float | None, schedule
     demos, open_ = stream.beginning(), told is not None and told < uc.evaluation.verdicts.MOSTLY
     there = _least_known(policy, demos, stream.recipe) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
     found = uc.evaluation.verdicts.of_explained(held_out, count, told, there=there)
-    ran = replayed(found, policy, demos, stream.recipe, None, stream.first.units, free=False)
+    ran = replayed(found, moving, demos, stream.recipe, None, stream.first.units, free=False)
     verdict = uc.evaluation.diagnosis.about_recordings(ran.verdict, demos, stream.recipe.states or ())
     return Judged(verdict, ran.medians, ran.in_words, count, samples, 1.0 - missed, held_out)
 

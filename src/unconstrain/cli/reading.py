@@ -19,6 +19,7 @@ import unconstrain as uc
 
 from ..base.display import bare
 from ..base.errors import NOTHING_LEFT, InvalidDataError, ModelFileError, ReadError, SettingError, UnconstrainError
+from ..base.estimators import innermost
 from ..base.files import stem
 from .progress import Progress
 
@@ -194,15 +195,15 @@ def recipe_of(
     return recipe if window is None else replace(recipe, window_s=window)
 
 
-def fitted_policy(path: str, kind: Any = None) -> Any:
-    """The policy in a file, or another that ``kind`` asks for.
+def fitted_policy(path: str) -> Any:
+    """The policy in a file, guided or not.
 
     Raises
     ------
     ModelFileError
         Also if it is not fitted.
     """
-    policy = loaded(path, kind or uc.Policy)
+    policy = loaded(path, uc.Policy | uc.Guided)
     if not hasattr(innermost(policy), "solution_"):
         raise ModelFileError(f"{path}: holds a policy that is not fitted. Fit it before saving.")
     return policy
@@ -230,11 +231,6 @@ def is_recording(path: Path | str, how: uc.readers.Reading | None = None) -> boo
     with suppress(UnconstrainError):
         return sum(len(block) for block in uc.readers.read_blocks(path, how)) > 0
     return False
-
-
-def innermost(policy: Any) -> Any:
-    """The policy that is guided or moved, or itself."""
-    return innermost(policy.policy) if hasattr(policy, "policy") else policy
 
 
 def said_recipe(recipe: uc.Recipe, recording: uc.Recording) -> str:

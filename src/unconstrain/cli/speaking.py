@@ -9,7 +9,14 @@ from difflib import get_close_matches
 
 import click
 
-ALSO = {"states": "--state", "actions": "--action", "angles": "--angle", "differentiate": "--by", "groups": "--group"}
+ALSO = {
+    "goal": "--guided",
+    "states": "--state",
+    "actions": "--action",
+    "angles": "--angle",
+    "differentiate": "--by",
+    "groups": "--group",
+}
 """Settings whose options are called otherwise than they are, or as another setting."""
 
 OBJECTS = {
@@ -17,7 +24,7 @@ OBJECTS = {
     "a LocallyLinearPolicy": "--model local",
     "fewer features, or Folds(2)": "--folds 2",
     "a smaller dt": "a smaller --dt",
-    "uc.Guided": "in Python, uc.Guided",
+    "goal=, or orbit='shown' for a cycle": "--guided its place, such as --guided 0.1,0, or --guided cycle",
     "Take Hybrid()": "Take --learner hybrid",
 }
 """What is made in Python, and the options that make it."""

@@ -332,7 +332,7 @@ def _strays(found: Verdict, how: str, what: str) -> Verdict:
         said=f"{found.said} {'But' if found.mark is Mark.GOOD else 'And'} {how}.",
         doubt=f"Its {what} over time. {found.doubt}".rstrip(),
         next="Look at it ('unconstrain look'). More demonstrations may come nearer, or another --model: 'auto' tries "
-        "several. In Python, uc.Guided keeps it to the goal or the cycle that was shown.",
+        "several.",
     )
 
 

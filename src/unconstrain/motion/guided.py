@@ -84,7 +84,8 @@ class Guided(Exportable, Shown):
     policy : callable
         States (N, n) to velocities (N, n).
     goal : array_like, shape (n,), optional
-        By default where the demonstrations end at rest, if most do or they do not go round.
+        By default where the demonstrations end at rest, if most do or they do not go round: those that end where the
+        policy rests, too, if there are any, as constraints stopped the others.
     orbit : array_like, shape (T, n), or "shown", optional
         States on the cycle, all around it; "shown" are those of the demonstrations, from which it is found by default
         where they go round and most do not end at rest.
@@ -236,7 +237,7 @@ def _single(policy: Callable[[Array], Array]) -> Callable[..., Array]:
 def _descent(demos: Sequence[Demonstration], wanted: Array, goal: ArrayLike | None, dt: float | None) -> Descent:
     """To the goal, or to where demonstrations end at rest."""
     states = stack(demos).states
-    place = _found(demos) if goal is None else as_vector(goal, "goal", states.shape[1])
+    place = _found(demos, wanted) if goal is None else as_vector(goal, "goal", states.shape[1])
     potential = descended(states, wanted, place, np.inf if dt is None else 2.0 / dt)
     return Descent(potential, PACE * float(np.sqrt((wanted**2).sum(axis=1).mean())))
 
@@ -283,13 +284,16 @@ def _rests(demo: Demonstration) -> bool:
     return bool(speed[-1] <= _AT_REST * speed.max())
 
 
-def _found(demos: Sequence[Demonstration]) -> Array:
-    """Where demonstrations end at rest, (n,)."""
-    ends = [demo.states[-1] for demo in demos if _rests(demo)]
-    if not ends:
+def _found(demos: Sequence[Demonstration], wanted: Array) -> Array:
+    """Where demonstrations end at rest, (n,); those that end where the policy rests, too, if any do, were not held."""
+    last = np.cumsum([len(demo) for demo in demos]) - 1
+    slow = np.linalg.norm(wanted[last], axis=1) <= _AT_REST * np.linalg.norm(wanted, axis=1).max()
+    rests = np.array([_rests(demo) for demo in demos])
+    ends = stack(demos).states[last[rests & slow if (rests & slow).any() else rests]]
+    if not len(ends):
         raise SettingError(
-            "goal: no demonstration ends at rest, and they do not go round either, so that none is found. Pass goal= "
-            "or orbit=."
+            "goal: no demonstration ends at rest, and they do not go round either, so that none is found. Pass goal=, "
+            "or orbit='shown' for a cycle."
         )
     extent = np.linalg.norm(np.ptp(stack(demos).states, axis=0))
     goal = np.mean(ends, axis=0)
@@ -297,7 +301,7 @@ def _found(demos: Sequence[Demonstration]) -> Array:
     if apart > _TOGETHER * extent:
         raise InvalidDataError(
             f"goal: demonstrations end at rest in places up to {apart:.3g} from their mean, {apart / extent:.0%} of "
-            "their extent; expected one place. Pass goal=."
+            "their extent; expected one place; give it with goal=."
         )
     return np.asarray(goal)
 

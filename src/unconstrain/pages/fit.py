@@ -12,9 +12,10 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.display import counted_off, listening
 from ..base.errors import InvalidDataError, SettingError
+from ..base.estimators import innermost
 from ..evaluation import diagnosis, ncpe, ninconsistency, nupe, verdicts
 from ..learners import named
-from ..motion import rollout
+from ..motion import Guided, rollout
 from ..recordings import Demonstration, Recipe, stack
 from ..risks import action_projection, project
 from . import figures, html
@@ -40,7 +41,7 @@ TILT = 20.0
 
 
 def policy_page(
-    policy: Policy,
+    moving: Policy | Guided,
     demonstrations: Sequence[Demonstration],
     title: str,
     recipe: Recipe | None = None,
@@ -50,7 +51,7 @@ def policy_page(
 
     Parameters
     ----------
-    policy : Policy
+    moving : Policy or Guided
         Fitted.
     demonstrations : sequence of Demonstration
         What it was fitted to, or others.
@@ -71,7 +72,7 @@ def policy_page(
     MissingExtraError
         If matplotlib or jinja2 is not installed.
     """
-    demos = list(demonstrations)
+    policy, demos = innermost(moving), list(demonstrations)
     n, d = demos[0].states.shape[1], demos[0].actions.shape[1]
     made, known = recipe or Recipe(), dict(units or {})
     states, actions = made.labels(known)
@@ -79,11 +80,12 @@ def policy_page(
     us = list(actions or (f"action {index + 1}" for index in range(d)))
     learner, held_out = named(policy.learner), _held_out(policy, demos)
     found = verdicts.of_explained(policy.held_out_score(), len(demos), diagnosis.states_told(policy))
-    judged = replayed(found, policy, demos, made, None, known)
+    judged = replayed(found, moving, demos, made, None, known)
     parts = [
+        *([html.section("Guided", html.paragraph(moving.aim_.promise))] if isinstance(moving, Guided) else []),
         *_replays(judged.runs, judged.verdict.said.removeprefix(f"{found.said} ").removeprefix("But "), xs),
-        html.section("The demonstrations", _movements(policy, demos, xs)),
-        *_reproduced(policy, demos, xs),
+        html.section("The demonstrations", _movements(moving, demos, xs)),
+        *_reproduced(moving, demos, xs),
         html.section("Predicted and observed actions", _actions(policy, demos, us)),
         html.section("Errors and support", _errors(policy, demos, held_out)),
     ]
@@ -130,7 +132,7 @@ def _summary(policy: Policy, demos: list[Demonstration]) -> html.Markup:
     )
 
 
-def _movements(policy: Policy, demos: list[Demonstration], names: Sequence[str]) -> html.Markup:
+def _movements(policy: Policy | Guided, demos: list[Demonstration], names: Sequence[str]) -> html.Markup:
     n, d = demos[0].states.shape[1], demos[0].actions.shape[1]
     tracks = [_thin(demo) for demo in demos]
     if n == 2 and d == 2:
@@ -177,7 +179,7 @@ def _replays(runs: Sequence[Replay], said: str, names: Sequence[str]) -> list[ht
     return [html.section("From where demonstrations start", html.paragraph(f"{said[:1].upper()}{said[1:]}"), picture)]
 
 
-def _reproduced(policy: Policy, demos: list[Demonstration], names: Sequence[str]) -> list[html.Markup]:
+def _reproduced(policy: Policy | Guided, demos: list[Demonstration], names: Sequence[str]) -> list[html.Markup]:
     """A roll-out from where a demonstration starts, free and under a constraint that nobody recorded."""
     demo = max(demos, key=len)
     n, d = demo.states.shape[1], demo.actions.shape[1]
@@ -203,7 +205,7 @@ def _rows(normal: Array, states: Array) -> Array:
     return np.broadcast_to(normal, (len(states), 1, len(normal)))
 
 
-def _field(policy: Policy, demos: list[Demonstration], names: Sequence[str]) -> object:
+def _field(policy: Policy | Guided, demos: list[Demonstration], names: Sequence[str]) -> object:
     states, actions, _ = stack(demos)
     low, high = states.min(axis=0), states.max(axis=0)
     points = np.stack(np.meshgrid(*np.linspace(low, high, ARROWS).T), axis=-1).reshape(-1, 2)

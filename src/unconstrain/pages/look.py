@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Array
 from ..base.errors import MissingBeliefError, SettingError
+from ..base.estimators import innermost
 from ..evaluation import verdicts
 from ..recordings import Demonstration, Recording, stack
 from .alone import assembled, literal
@@ -24,6 +25,7 @@ from .scene import patches_of
 
 if TYPE_CHECKING:
     from ..constraints import LearntConstraint
+    from ..motion import Guided
     from ..policies import Policy
 
 MOST_SAMPLES = 40_000
@@ -60,7 +62,7 @@ def look_page(
     units: Mapping[str, str] | None = None,
     marks: Sequence[Sequence[Mark]] = (),
     command: Sequence[str] = ("", ""),
-    policy: Policy | None = None,
+    policy: Policy | Guided | None = None,
     constraint: LearntConstraint | None = None,
     held: Sequence[Demonstration] | None = None,
     free: Array | None = None,
@@ -80,7 +82,7 @@ def look_page(
         What there is to say about each demonstration.
     command : pair of str
         What to type to learn from them, before and after the option that leaves some out.
-    policy : Policy, optional
+    policy : Policy or Guided, optional
         Fitted, of as many states.
     constraint : LearntConstraint, optional
         Fitted, of as many states.
@@ -92,7 +94,7 @@ def look_page(
     demos = list(demonstrations)
     every = max(1, -(-sum(map(len, demos)) // MOST_SAMPLES))
     thinned = [demo[np.unique([*range(0, len(demo), every), len(demo) - 1])] for demo in demos]
-    learnt = _free(policy, demos)
+    learnt = _free(innermost(policy), demos)
     known = free if learnt is None else learnt
     described = None if policy is None else _described(policy, len(columns))
     data = {
@@ -109,7 +111,7 @@ def look_page(
     }
     runs = policy is not None and described is not None and not described["trouble"]
     script = policy.javascript() if policy is not None and runs else "null"
-    told = _told(policy) if policy is not None and runs else "null"
+    told = _told(innermost(policy)) if policy is not None and runs else "null"
     return assembled("look.html", title=escape(title), data=literal(data), policy=script, told=told)
 
 
@@ -208,9 +210,10 @@ def _thinned(known: Array | None, demos: Sequence[Demonstration], every: int) ->
     return [part[np.unique([*range(0, len(part), every), len(part) - 1])] for part in parts]
 
 
-def _described(policy: Policy, columns: int) -> dict[str, Any]:
+def _described(policy: Policy | Guided, columns: int) -> dict[str, Any]:
     """What the page has to know of a policy beside its formula; ``trouble`` says why it cannot be rolled out."""
-    n, d, trouble = policy.n_features_in_, policy.n_outputs_, ""
+    learnt = innermost(policy)
+    n, d, trouble = learnt.n_features_in_, learnt.n_outputs_, ""
     if n != columns:
         trouble = f"The policy is of {n} states, these are {columns}."
     elif n != d:
@@ -220,7 +223,7 @@ def _described(policy: Policy, columns: int) -> dict[str, Any]:
             policy.closed_form()
         except SettingError as error:
             trouble = str(error)
-    return {"method": policy.solution_.method, "trouble": trouble}
+    return {"method": learnt.solution_.method, "trouble": trouble}
 
 
 def _told(policy: Policy) -> str:

@@ -11,17 +11,21 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Array
 from ..base.errors import DivergedError
+from ..base.estimators import innermost
 from ..evaluation import diagnosis, verdicts
 from ..models import spaces
 from ..motion import rollout
 from ..recordings import Demonstration
 
 if TYPE_CHECKING:
+    from ..motion import Guided
     from ..policies import Policy
     from ..recordings import Recipe
 
 MOST, STEPS = 20, 1000
 """Demonstrations, and steps of each, that are run at most: seconds."""
+
+GUIDE = "'unconstrain fit --guided auto' keeps it to the goal or the cycle that was shown, from anywhere."
 
 ROUNDS = 1.5
 """Rounds, at least, of which the last is compared with the first."""
@@ -55,7 +59,7 @@ class Replayed(NamedTuple):
 
 def replayed(
     found: verdicts.Verdict,
-    policy: Policy,
+    policy: Policy | Guided,
     demos: Sequence[Demonstration],
     recipe: Recipe,
     held: Any,
@@ -70,7 +74,7 @@ def replayed(
     try:
         runs = replays(policy, demos, recipe, held, free)
     except DivergedError:
-        return Replayed(verdicts.of_divergence(found), None)
+        return Replayed(_advised(verdicts.of_divergence(found), found, policy), None)
     known = [one for one in runs if one.held]
     if not known:
         unknown = " Its size and pace over time: not compared, as what held these recordings is not known."
@@ -82,11 +86,17 @@ def replayed(
     finite = {name: values[np.isfinite(values)] for name, values in measured.items()}
     told = {name: float(np.median(values)) if len(values) else None for name, values in finite.items()}
     judged = verdicts.of_replays(found, extents, paces, said, lasts)
-    return Replayed(judged, told, runs, verdicts.size_and_pace(extents, paces, lasts))
+    return Replayed(_advised(judged, found, policy), told, runs, verdicts.size_and_pace(extents, paces, lasts))
+
+
+def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Policy | Guided) -> verdicts.Verdict:
+    """With what cures a policy that strays, unless it was tried."""
+    strays = judged.next != before.next and "unit" not in judged.next
+    return judged._replace(next=f"{judged.next} {GUIDE}") if strays and innermost(policy) is policy else judged
 
 
 def replays(
-    policy: Policy, demos: Sequence[Demonstration], recipe: Recipe, held: Any = None, free: bool = True
+    policy: Policy | Guided, demos: Sequence[Demonstration], recipe: Recipe, held: Any = None, free: bool = True
 ) -> list[Replay]:
     """Compare at most twenty demonstrations; none where actions are not known to be velocities of Euclidean states.
 

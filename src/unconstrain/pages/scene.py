@@ -9,12 +9,14 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import SettingError
+from ..base.estimators import innermost
 from ..models import SUPPORTED
 from ..motion import rollout
 from ..recordings import Demonstration
 
 if TYPE_CHECKING:
     from ..constraints import Constraint, LearntConstraint
+    from ..motion import Guided
     from ..policies import Policy
 
 MOST_PATCHES = 250
@@ -58,7 +60,7 @@ class Scene(NamedTuple):
     demonstrations : sequence of Demonstration
     columns, directions : sequence of str
         Names of states and actions.
-    policy : Policy, optional
+    policy : Policy or Guided, optional
         Fitted, of as many states.
     constraint : LearntConstraint, optional
         Fitted, of as many states.
@@ -69,7 +71,7 @@ class Scene(NamedTuple):
     demonstrations: Sequence[Demonstration]
     columns: Sequence[str]
     directions: Sequence[str]
-    policy: Policy | None = None
+    policy: Policy | Guided | None = None
     constraint: LearntConstraint | None = None
     arm: Any = None
 
@@ -91,7 +93,8 @@ class Scene(NamedTuple):
     @property
     def moves(self) -> bool:
         """Whether a movement follows from the policy: it has an action for each state."""
-        return self.policy is not None and self.policy.n_features_in_ == self.policy.n_outputs_ == len(self.columns)
+        learnt = innermost(self.policy)
+        return learnt is not None and learnt.n_features_in_ == learnt.n_outputs_ == len(self.columns)
 
     def follow(self, start: Array, steps: int, dt: float, held: Constraint | None = None) -> Movement:
         """Roll the policy out, at most as far beyond the data as a quarter of the extent of the states.
@@ -104,7 +107,7 @@ class Scene(NamedTuple):
         policy: Any = self.policy
         track = rollout(policy, start, steps, dt, held, least_support=0.0)
         try:
-            support = policy.support(track.states)
+            support = innermost(policy).support(track.states)
         except SettingError:  # of a policy that has none
             return Movement(track, None)
         ways = np.linalg.norm(np.diff(track.states, axis=0, prepend=track.states[:1]), axis=1)

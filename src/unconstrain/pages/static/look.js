@@ -389,10 +389,9 @@
 
   /** What the plane, if there is one, leaves of the policy. */
   function allowed(state) {
-    const action = learnt.policy(state), way = roll.plane ? normal() : null;
-    if (!way) return action;
-    const into = way.reduce((sum, each, k) => sum + each * action[k], 0);
-    return action.map((each, k) => each - into * way[k]);
+    const way = roll.plane ? normal() : null;
+    if (!way) return learnt.policy(state);
+    return learnt.under(state, way.map((row, i) => way.map((each, k) => (i === k ? 1 : 0) - row * each)));
   }
 
   function drawRollout(context) {
