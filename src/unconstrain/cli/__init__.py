@@ -46,7 +46,6 @@ from .printing import (
     print_table,
     refuse_warnings,
     say_fit,
-    say_scale,
     say_surveys,
     say_verdict,
     say_written,
@@ -230,12 +229,7 @@ def fit(
             moving = guided(fitted, to, stream.beginning())
             judged = judge_fit(moving, stream, told := uc.evaluation.diagnosis.states_told(fitted), scheduler)
     if not as_json:
-        say_verdict(judged.verdict)
-        click.echo(f"Learnt from {said_recipe(stream.recipe, stream.first)}.")
-        say_scale(fitted, stream.recipe)
-        say_fit(fitted, stream, judged, learner, verbose)
-        if moving is not fitted:
-            click.echo(f"Guided: {moving.aim_.promise}")
+        say_fit(moving, stream, judged, learner, verbose)
     refuse_warnings(reading["strict"])
     notes = provenance(paths, stream.recipe, stream.first, **reading)
     uc.save(moving, output, notes | {TOLD: told, RAN: judged.ran or None})
@@ -291,9 +285,8 @@ def score(
     with shown("scoring"):
         rows = [scores(demo, demo.name, len(demo)) for demo in demonstrations]
         whole = scores(demonstrations, "all", sum(map(len, demonstrations)))
-    under = None if held is None else 1.0 - whole["ncpe"]
     known = learnt_from(learnt, notes, recordings)
-    more = under, None if known is None else len(known), notes.get(TOLD)
+    more = None if held is None else 1.0 - whole["ncpe"], None if known is None else len(known), notes.get(TOLD)
     judged = uc.evaluation.verdicts.of_score(1.0 - whole["ninc"], len(demonstrations), *more)
     with shown("running it from the same starts"):
         found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units)
@@ -360,12 +353,11 @@ def rollout(
     It stops where demonstrations no longer support it, and says so; where they do not support the start, it is refused.
     """
     check_outputs(() if output == "-" else (output,), (policy, constraint), force)
-    moving, recipe = fitted_policy(policy), uc.Recipe.from_dict(uc.storage.load_notes(policy).get("recipe", {}))
-    learnt = innermost(moving)
+    moving, notes = fitted_policy(policy), uc.storage.load_notes(policy)
+    learnt, recipe = innermost(moving), uc.Recipe.from_dict(notes.get("recipe", {}))
     if len(start) != learnt.n_features_in_:
         raise SettingError(f"--start: got {len(start)} numbers, expected {learnt.n_features_in_}, one for each state.")
-    if moving is learnt:  # a guided policy arrives from anywhere
-        _check_start(learnt, start, how["least_support"])
+    _check_start(moving, start, how["least_support"])
     places = learnt.n_outputs_ if how["order"] == 2 else len(start)  # what a constraint is a function of
     at = replace(recipe, states=recipe.states and recipe.states[:places])
     held = held_of(plane, constraint, at, [start[:places]], learnt.n_outputs_, "one for each action")
@@ -374,8 +366,7 @@ def rollout(
     path, why, trouble = _as_far_as_it_goes(moving, list(start), constraint=held, task=task, obstacles=round_, **how)
     named = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))
     kept = "the plane" if plane is not None else getattr(held, "title", "")
-    through = f" {kept[:1].upper()}{kept[1:]} passes through the start." if kept else ""
-    verdict = _supported(learnt, path, why, round_, through, uc.storage.load_notes(policy).get(TOLD))
+    verdict = _supported(learnt, path, why, round_, kept, notes.get(TOLD))
     accelerations = named.actions or tuple(f"a{name}" for name in (named.states or ())[:places])
     columns = ["t", *(named.states or ()), *(accelerations if how["order"] == 2 else named.directions)]
     if output != "-":
@@ -477,10 +468,10 @@ def _obstacle(given: tuple[float, ...], n: int) -> uc.motion.obstacles.Ellipsoid
         return uc.motion.obstacles.Ellipsoid(np.array(given[:n]), given[n:] if len(given) > n + 1 else given[n])
 
 
-def _check_start(policy: uc.Policy, start: tuple[float, ...], least: float) -> None:
-    """Refuse to begin where nothing was demonstrated."""
-    support = float(_support(policy, [start])[0])
-    if support < least:
+def _check_start(policy: uc.Policy | uc.Guided, start: tuple[float, ...], least: float) -> None:
+    """Refuse to begin where nothing was demonstrated, unless the policy is guided from anywhere."""
+    support = float(_support(innermost(policy), [start])[0])
+    if support < least and innermost(policy) is policy:
         raise InvalidDataError(
             f"--start: nothing was demonstrated near {', '.join(f'{one:.4g}' for one in start)} (support "
             f"{support:.2g}). Start nearer, demonstrate there, or go on in spite of it with --least-support 0."
@@ -516,12 +507,13 @@ def _as_far_as_it_goes(policy: uc.Policy, start: list[float], **how: Any) -> tup
 def _supported(
     policy: uc.Policy, path: Any, why: str, obstacles: Sequence[Any], held: str, told: float | None
 ) -> uc.evaluation.verdicts.Verdict:
-    """How near data is along a movement, and whether it tells the policy, if not everywhere; then ``held``."""
+    """How near data is along a movement, and whether it tells the policy, if not everywhere; and what ``held`` it."""
     verdicts = uc.evaluation.verdicts
     ended = verdicts.of_early_end(why, float(path.times[-1])) if why else None
     untold = None if (told or 0.0) >= verdicts.MOSTLY else uc.evaluation.diagnosis.untold(policy, path)
     found = ended or verdicts.of_support(_support(policy, path.states), path.times, untold)
-    found = found._replace(said=f"{found.said}{held}")
+    passes = f" {held[:1].upper()}{held[1:]} passes through the start." if held else ""
+    found = found._replace(said=f"{found.said}{passes}")
     if not obstacles:
         return found
     nearest = min((float(one(path.states)[0].min()), number) for number, one in enumerate(obstacles, start=1))

@@ -20,7 +20,7 @@ from ..base.display import bare, counted, listed
 from ..base.errors import InvalidDataError, SettingError
 from ..base.estimators import innermost
 from .endings import REFUSED, ending
-from .reading import next_command
+from .reading import next_command, said_recipe
 from .speaking import as_typed, meant_of
 from .terminal import plain_output
 
@@ -205,8 +205,14 @@ def models_of(policy: uc.Policy) -> str:
     return str(policy.features_)
 
 
-def say_fit(policy: uc.Policy, stream: uc.Stream, judged: Judged, learner: str, verbose: bool) -> None:
-    """Print what a policy explains, and what the data determined."""
+def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, learner: str, verbose: bool) -> None:
+    """Print a verdict, what a policy was learnt from and explains, and what the data determined."""
+    say_verdict(judged.verdict)
+    click.echo(f"Learnt from {said_recipe(stream.recipe, stream.first)}.")
+    policy = innermost(moving)
+    say_scale(policy, stream.recipe)
+    if moving is not policy:
+        click.echo(f"Guided: {moving.aim_.promise}")
     solution, known = policy.solution_, isfinite(judged.training)
     models = models_of(policy) if len(solution.weights) > 1 else ""
     counts = f"{counted(judged.demonstrations, 'demonstration')}, {counted(judged.samples, 'sample')}" if known else ""

@@ -293,8 +293,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         Returns
         -------
         Uncertainty
-            Standard deviations of each action coordinate, (N, d): from noise, from what the data does not
-            determine, and in total.
+            Standard deviations of each action coordinate, (N, d): from noise, from what is undetermined, and in total.
 
         Raises
         ------
@@ -411,9 +410,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         split = Split.begin(self.validation if self.validation is not None else Folds(), look, more)
         keep = None if learner.needs_samples else Training.MOST_KEPT if learner.uses_samples and together else 0
         begun = {name: Training.begin(look, one, split, keep, more=more) for name, one in places}
-        several = len(begun) > 1
-        name = Robust().suited(begun, seen, nested=self._nested) if several else next(iter(begun))
-        self.training_ = begun[name]
+        self.training_ = begun[next(iter(begun)) if len(begun) == 1 else Robust().suited(begun, seen, self._nested)]
         return self
 
     def _learnt(self, batches: Iterable[Batch], learner: Learner) -> Self:

@@ -321,7 +321,7 @@ class Robust(_Maximising):
         beside = Comparison([found.best, *held], found.noise, samples).as_consistent if held else []
         return Comparison([*learnt, *beside], found.noise, samples) if beside else found
 
-    def suited(self, begun: Mapping[str, Training], seen: Iterable[Batch], *, nested: bool = False) -> str:
+    def suited(self, begun: Mapping[str, Training], seen: Iterable[Batch], nested: bool = False) -> str:
         """The name of the model in which the policy of least estimated error is learnt.
 
         Candidates are the best of each model, by the rule of :mod:`.choice`, which takes them for equally biased
