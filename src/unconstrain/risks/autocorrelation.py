@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from ..base.arrays import Array
 
 
-def autocorrelations(residuals: Array, groups: NDArray[np.intp]) -> Iterator[float]:
-    """Autocorrelations r_1, r_2, ... up to the longest lag; zero where no two samples are so far apart, or all vanish.
+def autocorrelations(residuals: Array, groups: NDArray[np.intp], most: int) -> Iterator[float]:
+    """Autocorrelations r_1, r_2, ... r_most; zero where no two samples are so far apart, or all vanish.
 
     Parameters
     ----------
@@ -17,9 +17,18 @@ def autocorrelations(residuals: Array, groups: NDArray[np.intp]) -> Iterator[flo
         In the order of time within each demonstration.
     groups : ndarray of int, shape (N,)
         Which demonstration each sample is from.
+    most : int
+        The longest lag.
     """
-    energy = float(np.vecdot(residuals, residuals).mean()) if len(residuals) else 0.0
-    for lag in range(1, len(residuals)):
-        same = groups[lag:] == groups[:-lag]
-        none = energy <= 0.0 or not same.any()
-        yield 0.0 if none else float(np.vecdot(residuals[lag:], residuals[:-lag])[same].mean()) / energy
+    count, columns = residuals.shape
+    first = np.concatenate(([0], np.flatnonzero(groups[1:] != groups[:-1]) + 1, [count]))
+    lengths = first[1:] - first[:-1]
+    apart = min(most, int(lengths.max()))
+    # With zeros between demonstrations, products of neighbours are those within demonstrations.
+    spread = np.zeros((count + apart * len(lengths), columns))
+    spread[np.arange(count) + np.repeat(apart * np.arange(len(lengths)), lengths)] = residuals
+    values, pairs = spread.ravel(), np.maximum(lengths[:, None] - np.arange(apart + 1), 0).sum(axis=0)
+    energy = float(values @ values) / max(count, 1)
+    for lag in range(1, most + 1):
+        none = energy <= 0.0 or lag > apart or not pairs[lag]
+        yield 0.0 if none else float(values[lag * columns :] @ values[: -lag * columns]) / float(pairs[lag]) / energy

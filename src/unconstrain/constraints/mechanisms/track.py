@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import islice, takewhile
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,8 +83,7 @@ def correlation_time(residuals: Array, groups: NDArray[np.intp], fitted: int = 0
     """
     count, columns = residuals.shape
     longest, insignificant = max(count // 2 - 1, 0), 1.0 / np.sqrt(residuals.size)
-    tried = islice(autocorrelations(residuals, groups), longest)
-    found = list(takewhile(lambda each: each > insignificant, tried))
+    found = list(takewhile(lambda each: each > insignificant, autocorrelations(residuals, groups, longest)))
     lag = min(len(found) + 1, longest)
     return (1.0 + 2.0 * sum(found)) / max(1.0 - (2 * lag - 1) * fitted / columns / count, 1 / 3)
 

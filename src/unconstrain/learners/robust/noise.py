@@ -19,7 +19,6 @@ follows from the expectations
 and is a combination of the moments with sample weights ‖u‖² and 1.
 """
 
-from itertools import islice
 from math import comb
 
 import numpy as np
@@ -118,7 +117,7 @@ def correlation_time(residuals: Array, groups: NDArray[np.intp]) -> float:
         At least 1.
     """
     time = 1.0
-    for correlation in islice(autocorrelations(residuals, groups), MOST_LAGS):
+    for correlation in autocorrelations(residuals, groups, MOST_LAGS):
         if correlation <= LEAST_AUTOCORRELATION:
             break
         time += 2.0 * correlation
