@@ -201,7 +201,7 @@ def turns() -> list[Row]:
 
 
 def _learnt(recordings: list[uc.Recording], recipe: uc.Recipe) -> uc.Policy:
-    return uc.LocallyLinearPolicy().fit_demonstrations(uc.prepare(recordings, recipe))
+    return uc.LocallyLinearPolicy(None).fit_demonstrations(uc.prepare(recordings, recipe))
 
 
 def _body(start: Rotation, turn: Array, times: Array, rng: np.random.Generator) -> uc.Recording:
@@ -242,8 +242,8 @@ def units() -> list[Row]:
         errors = [
             np.sqrt(((policy.predict(states * unit)[:, 2] - true) ** 2).mean())
             for policy, unit in (
-                (uc.LocallyLinearPolicy().fit_demonstrations(equal), 1.0),
-                (uc.LocallyLinearPolicy(scale="auto").fit_demonstrations(unlike), scale),
+                (uc.LocallyLinearPolicy(None).fit_demonstrations(equal), 1.0),
+                (uc.LocallyLinearPolicy(None, scale="auto").fit_demonstrations(unlike), scale),
             )
         ]
         ratios.append(errors[1] / errors[0])

@@ -148,7 +148,7 @@ def tabled(once):
     """Table II, of fewer and shorter demonstrations."""
     from unconstrain.paper.experiments import table2
 
-    settings = table2.Settings(trials=1, demonstrations=20, steps=30, test_demonstrations=3, jacobian_trials=1)
+    settings = table2.Settings(trials=1, demonstrations=10, steps=30, test_demonstrations=3, jacobian_trials=1)
     return lambda: once("table 2", lambda: table2.run(settings))
 
 

@@ -108,7 +108,7 @@ def test_of_cycles_alone_the_terminal_has_their_rows_and_a_page_is_written(tmp_p
 def test_movements_are_those_of_a_rollout():
     goal, planes = np.zeros(2), [uc.constraints.Plane([1.0, 0.5]), uc.constraints.Plane([0.0, 1.0])]
     shown = uc.rollout(lambda x: x @ np.array([[-1.0, 1.0], [-1.0, -1.0]]), np.eye(2), 40, 0.1)
-    policy = uc.LocallyLinearPolicy(learner="direct").fit_demonstrations(shown)
+    policy = uc.LocallyLinearPolicy(None, learner="direct").fit_demonstrations(shown)
     guided, settings = uc.Guided(policy, goal, demonstrations=shown), arrival.Settings(longest=0.5)
     projections = uc.null_space_projection(np.stack([plane.normal for plane in planes])[:, None])
     flow, starts = strokes.flow(policy, guided.aim_, projections), [[2.0, 1.0], [-1.0, 0.5]]

@@ -26,7 +26,7 @@ def two_goals(states):
 
 
 SHOWN = uc.rollout(lambda states: -(states - GOAL), AROUND[:5], 100, 0.05, method="euler")
-POLICY = uc.LocallyLinearPolicy(learner="direct").fit_demonstrations(SHOWN)
+POLICY = uc.LocallyLinearPolicy(None, learner="direct").fit_demonstrations(SHOWN)
 
 
 def cycle(states):

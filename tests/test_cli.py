@@ -434,7 +434,7 @@ def test_the_width_of_the_local_models_is_chosen_and_told(tmp_path):
         np.savetxt(tmp_path / f"{number}.csv", rows, delimiter=",", header="x,y,u,v", comments="")
     columns = (*sorted(tmp_path.glob("*.csv")), "--state", "x,y", "--action", "u,v")
     said = run("fit", *columns, "-o", tmp_path / "p.npz")
-    found, widest = storage.load(tmp_path / "p.npz").fields_, uc.LocallyLinearPolicy(learner="direct")
+    found, widest = storage.load(tmp_path / "p.npz").fields_, uc.LocallyLinearPolicy(None, learner="direct")
     states, actions = np.concatenate(spots), np.sin(6.0 * np.concatenate(spots))
     assert found.variance < widest.fit(states, actions).fields_.variance
     assert f"local models of σ² {found.variance:.4g}" in said

@@ -229,7 +229,7 @@ def test_handwriting_arrives_from_everywhere_and_stays_as_it_was(monkeypatch, sh
     monkeypatch.setenv("UNCONSTRAIN_DATA", str(DATA))
     demos = load_handwriting(shape)
     states, actions, _ = uc.stack(demos)
-    policy = uc.LocallyLinearPolicy(learner="direct").fit_demonstrations(demos)
+    policy = uc.LocallyLinearPolicy(None, learner="direct").fit_demonstrations(demos)
     guided = uc.Guided(policy, demonstrations=demos, dt=0.02)
     low, high = states.min(axis=0), states.max(axis=0)
     box = (low + high) / 2 + 1.5 * (np.random.default_rng(0).random((20, 2)) - 0.5) * (high - low)

@@ -40,7 +40,7 @@ PROJECTIONS = uc.null_space_projection(NORMALS[:, None])
 @cache
 def learnt(kind):
     """A policy that goes round, far from what arrives at a goal, and is guided to one or stays."""
-    policy = uc.LocallyLinearPolicy(learner="direct").fit_demonstrations(ROUND)
+    policy = uc.LocallyLinearPolicy(None, learner="direct").fit_demonstrations(ROUND)
     aim = {"goal": [0.05, 0.0, 0.0], "demonstrations": DOWN} if kind == "goal" else {"demonstrations": ROUND}
     return uc.Guided(policy, **aim).moved(BY)
 

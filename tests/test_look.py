@@ -241,7 +241,7 @@ def test_it_shows_any_number_of_states(browser, tmp_path, dimensions):
                 states, np.gradient(states, axis=0), table[:, 0] if dimensions > 1 else None, name=f"</script>{index}"
             )
         )
-    policy = uc.LocallyLinearPolicy(learner=uc.Direct()).fit_demonstrations(demos)
+    policy = uc.LocallyLinearPolicy(None, learner=uc.Direct()).fit_demonstrations(demos)
     path = tmp_path / "look.html"
     path.write_text(look_page(demos, [f"q{k}" for k in range(dimensions)], "<i>many</i>", policy=policy), "utf-8")
     for page in opened(browser, path):

@@ -144,7 +144,8 @@ def test_diagnose_says_why_fit_may_be_content_and_what_its_columns_are(folder):
 
 
 def test_what_sums_cannot_tell_is_said_without_words_of_this_house(folder):
-    policy = uc.LocallyLinearPolicy(learner="hybrid").fit_demonstrations(uc.prepare(uc.read(folder / "w[0-5].csv")))
+    recordings = uc.read(folder / "w[0-5].csv")
+    policy = uc.LocallyLinearPolicy(None, learner="hybrid").fit_demonstrations(uc.prepare(recordings))
     with pytest.raises(uc.errors.UnconstrainError, match=r"^noise: .* learnt from sums,") as found:
         policy.solution_.noise  # noqa: B018
     assert "belief" not in str(found.value)
@@ -551,7 +552,7 @@ def test_a_rollout_that_is_printed_ends_with_its_verdict(policy, tmp_path):
 
 def test_a_good_verdict_of_a_printed_rollout_is_not_kept_back(tmp_path):
     swings = np.random.default_rng(0).uniform(-1, 1, (60, 2))
-    uc.save(uc.LocallyLinearPolicy(learner="direct").fit(swings, -swings), tmp_path / "p.npz")
+    uc.save(uc.LocallyLinearPolicy(None, learner="direct").fit(swings, -swings), tmp_path / "p.npz")
     assert call("rollout", tmp_path / "p.npz", "--start", "0.2,0.2", "--steps", 3).err.startswith("✔ ")
 
 

@@ -127,7 +127,7 @@ def test_units_do_not_matter(guided):
 
 
 def test_it_survives_its_file(tmp_path):
-    policy = uc.LocallyLinearPolicy(learner="direct").fit_demonstrations(SHOWN)
+    policy = uc.LocallyLinearPolicy(None, learner="direct").fit_demonstrations(SHOWN)
     guided = uc.Guided(policy, orbit="shown", demonstrations=SHOWN).moved([1.0, 0.0, 0.0])
     uc.save(guided, tmp_path / "guided.npz")
     assert_array_equal(uc.load(tmp_path / "guided.npz", uc.Guided)(STARTS), guided(STARTS))

@@ -118,7 +118,7 @@ def test_the_variance_is_chosen_by_what_is_held_out(monkeypatch):
     groups = np.repeat(np.arange(8), 60)
     winding = np.column_stack([np.ones(480), 2.0 * np.cos(2.0 * states[:, 0])]) + rng.normal(0.0, 0.05, (480, 2))
     straight = states @ [[-1.0, 0.5], [-0.5, -1.0]] + rng.normal(0.0, 0.05, (480, 2))
-    usual = uc.LocallyLinearPolicy(learner="direct").fit(states, straight, groups=groups).fields_.variance
+    usual = uc.LocallyLinearPolicy(None, learner="direct").fit(states, straight, groups=groups).fields_.variance
     compared, tried = uc.Robust.compared, list[int]()
     monkeypatch.setattr(uc.Robust, "compared", lambda self, *of: tried.append(1) or compared(self, *of))
     winds = uc.LocallyLinearPolicy("auto", learner="direct").fit(states, winding, groups=groups)

@@ -76,7 +76,7 @@ FITS = {
     "in the plane": (uc.ParametricPolicy(uc.NormalisedRBF.grid(-1, 1, 3), uc.Hybrid()), plane),
     "in space": (uc.LocallyLinearPolicy(), wiping),
     "in one dimension": (uc.ParametricPolicy(uc.Affine(), uc.Direct()), lambda: wiping(slice(1), times=False)),
-    "that never moves": (uc.LocallyLinearPolicy(learner=uc.Inconsistency()), still),
+    "that never moves": (uc.LocallyLinearPolicy(None, learner=uc.Inconsistency()), still),
 }
 
 

@@ -64,7 +64,7 @@ def test_units_cost_nothing_where_their_scale_is_told(model, learner):
 def test_millimetres_beside_radians_are_found_and_cost_nothing(seed):
     demos = turning(seed)
     plain, blind, seeing = (
-        uc.LocallyLinearPolicy(learner="hybrid", scale=scale).fit_demonstrations(in_units(demos, units))
+        uc.LocallyLinearPolicy(None, learner="hybrid", scale=scale).fit_demonstrations(in_units(demos, units))
         for scale, units in ((None, np.ones(3)), (None, MM), ("auto", MM))
     )
     assert_array_equal(seeing.scale_.states, MM)
@@ -77,7 +77,7 @@ def test_millimetres_beside_radians_are_found_and_cost_nothing(seed):
 
 def test_degrees_beside_metres_are_found_and_alike_columns_left_alone():
     demos, degrees = turning(3), np.array([1.0, 1.0, 180 / np.pi])
-    policy = uc.LocallyLinearPolicy(learner="hybrid", scale="auto")
+    policy = uc.LocallyLinearPolicy(None, learner="hybrid", scale="auto")
     assert_array_equal(policy.fit_demonstrations(in_units(demos, degrees)).scale_.states, degrees)
     assert policy.fit_demonstrations(demos).scale_ is None
     assert policy.fit_demonstrations(in_units(demos, np.full(3, 1000.0))).scale_ is None
@@ -85,11 +85,11 @@ def test_degrees_beside_metres_are_found_and_alike_columns_left_alone():
 
 def test_a_later_batch_that_is_unlike_in_the_scale_of_the_first_is_warned_of():
     metres, millimetres = uc.stack(turning(5)), uc.stack(in_units(turning(), MM))
-    policy = uc.LocallyLinearPolicy(learner="hybrid", scale="auto")
+    policy = uc.LocallyLinearPolicy(None, learner="hybrid", scale="auto")
     policy.partial_fit(*metres[:2], groups=metres.groups)
     with pytest.warns(UserWarning, match="scale: 'auto' was found on the first batch, and in a later one"):
         policy.partial_fit(*millimetres[:2], groups=millimetres.groups)
-    alike = uc.LocallyLinearPolicy(learner="hybrid", scale="auto")
+    alike = uc.LocallyLinearPolicy(None, learner="hybrid", scale="auto")
     for rows in np.array_split(np.arange(len(millimetres.states)), 6):  # warnings are errors here
         alike.partial_fit(millimetres.states[rows], millimetres.actions[rows], groups=millimetres.groups[rows])
     assert_array_equal(alike.scale_.states, MM)
@@ -210,7 +210,7 @@ def test_a_scale_that_is_not_finite_is_refused():
 
 
 def test_a_cluster_takes_numbers_alone():
-    policy = uc.LocallyLinearPolicy(learner=uc.Hybrid(), scale="auto")
+    policy = uc.LocallyLinearPolicy(None, learner=uc.Hybrid(), scale="auto")
     with pytest.raises(SettingError, match=r"scale: got 'auto', which looks at samples, and a cluster .* Take numbers"):
         policy.fit_parts([[]], lambda function, parts: function(*parts))
 

@@ -189,7 +189,7 @@ def _free(seen: Seen) -> Any:
         return None
     try:
         with warnings.catch_warnings(action="ignore"):
-            return uc.LocallyLinearPolicy(learner=uc.NoiseCorrected()).fit_demonstrations(demos).solution_.free
+            return uc.LocallyLinearPolicy(None, learner=uc.NoiseCorrected()).fit_demonstrations(demos).solution_.free
     except UnconstrainError:  # a look needs no more than what can be seen
         return None
 

@@ -18,10 +18,10 @@ class LocallyLinearPolicy(Policy):
 
     Parameters
     ----------
-    variance : float or "auto", optional
-        The fields' σ², by default a quarter of the states' total variance, more where that takes over 100 fields.
-        "auto" halves that, down to a sixteenth, until two in turn are worse by estimated error: movements that wind
-        need narrower fields.
+    variance : float, "auto" or None
+        The fields' σ². None is a quarter of the states' total variance, more where that takes over 100 fields. "auto"
+        halves that, down to a sixteenth, until two in turn are worse by estimated error: movements that wind need
+        narrower fields. That takes four times as long.
     at_least : float
         Fields are added until every sample has at least this weight in one.
     centres : array_like, shape (M, n), optional
@@ -54,7 +54,7 @@ class LocallyLinearPolicy(Policy):
 
     def __init__(
         self,
-        variance: float | Literal["auto"] | None = None,
+        variance: float | Literal["auto"] | None = "auto",
         at_least: float = 0.7,
         centres: ArrayLike | None = None,
         learner: Learner | str | None = None,
