@@ -41,8 +41,9 @@ FLAT, ONE = 0.1, 0.03
 SLOW, LONG = 0.2, 0.1
 """Slower than the first share of a usual speed is rest, for more than the second share of the samples a long one."""
 
-BESIDE = 0.05
-"""Within this share of the extents of the states others come by a place, or end there; beyond twice that elsewhere."""
+BESIDE, PASSING = 0.05, 0.5
+"""Others that come nearer than the first share of the extents, faster than the second of a usual speed, move on there;
+near a goal all are slow. They end there within the first share, and elsewhere beyond twice that."""
 
 
 class Place(NamedTuple):
@@ -301,7 +302,7 @@ def planes_of(demonstrations: Sequence[Demonstration]) -> Array:
 def about_recordings(
     found: Verdict, demonstrations: Sequence[Demonstration], recipe: Recipe, policy: Policy
 ) -> Verdict:
-    """Add to a verdict which planes demonstrations keep to and, unless rest is trimmed, where a policy rests wrongly."""
+    """Add to a verdict which planes demonstrations keep to and, unless rest is trimmed, where a policy rests amiss."""
     planes, states, trust, doubt = planes_of(demonstrations), recipe.states or (), found.trust, found.doubt
     if len(planes) == 1:
         doubt = f"All demonstrations lie on one plane or parallel ones, of normal {named(planes[0], states)}: none "
@@ -349,7 +350,8 @@ def _rests(
     found = []
     for row in rest:
         far = np.linalg.norm(ends - ends[row], axis=1)
-        fast = [one.states[speeds[i] > slow] / wide for i, one in enumerate(demonstrations) if far[i] > 2.0 * BESIDE]
+        left = [i for i in range(len(ends)) if far[i] > 2.0 * BESIDE]
+        fast = [demonstrations[i].states[speeds[i] > PASSING / SLOW * slow] / wide for i in left]
         by = any((np.linalg.norm(some - ends[row], axis=1) < BESIDE).any() for some in fast)
         found.append((row, by, int((far[rest] < BESIDE).sum())))
     return found
