@@ -299,11 +299,9 @@ def planes_of(demonstrations: Sequence[Demonstration]) -> Array:
     return each[:, 2] if together and each[:, 2].any(axis=1).all() and not each[:, 1].any() else whole[:0]
 
 
-def about_recordings(
-    found: Verdict, demonstrations: Sequence[Demonstration], recipe: Recipe, policy: Policy
-) -> Verdict:
+def about_recordings(found: Verdict, demos: Sequence[Demonstration], recipe: Recipe, policy: Policy) -> Verdict:
     """Add to a verdict which planes demonstrations keep to and, unless rest is trimmed, where a policy rests amiss."""
-    planes, states, trust, doubt = planes_of(demonstrations), recipe.states or (), found.trust, found.doubt
+    planes, states, trust, doubt = planes_of(demos), recipe.states or (), found.trust, found.doubt
     if len(planes) == 1:
         doubt = f"All demonstrations lie on one plane or parallel ones, of normal {named(planes[0], states)}: none "
         doubt += f"tells what is across it; others at other tilts would. {found.doubt}"
@@ -311,23 +309,21 @@ def about_recordings(
         apart = np.degrees(np.arccos(min(float(np.abs(planes @ planes.T).min()), 1.0)))
         trust = f"{trust} Each demonstration lies on a plane of its own, up to {apart:.0f}° from the others.".strip()
     found = found._replace(trust=trust, doubt=doubt)
-    return found if recipe.still else _about_rest(found, demonstrations, states, policy)
+    return found if recipe.still else _about_rest(found, demos, states, policy)
 
 
-def _about_rest(
-    found: Verdict, demonstrations: Sequence[Demonstration], states: Sequence[str], policy: Policy
-) -> Verdict:
+def _about_rest(found: Verdict, demos: Sequence[Demonstration], states: Sequence[str], policy: Policy) -> Verdict:
     """Say where a policy rests as something stopped a demonstration there, or that this cannot be told.
 
     What the policy moves on from did no harm, and a goal, to which :data:`ENOUGH` come or all that rest, is its own.
     """
-    speeds = [np.linalg.norm(one.actions, axis=1) for one in demonstrations]
+    speeds = [np.linalg.norm(one.actions, axis=1) for one in demos]
     slow = float(f"{SLOW * np.quantile(np.concatenate(speeds), 0.9):.2g}")
-    rests, names = _rests(demonstrations, speeds, slow), _names(list(demonstrations))
+    rests, names = _rests(demos, speeds, slow), _names(list(demos))
     goal = any(not by and together >= min(ENOUGH, max(len(rests), 2)) for _, by, together in rests)
-    kept = [(row, by) for row, by, _ in rests if np.linalg.norm(policy(demonstrations[row].states[-1:])) < slow]
+    kept = [(row, by) for row, by, _ in rests if np.linalg.norm(policy(demos[row].states[-1:])) < slow]
     for row in [row for row, by in kept if by][:1]:
-        place = named(demonstrations[row].states[-1], states)
+        place = named(demos[row].states[-1], states)
         said = f"The policy rests near {place}, where '{names[row]}' came to rest and others move on: likely something "
         found = found._replace(doubt=f"{said}stopped it. {found.doubt}".rstrip())
         if goal or any((speed >= slow).mean() < LONG for speed in speeds):
