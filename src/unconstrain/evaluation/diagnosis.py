@@ -321,7 +321,7 @@ def _about_rest(found: Verdict, demos: Sequence[Demonstration], states: Sequence
     slow = float(f"{SLOW * np.quantile(np.concatenate(speeds), 0.9):.2g}")
     rests, names = _rests(demos, speeds, slow), _names(list(demos))
     goal = any(not by and together >= min(ENOUGH, max(len(rests), 2)) for _, by, together in rests)
-    kept = [(row, by) for row, by, _ in rests if np.linalg.norm(policy(demos[row].states[-1:])) < slow]
+    kept = [(row, by) for row, by, _ in rests if 2.0 * np.linalg.norm(policy(demos[row].states[-1:])) < slow]
     for row in [row for row, by in kept if by][:1]:
         place = named(demos[row].states[-1], states)
         said = f"The policy rests near {place}, where '{names[row]}' came to rest and others move on: likely something "
