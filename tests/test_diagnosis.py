@@ -291,7 +291,7 @@ def test_what_fit_and_diagnose_call_told_is_told(kind, seed):
     states, wanted = uc.stack(demos).states, np.vstack([one.truth.policy for one in demos])
     missed = np.sqrt(((policy(states) - wanted) ** 2).sum() / (wanted**2).sum())
     fit, whole = verdicts.of_explained(policy.held_out_score(), 5, told), verdicts.of_diagnosis(found)
-    said = about_recordings(fit, demos, ("x", "y", "z"))
+    said = about_recordings(fit, demos, uc.Recipe(("x", "y", "z"), still=1.0), np.zeros_like)
     assert ("Each demonstration lies on a plane of its own, up to " in said.trust) == (kind == "own planes")
     assert ("All demonstrations lie on one plane or parallel ones, of normal (x = " in said.doubt) == (
         kind == "one plane"
@@ -320,19 +320,45 @@ def test_strokes_on_planes_of_their_own_are_not_called_bad_recordings(fitted):
     assert own.said.endswith("not enough to be sure, though each lies on a plane of its own.")
 
 
-def test_strokes_that_come_to_rest_are_told_with_the_option_that_trims_it():
-    def stroke(rest):
-        speed = np.r_[np.full(60, 10.0), np.full(rest, 0.05)]
-        states = np.cumsum(speed) * 0.01
-        return uc.Demonstration(states[:, None] * [1.0, 0.0], speed[:, None] * [1.0, 0.0], name=f"s{rest}")
+def stroke(start, end, rest, name):
+    """From a place to another, then at rest there for some samples."""
+    speed = np.r_[np.full(60, 1.0), np.full(rest, 0.001)]
+    way = np.subtract(end, start) / 60.0
+    return uc.Demonstration(start + np.cumsum(speed)[:, None] * way, speed[:, None] * way, name=name)
 
-    poor, demos = verdicts.Verdict(verdicts.Mark.BAD, "Poor.", next="Look."), [stroke(40), stroke(40), stroke(2)]
-    said = about_recordings(poor, demos, ("x", "y")).next
-    assert said.startswith("2 of 3 demonstrations come to rest at an end")
-    assert said.endswith(": --still 2 leaves that out. Look.")
-    trimmed = [uc.preparation.trim(one, still=2.0) for one in demos]
-    assert about_recordings(poor, trimmed, ("x", "y")).next == "Look."
-    assert about_recordings(poor._replace(mark=verdicts.Mark.GOOD), demos, ("x", "y")).next == "Look."
+
+CROSSING = [stroke((-1, 0), (1, 0), 0, "by"), stroke((0, -1), (0, 0), 40, "held"), stroke((1, 1), (-1, 1), 0, "on")]
+TO_A_GOAL = [stroke(start, (0, 0), 40, "to") for start in ((1, 0), (0, 1), (-1, 0), (0, -1))]
+
+
+@pytest.mark.parametrize(
+    ("demos", "policy", "doubt", "advised"),
+    [
+        (
+            CROSSING,
+            np.zeros_like,
+            "The policy rests near (x = 0, y = 0.000667), where 'held' came to rest and others",
+            True,
+        ),
+        (CROSSING, np.ones_like, "", False),
+        (CROSSING[1:], np.zeros_like, "1 of 2 demonstrations come to rest where no other moves on: whether", False),
+        (CROSSING[1:2], np.zeros_like, "1 of 1 demonstrations", False),
+        (TO_A_GOAL, np.zeros_like, "", False),
+        (
+            CROSSING + [stroke(start, (0.5, 0.7), 40, "to") for start in ((1, 0), (0, 1))] * 2,
+            np.zeros_like,
+            "The",
+            False,
+        ),
+    ],
+)
+def test_where_a_policy_rests_by_mistake_is_told_and_trimmed_only_where_no_goal_is_lost(demos, policy, doubt, advised):
+    poor = verdicts.Verdict(verdicts.Mark.BAD, "Poor.", next="Look.")
+    said = about_recordings(poor, demos, uc.Recipe(("x", "y")), policy)
+    assert said.doubt.startswith(doubt)
+    assert bool(said.doubt) == bool(doubt)
+    assert said.next == ("--still 0.0067 leaves out rest at an end. Look." if advised else "Look.")
+    assert about_recordings(poor, demos, uc.Recipe(("x", "y"), still=0.1), policy) == poor
 
 
 @pytest.mark.parametrize(("count", "told"), [(2, False), (3, True)])

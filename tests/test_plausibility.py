@@ -220,6 +220,12 @@ def test_a_pause_is_found_where_only_what_stands_still_trembles(pace, found, sha
     assert not found or abs(bounds - [150, 300]).max() <= 10
 
 
+def test_reaches_that_creep_under_noise_do_not_pause():
+    share, rng = np.linspace(0, 1, 200), np.random.default_rng(0)
+    reach = share[:, None] ** 3 * (10 - 15 * share[:, None] + 6 * share[:, None] ** 2) * [0.8, 0.6]
+    assert not [found for _ in range(40) if (found := pauses(reach + 0.03 * rng.standard_normal(reach.shape)))]
+
+
 def test_a_pause_is_found_where_the_movement_after_it_creeps():
     for number, held in enumerate(swings(5)[1]):  # behind two of these planes hardly anything moves after the pause
         [(start, stop)] = pauses(held.values)

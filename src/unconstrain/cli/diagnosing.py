@@ -58,7 +58,7 @@ def diagnose(
     states = recipe.states or ()
     actions = recipe.actions or recipe.directions
     judged = uc.evaluation.verdicts.of_diagnosis(found)
-    verdict = uc.evaluation.diagnosis.about_recordings(judged, demonstrations, states)
+    verdict = uc.evaluation.diagnosis.about_recordings(judged, demonstrations, recipe, policy)
     if as_json:
         named = {"states": states, "actions": actions, "verdict": verdict.to_json()}
         click.echo(json.dumps(found.to_json() | named, indent=2))

@@ -182,7 +182,7 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     there = _least_known(policy, demos, stream.recipe) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
     found = uc.evaluation.verdicts.of_explained(held_out, count, told, there=there)
     ran = replayed(found, moving, demos, stream.recipe, None, stream.first.units, free=False)
-    verdict = uc.evaluation.diagnosis.about_recordings(ran.verdict, demos, stream.recipe.states or ())
+    verdict = uc.evaluation.diagnosis.about_recordings(ran.verdict, demos, stream.recipe, moving)
     return Judged(verdict, ran.medians, ran.in_words, count, samples, 1.0 - missed, held_out)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,7 +15,7 @@ from ..base.errors import InvalidDataError, MissingBeliefError
 from ..base.files import stem
 from ..learners import Solution, robust
 from ..models import Scale, choose_variance, cover
-from ..recordings import Demonstration, readers, stack
+from ..recordings import Demonstration, Recipe, readers, stack
 from .verdicts import ENOUGH as ENOUGH
 from .verdicts import SMALL as SMALL
 from .verdicts import Mark, Verdict
@@ -40,6 +40,10 @@ FLAT, ONE = 0.1, 0.03
 
 SLOW, LONG = 0.2, 0.1
 """Slower than the first share of a usual speed is rest, for more than the second share of the samples a long one."""
+
+BESIDE, PASSING = 0.05, 0.5
+"""Others that come nearer than the first share of the extents, faster than the second of a usual speed, move on there;
+near a goal all are slow. They end there within the first share, and elsewhere beyond twice that."""
 
 
 class Place(NamedTuple):
@@ -295,23 +299,62 @@ def planes_of(demonstrations: Sequence[Demonstration]) -> Array:
     return each[:, 2] if together and each[:, 2].any(axis=1).all() and not each[:, 1].any() else whole[:0]
 
 
-def about_recordings(found: Verdict, demonstrations: Sequence[Demonstration], states: Sequence[str]) -> Verdict:
-    """Add to a verdict which planes demonstrations keep to, and if it is not good where they are at rest."""
-    planes, trust, doubt = planes_of(demonstrations), found.trust, found.doubt
+def about_recordings(
+    found: Verdict, demos: Sequence[Demonstration], recipe: Recipe, policy: Callable[[Array], Array]
+) -> Verdict:
+    """Add to a verdict which planes demonstrations keep to and, unless rest is trimmed, where a policy rests amiss."""
+    planes, states, trust, doubt = planes_of(demos), recipe.states or (), found.trust, found.doubt
     if len(planes) == 1:
         doubt = f"All demonstrations lie on one plane or parallel ones, of normal {named(planes[0], states)}: none "
         doubt += f"tells what is across it; others at other tilts would. {found.doubt}"
     elif len(planes):
         apart = np.degrees(np.arccos(min(float(np.abs(planes @ planes.T).min()), 1.0)))
         trust = f"{trust} Each demonstration lies on a plane of its own, up to {apart:.0f}° from the others.".strip()
-    speeds = [np.linalg.norm(one.actions, axis=1) for one in demonstrations]
-    slow = SLOW * float(np.quantile(np.concatenate(speeds), 0.9))
-    rest = [np.ptp(np.flatnonzero(each > slow)) < (1 - LONG) * len(each) for each in speeds if (each > slow).any()]
     found = found._replace(trust=trust, doubt=doubt)
-    if found.mark is Mark.GOOD or not any(rest):
+    return found if recipe.still else _about_rest(found, demos, states, policy)
+
+
+def _about_rest(
+    found: Verdict, demos: Sequence[Demonstration], states: Sequence[str], policy: Callable[[Array], Array]
+) -> Verdict:
+    """Say where a policy rests as something stopped a demonstration there, or that this cannot be told.
+
+    What the policy moves on from did no harm, and a goal, to which :data:`ENOUGH` come or all that rest, is its own.
+    """
+    speeds = [np.linalg.norm(one.actions, axis=1) for one in demos]
+    slow = float(f"{SLOW * np.quantile(np.concatenate(speeds), 0.9):.2g}")
+    rests, names = _rests(demos, speeds, slow), _names(list(demos))
+    goal = any(not by and together >= min(ENOUGH, max(len(rests), 2)) for _, by, together in rests)
+    kept = [(row, by) for row, by, _ in rests if 2.0 * np.linalg.norm(policy(demos[row].states[-1:])) < slow]
+    for row in [row for row, by in kept if by][:1]:
+        place = named(demos[row].states[-1], states)
+        said = f"The policy rests near {place}, where '{names[row]}' came to rest and others move on: likely something "
+        found = found._replace(doubt=f"{said}stopped it. {found.doubt}".rstrip())
+        if goal or any((speed >= slow).mean() < LONG for speed in speeds):
+            return found
+        return found._replace(next=f"--still {slow} leaves out rest at an end. {found.next}".rstrip())
+    if found.mark is Mark.GOOD or goal or not kept:
         return found
-    said = f"{sum(rest)} of {len(speeds)} demonstrations come to rest at an end, where they tell no policy: --still"
-    return found._replace(next=f"{said} {slow:.2g} leaves that out. {found.next}")
+    said = f"{len(kept)} of {len(speeds)} demonstrations come to rest where no other moves on: whether something "
+    return found._replace(doubt=f"{said}stopped them cannot be told. {found.doubt}".rstrip())
+
+
+def _rests(
+    demonstrations: Sequence[Demonstration], speeds: Sequence[Array], slow: float
+) -> list[tuple[int, bool, int]]:
+    """Which end in a long rest; whether others move by there and end elsewhere, and how many rest there together."""
+    wide = np.maximum(np.ptp(np.vstack([one.states for one in demonstrations]), axis=0), 1e-300)
+    ends = np.array([one.states[-1] for one in demonstrations]) / wide
+    last = [np.flatnonzero(speed > slow).max(initial=-1) for speed in speeds]
+    rest = [row for row, at in enumerate(last) if at >= 0 and len(speeds[row]) - 1 - at > LONG * len(speeds[row])]
+    found = []
+    for row in rest:
+        far = np.linalg.norm(ends - ends[row], axis=1)
+        left = [i for i in range(len(ends)) if far[i] > 2.0 * BESIDE]
+        fast = [demonstrations[i].states[speeds[i] > PASSING / SLOW * slow] / wide for i in left]
+        by = any((np.linalg.norm(some - ends[row], axis=1) < BESIDE).any() for some in fast)
+        found.append((row, by, int((far[rest] < BESIDE).sum())))
+    return found
 
 
 def untold(policy: Policy, movement: Demonstration) -> Array | None:

@@ -139,18 +139,19 @@ def marks_of(recording: Recording, survey: Any, demonstration: Demonstration) ->
     return [*marks, *_pauses(kept, begin, marks)]
 
 
-def _pauses(times: Array | None, begin: float, gaps: Sequence[Mark]) -> Iterator[Mark]:
-    """Intervals that are no gaps of the recording, and so were left out of the demonstration."""
+def _pauses(times: Array | None, begin: float, marks: Sequence[Mark]) -> Iterator[Mark]:
+    """Intervals that are no gaps of the recording, and so were left out of the demonstration; told once."""
     intervals = np.empty(0) if times is None else np.diff(times)
     if times is None or len(intervals) < 2:
         return
-    known = [gap.start for gap in gaps if gap.code == "gap" and gap.start is not None]
+    known = [gap.start for gap in marks if gap.code == "gap" and gap.start is not None]
     usual = float(np.median(intervals))
     for row in np.flatnonzero(intervals > PAUSE * usual):
         start = float(times[row]) - begin
         if not any(abs(start - gap) < 2 * usual for gap in known):
             length = float(intervals[row])
-            yield Mark("pause", f"stands still for {length:.3g} s, left out", start, length)
+            said = "" if any(one.code == "pause" for one in marks) else f"stands still for {length:.3g} s, left out"
+            yield Mark("pause", said, start, length)
 
 
 def _packed(demos: Sequence[Demonstration], free: Sequence[Array] | None) -> Iterator[dict[str, Any]]:

@@ -91,7 +91,14 @@ def _motionless(values: Array, shortest: int) -> list[tuple[int, int]]:
     near = NOISE * _noise(values)
     runs = _runs(values, shortest // 2, near, shortest)
     exact = [_around(values, *run, near) for run in runs]
-    return _left([(start, stop) for start, stop in exact if stop - start >= shortest], values, 2.0 * near)
+    long = [(start, stop) for start, stop in exact if stop - start >= shortest and _stays(values[start:stop], near)]
+    return _left(long, values, 2.0 * near)
+
+
+def _stays(values: Array, near: Array) -> bool:
+    """Whether the middles of both halves are nearer than their noise: what creeps under noise does not stand still."""
+    first, second = (np.median(half, axis=0) for half in np.array_split(values, 2))
+    return bool((np.abs(first - second) <= near / 3.0).all())
 
 
 def _runs(values: Array, span: int, least: Array, shortest: int) -> list[tuple[int, int]]:
