@@ -295,7 +295,7 @@ def walk_of_fitting(house: House) -> list[Call]:
     normals = np.eye(2)[[0, 1, 0, 1]]
     tables = [(states, -states * normal) for states, normal in zip(rng.normal(size=(4, 30, 2)), normals, strict=True)]
     demonstrations = [uc.Demonstration(states, actions) for states, actions in tables]
-    policy = uc.LocallyLinearPolicy(learner=uc.Hybrid())
+    policy = uc.LocallyLinearPolicy(None, learner=uc.Hybrid())  # on fields of one width, as in the paper
     policy.fit_demonstrations(demonstrations)  # imports what is imported on first use
     return calls(house, lambda: policy.fit_demonstrations(demonstrations))
 

@@ -49,7 +49,8 @@ def folder(tmp_path_factory):
         write(place / f"held_{k}.csv", HEAD, oval(k))
     for name, how in {"same": {}, "slow": {"pace": 0.7}}.items():
         files = [write(place / f"{name}_{k}.csv", HEAD, oval(k, **how)) for k in range(10, 14)]
-        run("fit", *files, "--state", "x,y,z", "--differentiate", "--learner", "hybrid", "-o", place / f"{name}.npz")
+        how = "--state", "x,y,z", "--differentiate", "--learner", "hybrid", "--variance", 500
+        run("fit", *files, *how, "-o", place / f"{name}.npz")
     return place
 
 

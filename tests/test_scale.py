@@ -227,17 +227,17 @@ def test_the_command_line_scales_and_says_so(tmp_path):
     for one in in_units(turning(), MM):
         table = np.column_stack([np.arange(len(one)) * 0.03, one.states, one.actions])
         files.append(write(tmp_path / f"d{len(files)}.csv", "t,x,y,yaw,vx,vy,vyaw", table))
-    output = tmp_path / "p.npz"
-    done = run("fit", *files, "-o", output, "--learner", "hybrid", "--scale", "auto", "--strict")
+    output, plain = tmp_path / "p.npz", ("--learner", "hybrid", "--model", "affine")
+    done = run("fit", *files, "-o", output, *plain, "--scale", "auto", "--strict")
     assert "As one count 1000 of x, 1000 of y, 1 of yaw, 1000 of vx" in done
     assert_array_equal(uc.load(output).scale_.states, MM)
-    told = run("fit", *files, "-o", output, "--force", "--learner", "hybrid", "--scale", "1000,1000,1")
+    told = run("fit", *files, "-o", output, "--force", *plain, "--scale", "1000,1000,1")
     assert told == done
-    unscaled = call("fit", *files, "-o", output, "--force", "--learner", "hybrid")
+    unscaled = call("fit", *files, "-o", output, "--force", *plain)
     assert "As one" not in unscaled.out
     assert "mixed-units: 'd0', column 'yaw': " in unscaled.err
     assert "--scale auto levels them" in unscaled.err
-    beside = call("fit", *files, "-o", output, "--force", "--learner", "hybrid", "--scale", "auto", "--angle", "yaw")
+    beside = call("fit", *files, "-o", output, "--force", *plain, "--scale", "auto", "--angle", "yaw")
     assert "As one" not in beside.out
     assert "Note: --scale auto: angles and orientations have none; give positions in metres." in beside.err
     wrong = call("fit", *files, "-o", output, "--force", "--scale", "1,2")

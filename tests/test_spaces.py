@@ -491,7 +491,7 @@ def test_the_command_line_gives_a_policy_its_space(tmp_path):
     turning_columns = ("--quaternion", "qx,qy,qz,qw", "--angle", "crank")
     columns = ("--state", "x,qx,qy,qz,qw,crank", "--differentiate", *turning_columns)
     saved = tmp_path / "policy.npz"
-    said = run("fit", *files, *columns, "--learner", "direct", "-o", saved)
+    said = run("fit", *files, *columns, "--learner", "direct", "--variance", "9", "-o", saved)
     assert "qw, crank (an angle) (qx, qy, qz, qw are an orientation) as states" in said
     assert uc.load(saved).space_ == Euclidean() * Sphere("xyzw") * Circle()
     state = np.r_[0.0, turning(Rotation.random(random_state=3), "xyzw", flips=False).values[50], 3.0]

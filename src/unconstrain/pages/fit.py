@@ -107,11 +107,13 @@ def _held_out(policy: Policy, demos: list[Demonstration]) -> list[float] | None:
     count = min(FOLDS, len(demos))
     if count < 2 or sum(map(len, demos)) > MOST_REFITTED:
         return None
-    found = [float("nan")] * len(demos)
+    found, again = [float("nan")] * len(demos), copy(policy)
+    if hasattr(again, "fields_"):  # as wide as was chosen
+        again.variance = again.fields_.variance
     for fold in counted_off(range(count), "report: learning again, each time without some demonstrations:"):
         rest = [demo for index, demo in enumerate(demos) if index % count != fold]
         with listening(lambda *_: None):  # their own steps would look as if the policy were learnt anew
-            learnt = copy(policy).fit_demonstrations(rest)
+            learnt = copy(again).fit_demonstrations(rest)
         for index in range(fold, len(demos), count):
             found[index] = _or_nan(ninconsistency, learnt, [demos[index]])
     return found
