@@ -107,6 +107,27 @@ class TestSupport:
     def test_where_support_ends_is_said_in_seconds(self):
         found = verdicts.of_support(np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.5, 1.0]))
         assert (found.mark, found.trust) == (Mark.DOUBTFUL, "The first 1.00 s.")
+        ended = verdicts.of_early_end(found, "It stops. Go on.")
+        assert (ended.trust, ended.next) == ("The first 1.00 s.", "Go on.")
+        assert ended.said.startswith("It stops. No demonstration passes near for 33% of the time, first at 1.00 s")
+
+    @pytest.mark.parametrize(("most", "said"), [(0.3, "about 30% of"), (30.0, "about 30% of"), (9.0, "as much as")])
+    def test_how_far_a_movement_may_be_off_is_said_of_its_middle(self, most, said):
+        unknown = np.array([0.0, 0.3, 0.3, most]) if most != 9.0 else np.full(4, most)
+        found = verdicts.of_support(np.ones(4), np.arange(4.0), unknown)
+        assert f"there it may be off by {said} its typical action, most at" in found.said
+
+    @pytest.mark.parametrize("told", [None, 1.0])
+    def test_a_run_through_the_middle_of_a_circle_is_where_nobody_was(self, tmp_path, told):
+        turn = np.linspace(0.0, 2 * np.pi, 200)
+        states, actions = (np.column_stack([a(turn), b(turn)]) for a, b in ((np.cos, np.sin), (np.sin, np.cos)))
+        policy = uc.LocallyLinearPolicy(learner="direct").fit(states, actions * [-1.0, 1.0])
+        uc.save(policy, tmp_path / "p.npz", {} if told is None else {"determined share of states": told})
+        for start, sign in (("1,0", "✔ Near demonstrations for all"), ("0.1,0", "! No demonstration passes near for")):
+            ran = call(
+                "rollout", tmp_path / "p.npz", "--start", start, "--steps", 20, "-o", tmp_path / "r.csv", "--force"
+            )
+            assert ran.stdout.startswith(sign)
 
 
 class TestInfo:

@@ -503,9 +503,9 @@ def _supported(
 ) -> uc.evaluation.verdicts.Verdict:
     """How near data is along a movement, and whether it tells the policy, if not everywhere; then ``held``."""
     verdicts = uc.evaluation.verdicts
-    ended = verdicts.of_early_end(why, float(path.times[-1])) if why else None
     untold = None if (told or 0.0) >= verdicts.MOSTLY else uc.evaluation.diagnosis.untold(policy, path)
-    found = ended or verdicts.of_support(_support(policy, path.states), path.times, untold)
+    found = verdicts.of_support(_support(policy, path.states), path.times, untold)
+    found = verdicts.of_early_end(found, why) if why else found
     found = found._replace(said=f"{found.said}{held}")
     if not obstacles:
         return found

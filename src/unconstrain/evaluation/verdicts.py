@@ -47,6 +47,9 @@ FORBIDDEN = 0.05
 OTHER_UNIT = 30.0
 """Median size over that demonstrated, or the inverse, from which on units are likely to differ."""
 
+NEARBY = 0.6
+"""Support of nearly all recorded states: they are within one width of a kernel, exp(−½). Below, none came by."""
+
 SMALL = 0.1
 """An undetermined spread below this share of the typical action is negligible."""
 
@@ -255,26 +258,31 @@ def of_support(support: Array, times: Array | None, unknown: Array | None = None
     ``unknown`` is how much of each action no recording tells, as a standard deviation, as a share of a typical one.
     """
     seconds = np.arange(len(support)) if times is None else times
-    far = support < SUPPORTED
-    open_ = np.zeros(len(far), np.bool_) if unknown is None else unknown > SMALL
-    if unknown is not None and not far.any() and open_.any():
-        return _of_open(open_, float(unknown.max()), np.asarray(seconds, np.float64))
-    if not far.any():
+    far, away = support < SUPPORTED, support < NEARBY
+    open_ = np.zeros_like(away) if unknown is None else (unknown > SMALL) & ~away
+    if not (away | open_).any():
         return Verdict(Mark.GOOD, f"Near demonstrations for all {seconds[-1]:.2f} s: supported.")
-    since = seconds[int(far.argmax())]
-    mark = Mark.BAD if far.mean() > 0.5 else Mark.DOUBTFUL
-    said = f"From {since:.2f} s on the movement is far from all data, {far.mean():.0%} of the time: extrapolated."
-    trust = f"The first {since:.2f} s." if far.argmax() else ""
-    return Verdict(mark, said, trust, "What is far from data.", "Start nearer, or demonstrate there.")
+    first = int((away | open_).argmax())
+    trust = f"The first {seconds[first]:.2f} s." if first else ""
+    since, then = seconds[int(away.argmax())], "Start nearer, or demonstrate there."
+    if far.mean() > 0.5:
+        said = f"From {since:.2f} s on the movement is far from all data, {far.mean():.0%} of the time: extrapolated."
+        return Verdict(Mark.BAD, said, trust, "What is far from data.", then)
+    said = f"No demonstration passes near for {away.mean():.0%} of the time, first at {since:.2f} s: extrapolated."
+    doubt = "Where none passes, and what that leads to."
+    if open_.any():
+        told = f"{open_.mean():.0%} of the time, first at {seconds[int(open_.argmax())]:.2f} s, they do not tell the "
+        told += f"policy in every direction: there it may be off by {_off(unknown, open_, seconds)}."  # type: ignore[arg-type]
+        said, doubt = (f"{said} Near some, {told}", doubt) if away.any() else (f"Near demonstrations, but {told}", "")
+        doubt = f"{doubt} Directions that are not determined there.".lstrip()
+        then = f"{then if away.any() else ''} 'unconstrain diagnose' says what to record.".lstrip()
+    return Verdict(Mark.DOUBTFUL, said, trust, doubt, then)
 
 
-def _of_open(open_: NDArray[np.bool_], most: float, seconds: Array) -> Verdict:
-    """Judge a movement that is near demonstrations, but goes where they do not tell the policy."""
-    since, then = seconds[int(open_.argmax())], "'unconstrain diagnose' says what to record."
-    said = f"Near demonstrations, but {open_.mean():.0%} of the time, first at {since:.2f} s, no recording tells the "
-    said += f"policy in a direction that it takes: undetermined, by up to {most:.0%} of its typical action."
-    trust = f"The first {since:.2f} s." if open_.argmax() else ""
-    return Verdict(Mark.DOUBTFUL, said, trust, "Directions that are not determined there.", then)
+def _off(unknown: Array, where: NDArray[np.bool_], seconds: Array) -> str:
+    """How far a policy may be off where it is not told: in the middle, and when most."""
+    middle, worst = float(np.median(unknown[where])), seconds[int(np.where(where, unknown, 0.0).argmax())]
+    return f"{f'about {middle:.0%} of' if middle < 1 else 'as much as'} its typical action, most at {worst:.2f} s"
 
 
 def of_replays(found: Verdict, extents: Array, paces: Array, apart: str, lasts: Sequence[float] = ()) -> Verdict:
@@ -336,10 +344,12 @@ def _strays(found: Verdict, how: str, what: str) -> Verdict:
     )
 
 
-def of_early_end(why: str, seconds: float) -> Verdict:
-    """Judge a movement that stops after so many seconds, for a reason in one sentence, and what to do in another."""
+def of_early_end(found: Verdict, why: str) -> Verdict:
+    """Add to a verdict on a movement that it stops, for a reason in one sentence, and what to do in another."""
     said, _, then = why.partition(". ")
-    return Verdict(Mark.DOUBTFUL, f"{said}.", f"These {seconds:.2f} s.", "What would have come after.", then)
+    mark = Mark.BAD if found.mark is Mark.BAD else Mark.DOUBTFUL
+    doubt = f"{found.doubt} What would have come after.".lstrip()
+    return found._replace(mark=mark, said=f"{said}. {found.said}", doubt=doubt, next=then)
 
 
 SAME_CAUSE = ("clock-gap", "seam", "few-demonstrations")
