@@ -108,7 +108,11 @@ def _of(name: str, named: Named | None, demonstrations: Sequence[uc.Demonstratio
     """What a file notes of the demonstration that it is of, of where that was, and of the mechanism."""
     states = uc.stack([one for one in demonstrations if name in ("", one.name)]).states
     where = {WHERE: [states.min(axis=0).tolist(), states.max(axis=0).tolist()]}
-    return where | ({OF: [name]} if name else {}) | ({} if named is None else named.notes(name))
+    return (
+        where
+        | {OF: [name] if name else [one.name for one in demonstrations]}
+        | ({} if named is None else named.notes(name))
+    )
 
 
 def _judged(learnt: Mapping[str, uc.LearntConstraint], named: Named | None) -> uc.evaluation.verdicts.Verdict:

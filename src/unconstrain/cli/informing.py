@@ -23,7 +23,7 @@ RAN = "from the same starts"
 """Note of size and pace of the policy's own movements over those of the demonstrations."""
 
 OF, HELD_BY, WHERE = "of", "held by", "least and largest states"
-"""Notes of a constraint: demonstrations that it is of, if not of all; numbers of the mechanism; where it was learnt."""
+"""Notes of a constraint: demonstrations that it is of; numbers of the mechanism; where it was learnt."""
 
 ENDS = 2**16
 """Bytes at either end of a file by which it is known again."""

@@ -175,6 +175,7 @@
     } else {
       parts.push(`${several(demos.length, "demonstration")}, each in its colour; a dot is where it is at the time below.`);
     }
+    if (!flat()) parts.push("Light grey on the floor: their shadows.");
     if (shown.patches.length) parts.push("Faint pieces: what the learnt constraint leaves free.");
     legend.append(...parts.map((part) => {
       if (typeof part !== "string") return part;
@@ -456,7 +457,7 @@
   const isOpen = (i) => roll.untold !== null && roll.untold[i] > untold.small && !isAway(i);
 
   function sayPolicy() {
-    of("policy-says").textContent = `The bold line: where it goes from the ring, which can be dragged. ${howKnown()}`;
+    of("policy-says").textContent = `The black line: where it goes from the ring, which can be dragged. ${howKnown()}`;
   }
 
   /** The same as the verdict of `unconstrain rollout`. */
@@ -543,10 +544,8 @@
   function sayAll() {
     const warnings = demos.flatMap((demo) => demo.marks.map((mark) => ({ demo, mark })));
     const odd = warnings.filter(({ mark }) => mark.code !== "gap" && mark.code !== "pause");
-    of("verdict").textContent = odd.length
-      ? `! ${several(odd.length, "thing")} to look at, listed under What looks odd.`
-      : "✔ Nothing looks odd.";
-    of("verdict").className = odd.length ? "verdict warn" : "verdict";
+    of("verdict").textContent = shown.verdict + (odd.length ? " What looks odd is listed below." : "");
+    of("verdict").className = /^[!✖]/.test(shown.verdict) ? "verdict warn" : "verdict";
     const whole = number(demos.reduce((sum, demo) => sum + lengthOf(demo), 0));
     of("summary").textContent = `${several(demos.length, "demonstration")}, ${several(shown.samples, "sample")}, ` +
       `${shown.timed ? `${whole} s in all` : "without times"}; ` +
