@@ -217,11 +217,6 @@ def test_one_that_is_another_movement_is_said_whatever_the_others_do():
     assert added([1.0, 1.0, 1.0, 1.0, 1.3]).mark is Mark.GOOD  # as people vary
 
 
-def test_sizes_that_are_no_movement_of_the_same_unit_are_called_so():
-    assert added([400.0, 410.0]).next.startswith("Compare units")
-    assert not added([4.0, 4.1]).next.startswith("Compare units")
-
-
 def test_what_is_poor_anyway_is_not_excepted_by_but():
     assert "Poor. And run from" in of_replays(Verdict(Mark.BAD, "Poor."), np.array([2.0]), np.array([1.0]), "3 mm").said
 

@@ -179,6 +179,26 @@ def test_fit_and_score_agree_on_a_policy_that_is_not_told_across(folder, tmp_pat
     assert verdicts.of_score(1.0, 5, 0.95, told=0.5).mark is Mark.GOOD  # under the constraint that is all there is
 
 
+@pytest.mark.parametrize(
+    ("times", "said"),
+    [(1000, "metres and mill"), (1 / 900, "metres and mill"), (60, "degrees and rad"), (1, ""), (9, "")],
+)
+def test_recordings_in_another_unit_are_called_so(folder, tmp_path, times, said):
+    table = np.loadtxt(folder / "swing_0.csv", delimiter=",", skiprows=1) * [1.0, *[times] * 4]
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="t,x,y,vx,vy", comments="")
+    found = json.loads(call("score", folder / "p.npz", tmp_path / "a.csv", "--json").stdout)["verdict"]
+    assert found["said"].startswith("Recordings are ") == bool(said)
+    assert said in found["said"]
+
+
+def test_what_is_missed_by_more_than_all_is_said_in_words_with_a_cause():
+    for found in (verdicts.of_explained(-2.4, 5), verdicts.of_score(-2.4, 5), verdicts.of_score(-9.0, 5, -9.0)):
+        assert "misses held-out motion by more than that motion itself" in found.said
+        assert "%" not in found.said
+    assert "units may be wrong" in verdicts.of_explained(-2.4, 5, learnt=0.5).next
+    assert "go where no other does" in verdicts.of_explained(-2.4, 5, learnt=0.95).next
+
+
 def test_a_fit_tells_programs_what_it_tells_people(folder):
     told = json.loads((folder / "fit.json").read_text())
     assert told["verdict"]["mark"] == "doubtful"  # one circle three times: nothing was seen across it

@@ -285,6 +285,7 @@ def score(
     with shown("running it from the same starts"):
         found = replayed(judged, learnt, demonstrations, recipe, held, recordings[0].units)
     verdict = uc.evaluation.verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0))
+    verdict = uc.evaluation.verdicts.of_unit(verdict, _times(learnt, states))
     if as_json:
         told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known}
         click.echo(json.dumps({**told, "replayed": found.medians, "verdict": verdict.to_json()}, indent=2))
@@ -480,6 +481,20 @@ def _support(policy: uc.Policy, states: Any) -> Any:
         return policy.support(states)
     form = policy.closed_form()
     return (np.abs(form.embedding(np.array(states)) - form.origin) <= 2 * form.reach).all(axis=1) * 1.0
+
+
+def _times(policy: uc.Policy, states: Any) -> float:
+    """How many times as large states (N, n) are as what a policy learnt from, in the middle; 1 where not known."""
+    import numpy as np
+
+    try:
+        form = policy.closed_form()
+    except SettingError:
+        return 1.0
+    own = form.embedding(np.array(states))
+    extents = np.log(np.ptp(own, axis=0) / (2 * form.reach) + 1e-300)
+    sizes = np.log(np.abs(own).max(axis=0) / (np.abs(form.origin) + form.reach) + 1e-300)
+    return float(np.exp(np.median(np.where(np.abs(sizes) < np.abs(extents), sizes, extents))))
 
 
 def _as_far_as_it_goes(policy: uc.Policy, start: list[float], **how: Any) -> tuple[Any, str, DivergedError | None]:

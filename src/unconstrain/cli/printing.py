@@ -178,7 +178,7 @@ def judge_fit(policy: uc.Policy, stream: uc.Stream, told: float | None, schedule
     count, samples, missed = _walked(policy, stream)
     demos, open_ = stream.beginning(), told is not None and told < uc.evaluation.verdicts.MOSTLY
     there = _least_known(policy, demos, stream.recipe) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
-    found = uc.evaluation.verdicts.of_explained(held_out, count, told, there=there)
+    found = uc.evaluation.verdicts.of_explained(held_out, count, told, there, 1.0 - missed)
     ran = replayed(found, policy, demos, stream.recipe, None, stream.first.units, free=False)
     verdict = uc.evaluation.diagnosis.about_recordings(ran.verdict, demos, stream.recipe.states or ())
     return Judged(verdict, ran.medians, ran.in_words, count, samples, 1.0 - missed, held_out)

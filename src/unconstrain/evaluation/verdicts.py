@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
+from ..base.display import mixed_up
 from ..models import SUPPORTED
 
 if TYPE_CHECKING:
@@ -43,9 +44,6 @@ FAR_OFF = 1.5
 
 FORBIDDEN = 0.05
 """Share of recorded motion that a constraint given would not allow, from which on it is likely another."""
-
-OTHER_UNIT = 30.0
-"""Median size over that demonstrated, or the inverse, from which on units are likely to differ."""
 
 NEARBY = 0.6
 """Support of nearly all recorded states: they are within one width of a kernel, exp(−½). Below, none came by."""
@@ -106,24 +104,30 @@ def _graded(share: float, good: float = GOOD, fair: float = FAIR, told: float | 
     return (Mark.DOUBTFUL, "fair") if share >= fair else (Mark.BAD, "poor")
 
 
+def _explains(share: float, what: str = "held-out motion") -> str:
+    return f"explains {share:.0%} of {what}" if share >= -1 else f"misses {what} by more than that motion itself"
+
+
 def of_untold(share: float) -> str:
     """Say at which share of the recorded states the policy is not determined."""
     return f"at {max(share, 0.0):.0%} of the recorded states no recording tells the policy in some direction"
 
 
-def of_explained(share: float, demonstrations: int, determined: float | None = None, there: str = "") -> Verdict:
+def of_explained(
+    share: float, demonstrations: int, determined: float | None = None, there: str = "", learnt: float = 0.0
+) -> Verdict:
     """Judge how much of held-out motion a policy explains, along the motion.
 
     ``share`` is 1 − the share left unexplained, NaN where nothing could be held out; fewer than three demonstrations
     give no verdict. ``determined`` is the share of the recorded states at which recordings tell the policy, and
-    ``there`` what to record where fewer show it.
+    ``there`` what to record where fewer show it. ``learnt`` is the share of what was learnt from.
     """
     across = "What constraints hid: no recording shows it, so no score does."
     if determined is not None and determined < MOSTLY and demonstrations >= ENOUGH:
         across = f"Across the motion: {of_untold(1 - determined)}"
         across += "." if there else "; 'unconstrain diagnose' says where."
     if demonstrations < ENOUGH or not np.isfinite(share):
-        seen = f"the policy explains {share:.0%} of held-out motion, but " if np.isfinite(share) else ""
+        seen = f"the policy {_explains(share)}, but " if np.isfinite(share) else ""
         few = f"{seen}no verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
         return Verdict(Mark.DOUBTFUL, few[0].upper() + few[1:], doubt=across, next=MORE)
     mark, word = _graded(share, told=determined)
@@ -134,8 +138,11 @@ def of_explained(share: float, demonstrations: int, determined: float | None = N
         "poor": "Look at the recordings ('unconstrain inspect'): columns, clocks or units may be wrong, or they have "
         "too little in common.",
     }.get(word, "Score it on recordings that were held in other ways.")
+    if mark is Mark.BAD and learnt >= GOOD:
+        advice = f"It explains {learnt:.0%} of what it learnt from: demonstrations that are held out go where no other "
+        advice += "does, or it is too flexible. Demonstrate between them, or try another --model."
     trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
-    said = f"The policy explains {share:.0%} of held-out motion: {word}."
+    said = f"The policy {_explains(share)}: {word}."
     return Verdict(mark, said, trust, across, f"{advice} {there}".rstrip())
 
 
@@ -149,12 +156,16 @@ def of_score(
     """
     mark, word = _graded(share, told=told) if under is None else _graded(min(share, under))
     few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
-    known = "" if under is None else f", and {under:.0%} under the constraint given (1 − nCPE)"
+    known = (
+        ""
+        if under is None
+        else f", and {f'{under:.0%}' if under >= -1 else 'nothing'} under the constraint given (1 − nCPE)"
+    )
     counted = (
         "Movement under other constraints. Noise, and motion faster or slower than learnt, count as missed in nCPE."
     )
     if learnt:
-        said = f"The policy explains {share:.0%} of the motion{known}, but it learnt from {learnt} of "
+        said = f"The policy {_explains(share, 'the motion')}{known}, but it learnt from {learnt} of "
         said += f"{_count(demonstrations)}: a score on what was learnt from is too good."
         return Verdict(Mark.DOUBTFUL, said, next="Hold some out of the fit (--leave-out, --episodes), and score these.")
     unknown = ", if none of it was learnt from" if learnt is None else ""
@@ -163,13 +174,24 @@ def of_score(
         across = f"Across the motion: {of_untold(1 - told)}. --plane or --constraint tells more."
     return Verdict(
         mark,
-        f"The policy explains {share:.0%} of held-out motion{known}{unknown}: {word}.",
+        f"The policy {_explains(share)}{known}{unknown}: {word}.",
         "" if mark is Mark.BAD else "Movement like this, along the directions that were recorded.",
         across if under is None else counted,
         f"Score it under other constraints.{few}"
         if mark is Mark.GOOD
         else "'unconstrain diagnose' says what to record.",
     )
+
+
+def of_unit(found: Verdict, times: float) -> Verdict:
+    """Say first of recordings so many times as large as what a policy learnt from that units differ, if it is likely."""
+    if not (units := mixed_up(times)):
+        return found
+    said = (
+        f"Recordings are {'larger' if times > 1 else 'smaller'} than what the policy learnt from, as in another unit "
+    )
+    said += f"({units}). {found.said}"
+    return Verdict(Mark.BAD, said, doubt=found.doubt, next="Convert them to the unit of the policy.")
 
 
 def of_forbidden(found: Verdict, share: float) -> Verdict:
@@ -306,10 +328,7 @@ def of_replays(found: Verdict, extents: Array, paces: Array, apart: str, lasts: 
         return found._replace(said=f"{found.said} R{ran}.")
     counted = ", ".join(f"{name} of {count} of {len(extents)}" for name, count in strays.items())
     which = f"; more than {OTHERWISE - 1:.0%} off: {counted}" if len(extents) > 1 else ""
-    judged = _strays(found, f"r{ran}{which}", " and ".join(strays))
-    if np.median(off.get("size", 0.0)) > np.log(OTHER_UNIT):
-        return judged._replace(next="Compare units: recordings look as if in another one than the policy's.")
-    return judged
+    return _strays(found, f"r{ran}{which}", " and ".join(strays))
 
 
 def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> str:
