@@ -468,6 +468,17 @@ def test_a_value_that_is_none_is_answered_with_what_was_meant(folder, tmp_path, 
     assert refused("fit", folder, option, value, "-o", tmp_path / "p.npz").endswith(meant)
 
 
+def test_what_comes_next_has_columns_that_are_there_and_leaves_out_what_is_in_another_unit(tmp_path):
+    for k in range(4):
+        write(tmp_path / f"w{k}.csv", "t,x,y", stroke(k + 1) * np.array([1, *[1e4 if k == 3 else 1.0] * 2]))
+    for typed, then in (
+        (("--state", "x,yy", "--action", "vx"), "--state x,y --differentiate"),
+        (("--state", "x,y", "--leave-out", "w0"), "--state x,y --leave-out w0,w3"),
+        (("--state", "x,y", "--leave-out", "w3"), "--state x,y --leave-out w3"),
+    ):
+        assert f"unconstrain fit {tmp_path} {then} -o policy.npz\n" in run("inspect", tmp_path, *typed)
+
+
 def test_a_guess_at_the_states_is_a_command_that_runs(tmp_path):
     axes = [f"{side} {axis} [mm]" for side in ("linker 'Arm'", "rechts") for axis in "xyz"]
     for k in range(4):

@@ -50,12 +50,6 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
-def mixed_up(times: float) -> str:
-    """Two units that are likely to be mixed up where sizes are about so many times others; empty where none are."""
-    pairs, ratio = {"metres and millimetres": 1000, "degrees and radians": 57.3}, max(times, 1 / max(times, 1e-300))
-    return next((f"{pair}: about {one} times" for pair, one in pairs.items() if 1 / 3 < ratio / one < 3), "")
-
-
 def shortened(name: str, most: int = 40) -> str:
     """A name in quotes, its middle left out where it is long."""
     return repr(name if len(name) <= most else f"{name[: most // 2]}…{name[-most // 2 + 1 :]}")

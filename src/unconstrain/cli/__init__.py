@@ -119,7 +119,9 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
         surveys = uc.preparation.survey_set(recordings(), recipe)
     if not first:
         raise ReadError(NOTHING_LEFT)
-    names = uc.readers.unique_names(found.name for found in surveys)
+    own = [found.name for found in surveys]
+    out = [one.name for one in surveys if own.count(one.name) == 1 and "leave_out=" in str(one.warnings)]
+    names = uc.readers.unique_names(own)
     surveys = [replace(found, name=name) for found, name in zip(surveys, names, strict=True)]
     keep_codes(remark.code for found in surveys for remark in found.warnings)
     if as_json:
@@ -133,21 +135,31 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
         ]
         click.echo(json.dumps(plain, indent=2))
     else:
-        used, needed, more = "", "", tuple[str, ...]()
+        used, needed = "", ""
         try:
             used = f"fit uses {said_recipe(uc.preparation.decide(recipe, first[0])[0], first[0])}.\n"
         except UnconstrainError as error:
-            needed, more = as_typed(str(error)), _guessed(recipe, first[0])
-        apart = next_command("inspect", "--group", without=["group"])
-        say_surveys(surveys, needed, next_command("fit", *more, "-o", "policy.npz"), apart)
+            needed = as_typed(str(error))
+        left_out = [*reading["leave_out"], *out] if 0 < len(out) < len(own) else []
+        say_surveys(surveys, needed, _to_fit(recipe, first[0], bool(needed), left_out))
         click.echo(used, nl=False)
     refuse_warnings(reading["strict"])
 
 
-def _guessed(recipe: uc.Recipe, first: uc.Recording) -> tuple[str, ...]:
-    """Options that may be what ``fit`` has to be told."""
-    states = () if recipe.states else ("--state", ",".join(likely_states(first.columns)))
-    return states if recipe.actions or recipe.differentiate else (*states, "--differentiate")
+def _to_fit(recipe: uc.Recipe, first: uc.Recording, guess: bool, left_out: Sequence[str]) -> str:
+    """The command that comes next; with what may be meant, where columns are not named or not there."""
+    states, actions = (not guess or _are_there(names, first) for names in (recipe.states, recipe.actions))
+    more = [] if states else ["--state", ",".join(likely_states(first.columns))]
+    more += [] if actions or recipe.differentiate else ["--differentiate"]
+    more += ["--leave-out", ",".join(left_out)] if left_out else []
+    wrong = [name for name, right in (("state", states), ("action", actions), ("leave_out", not left_out)) if not right]
+    return next_command("fit", *more, "-o", "policy.npz", without=wrong)
+
+
+def _are_there(names: Sequence[str] | None, recording: uc.Recording) -> bool:
+    with suppress(UnconstrainError):
+        return names is not None and recording.select(recording.resolve(names)) is not None
+    return False
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain fit wipe_*.csv --state x,y,z --differentiate -o wipe.npz")

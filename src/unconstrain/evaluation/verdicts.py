@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
-from ..base.display import mixed_up
 from ..models import SUPPORTED
 
 if TYPE_CHECKING:
@@ -44,6 +43,9 @@ FAR_OFF = 1.5
 
 FORBIDDEN = 0.05
 """Share of recorded motion that a constraint given would not allow, from which on it is likely another."""
+
+UNITS = {"metres and millimetres": 1000.0, "degrees and radians": 57.3}
+"""Units that are mixed up, and how many of one are the other."""
 
 NEARBY = 0.6
 """Support of nearly all recorded states: they are within one width of a kernel, exp(−½). Below, none came by."""
@@ -184,13 +186,12 @@ def of_score(
 
 
 def of_unit(found: Verdict, times: float) -> Verdict:
-    """Say first of recordings so many times as large as what a policy learnt from that units differ, if it is likely."""
-    if not (units := mixed_up(times)):
+    """Say first that units differ, where recordings are as many times as large as what a policy learnt from."""
+    ratio, size = max(times, 1 / max(times, 1e-300)), "larger" if times > 1 else "smaller"
+    units = [f"{pair}: about {one:g} times" for pair, one in UNITS.items() if 1 / 3 < ratio / one < 3]
+    if not units:
         return found
-    said = (
-        f"Recordings are {'larger' if times > 1 else 'smaller'} than what the policy learnt from, as in another unit "
-    )
-    said += f"({units}). {found.said}"
+    said = f"Recordings are {size} than what the policy learnt from, as in another unit ({units[0]}). {found.said}"
     return Verdict(Mark.BAD, said, doubt=found.doubt, next="Convert them to the unit of the policy.")
 
 

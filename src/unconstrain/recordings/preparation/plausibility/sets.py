@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ....base.arrays import Array
-from ....base.display import mixed_up
 from ...remarks import Remark
 from ...signals.stillness import is_noise, noise_share
 from .directions import turned_round
@@ -97,7 +96,7 @@ def doubts(demonstrations: int, missed: float) -> tuple[Remark, ...]:
 def _explains_nothing(missed: float) -> tuple[Remark, ...]:
     """The remark on a policy that misses most of the motion that it learnt from, as a share; none where it does not."""
     message = (
-        f"misses {f'{missed:.0%}' if missed < 2 else 'more than all'} of the motion that it learnt from; the actions may be no function of the state, "
+        f"misses {min(missed, 1):.0%} of the motion that it learnt from; the actions may be no function of the state, "
         "as where a movement goes out and back or stands still. Look at the warnings of a survey, and at states=."
     )
     return (Remark("explains-nothing", message),) if missed > MOST_MISSED else ()
@@ -146,8 +145,8 @@ def unit_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
         if np.median(np.abs(logs)) > np.log(OTHER_UNIT) and np.abs(logs).min() > np.log(LEAST) and _one_sign(logs):
             factor = float(np.exp(np.abs(logs).mean()))
             message = (
-                f"is {factor:.3g} times {'larger' if logs[0] > 0 else 'smaller'} than the others, as in another unit"
-                f"{f' ({units})' if (units := mixed_up(factor)) else ''}; convert it, or leave it out with leave_out=."
+                f"is {factor:.3g} times {'larger' if logs[0] > 0 else 'smaller'} than the others, as in another unit; "
+                "convert it, or leave it out with leave_out=."
             )
             found.append((place, Remark("unit-differs", message, outlines[place].names[0])))
     return found
