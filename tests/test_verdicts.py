@@ -57,7 +57,7 @@ class TestMarks:
 
     def test_how_many_directions_were_held_is_a_bound_where_demonstrations_disagree(self):
         def held(rank):
-            choice = SimpleNamespace(held_out=0.01, actions=4, doubts=(), lacking=(), several=True)
+            choice = SimpleNamespace(held_out=0.01, actions=4, doubts=(), lacking=(), several=True, one_way=False)
             return SimpleNamespace(rank_=rank, choice_=choice)
 
         sure, unsure = verdicts.of_constraint(held(1), held(1)), verdicts.of_constraint(held(3), held(1), held(2))
@@ -66,6 +66,15 @@ class TestMarks:
             "At most 1 of 4 directions were held, others in each of 3 demonstrations (in some up"
         )
         assert (sure.mark, unsure.mark) == (Mark.GOOD, Mark.DOUBTFUL)
+        alone = held(1)
+        assert verdicts.of_constraint(alone, shown=False).mark is Mark.DOUBTFUL
+        alone.choice_.several, alone.choice_.one_way = False, True
+        alike, known = verdicts.of_constraint(alone), verdicts.of_constraint(alone, shown=True)
+        assert (alike.mark, alike.said[:40]) == (Mark.DOUBTFUL, "Whether anything was held cannot be told")
+        assert known.said.startswith("1 of 4 directions were held")
+        assert (
+            "from several" in known.next and "from several" not in verdicts.of_constraint(alone, alone, shown=True).next
+        )
 
     def test_a_command_that_comes_next_can_be_copied(self):
         command = f"unconstrain fit {'a  b ' * 30}-o policy.npz"

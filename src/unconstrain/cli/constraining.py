@@ -15,7 +15,7 @@ import unconstrain as uc
 from ..base.display import bare, listed
 from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
-from .informing import HELD_BY, OF, WHERE, provenance
+from .informing import HELD_BY, OF, SHOWN, WHERE, provenance
 from .printing import of_option, option_for_json, print_table, refuse_warnings, say_verdict, say_written
 from .progress import shown
 from .reading import loaded, numbers, options_for_reading, prepared, said_recipe
@@ -117,7 +117,8 @@ def _of(name: str, named: Named | None, demonstrations: Sequence[uc.Demonstratio
 
 def _judged(learnt: Mapping[str, uc.LearntConstraint], named: Named | None) -> uc.evaluation.verdicts.Verdict:
     """What was learnt, and what it is by name where that holds more."""
-    found, rank = uc.evaluation.verdicts.of_constraint(*learnt.values()), max(one.rank_ for one in learnt.values())
+    shown, rank = None if named is None else named.shown, max(one.rank_ for one in learnt.values())
+    found = uc.evaluation.verdicts.of_constraint(*learnt.values(), shown=shown)
     judged = uc.evaluation.verdicts.of_mechanism
     return found if named is None else judged(found, rank, named.found.mechanism, named.sure)
 
@@ -276,11 +277,16 @@ class Named(NamedTuple):
         """Whether a movement can be held by it."""
         return bool(self.found.decided and not self.found.doubt and self.found.mechanism.rank)
 
+    @property
+    def shown(self) -> bool | None:
+        """Whether positions show what held them; None where they may show a habit."""
+        return True if self.sure else None if self.found.decided and self.found.mechanism.rank else False
+
     def notes(self, name: str) -> dict[str, Any]:
         """What goes into the file of one demonstration, or of all together: words, and numbers where it is sure."""
         mechanisms = self.found.candidates[0].mechanisms
         own = mechanisms[self.names.index(name)] if name and len(mechanisms) > 1 else mechanisms[0]
-        told = {"mechanism": dict(self.each).get(name, self.found.summary)}
+        told = {"mechanism": dict(self.each).get(name, self.found.summary), SHOWN: self.shown}
         return told | ({HELD_BY: own.numbers()} if self.sure and (name or len(mechanisms) == 1) else {})
 
     @property

@@ -22,8 +22,9 @@ TOLD = "determined share of states"
 RAN = "from the same starts"
 """Note of size and pace of the policy's own movements over those of the demonstrations."""
 
-OF, HELD_BY, WHERE = "of", "held by", "least and largest states"
-"""Notes of a constraint: demonstrations that it is of; numbers of the mechanism; where it was learnt."""
+OF, HELD_BY, SHOWN, WHERE = "of", "held by", "shown by positions", "least and largest states"
+"""Notes of a constraint: demonstrations that it is of; numbers of the mechanism; if that is sure; where it was learnt.
+"""
 
 ENDS = 2**16
 """Bytes at either end of a file by which it is known again."""
@@ -73,7 +74,11 @@ def info(file: str, as_json: bool) -> None:
     A policy, guided or not, or a constraint.
     """
     held, notes = loaded(file, uc.Policy | uc.LearntConstraint | uc.Guided), uc.storage.load_notes(file)
-    rest = {name: value for name, value in notes.items() if name not in ("recipe", "units", "digests", HELD_BY, WHERE)}
+    rest = {
+        name: value
+        for name, value in notes.items()
+        if name not in ("recipe", "units", "digests", HELD_BY, SHOWN, WHERE)
+    }
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held, notes), **rest}
     if as_json:
         click.echo(json.dumps(told | {"verdict": verdict_of(held, notes).to_json()}, indent=2))
@@ -99,8 +104,13 @@ def _columns(notes: Mapping[str, Any]) -> dict[str, Any]:
 def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
     """What was learnt, and how; a guided policy is told by the one in it."""
     if isinstance(held, uc.LearntConstraint):
-        count = verdict_of(held, notes).said.partition(" were held")[0]
-        return {"held": count, "features": held.choice_.name, "noise": held.noise_}
+        named = _mechanism(notes)
+        count = max(held.rank_, named.rank if named else 0)
+        return {
+            "held": f"{count} of {held.choice_.actions} directions",
+            "features": held.choice_.name,
+            "noise": held.noise_,
+        }
     policy = innermost(held)
     solution = getattr(policy, "solution_", None)
     if solution is None:
@@ -118,11 +128,14 @@ def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+def _mechanism(notes: Mapping[str, Any]) -> Any:
+    return notes.get(HELD_BY) and uc.constraints.mechanisms.restored(notes[HELD_BY])
+
+
 def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:
     """Judge a policy, constraint or guided policy by what it explained where held out, and what ``fit`` wrote down."""
     if isinstance(held, uc.LearntConstraint):
-        found, numbers = uc.evaluation.verdicts.of_constraint(held), notes.get(HELD_BY)
-        named = numbers and uc.constraints.mechanisms.restored(numbers)
+        found, named = uc.evaluation.verdicts.of_constraint(held, shown=notes.get(SHOWN)), _mechanism(notes)
         return uc.evaluation.verdicts.of_mechanism(found, held.rank_, named, sure=True) if named else found
     policy = innermost(held)
     if not hasattr(policy, "solution_"):

@@ -235,14 +235,23 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
     return Verdict(mark, said, trust, doubt, then)
 
 
-def of_constraint(learnt: LearntConstraint, *others: LearntConstraint) -> Verdict:
-    """Judge a learnt constraint, or one for each demonstration, by what was missed where held out."""
+def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bool | None = None) -> Verdict:
+    """Judge a learnt constraint, or one for each demonstration, by what was missed where held out.
+
+    ``shown`` is whether positions show what held them, None where that is not known.
+    """
     every = (learnt, *others)
     choice = max((one.choice_ for one in every), key=lambda each: each.held_out)
     missed, ranks = sum(one.choice_.held_out for one in every) / len(every), {one.rank_ for one in every}
     if max(ranks) == 0:
         said = "No direction was held: nothing constrained these movements, or each direction was seen."
         return Verdict(Mark.DOUBTFUL, said, next="Look whether the demonstrations were held in different ways.")
+    if all(one.choice_.one_way for one in every) and not shown:
+        said = (
+            "Whether anything was held cannot be told: at each state only one direction was seen, as of a free policy."
+        )
+        then = "Record movements that cross each other, and learn it again; or name the --features."
+        return Verdict(Mark.DOUBTFUL, said, doubt=f"That {min(ranks)} of {choice.actions} are held.", next=then)
     mark, word = _graded(1.0 - missed)
     held = f"{min(ranks)} of {choice.actions} directions were held"
     apart = f", others in each of {_count(len(every))}" if others else ""
@@ -251,11 +260,12 @@ def of_constraint(learnt: LearntConstraint, *others: LearntConstraint) -> Verdic
         apart += f" (in some up to {max(ranks)} look so, as does a direction in which nobody moved)"
     said = f"{held}{apart}; {missed:.0%} of held-out motion is along them: {word}."
     then = "Use it with 'unconstrain rollout --constraint' or 'score --constraint'."
-    if (choice.doubts or len(ranks) > 1) and mark is Mark.GOOD:
+    said += " Positions do not decide it." if shown is False else ""
+    if (choice.doubts or len(ranks) > 1 or shown is False) and mark is Mark.GOOD:
         mark = Mark.DOUBTFUL
     if choice.lacking:
         then = "Record what is missing, then learn it again."
-    elif not choice.several:
+    elif not choice.several and not others:
         then = "Learn it from several demonstrations, from other starts: what one does not do looks held."
     doubt = "; ".join(text.rstrip(".") for text in choice.doubts)
     still = "A direction in which nobody wanted to move looks held, too."
