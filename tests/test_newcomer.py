@@ -1,5 +1,6 @@
 """What somebody meets who has only the README and files of their own: each message leads on."""
 
+import html
 import json
 import re
 import shlex
@@ -579,7 +580,10 @@ def test_names_of_candidates_are_explained_where_they_stand(folder, policy, tmp_
 
 def test_regions_of_a_diagnosis_are_one_number_each(folder):
     said = " ".join(run("diagnose", folder, "-v").split())
-    told = json.loads(run("diagnose", folder, "--json"))["regions"]
+    report = ("-o", folder.parent / "d.html", "--force")
+    whole = json.loads(run("diagnose", folder, "--json", *report))
+    told = whole["regions"]
+    assert whole["verdict"]["next"].partition("'")[0] in html.unescape(report[1].read_text("utf-8"))
     alone, open_ = sum(len(one["shown_by"]) < 3 for one in told), sum(one["determined"] < 1 for one in told)
     assert f"Do not trust: {alone} of {len(told)} regions, where fewer than 3 demonstrations" in said
     where = (

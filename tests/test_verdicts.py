@@ -72,9 +72,8 @@ class TestMarks:
         alike, known = verdicts.of_constraint(alone), verdicts.of_constraint(alone, shown=True)
         assert (alike.mark, alike.said[:40]) == (Mark.DOUBTFUL, "Whether anything was held cannot be told")
         assert known.said.startswith("1 of 4 directions were held")
-        assert (
-            "from several" in known.next and "from several" not in verdicts.of_constraint(alone, alone, shown=True).next
-        )
+        both = verdicts.of_constraint(alone, alone, shown=True)
+        assert ["from several" in one.next for one in (known, both)] == [True, False]
 
     def test_a_command_that_comes_next_can_be_copied(self):
         command = f"unconstrain fit {'a  b ' * 30}-o policy.npz"
@@ -120,23 +119,19 @@ class TestSupport:
         assert (ended.trust, ended.next) == ("The first 1.00 s.", "Go on.")
         assert ended.said.startswith("It stops. No demonstration passes near for 33% of the time, first at 1.00 s")
 
-    @pytest.mark.parametrize(("most", "said"), [(0.3, "about 30% of"), (30.0, "about 30% of"), (9.0, "as much as")])
-    def test_how_far_a_movement_may_be_off_is_said_of_its_middle(self, most, said):
-        unknown = np.array([0.0, 0.3, 0.3, most]) if most != 9.0 else np.full(4, most)
-        found = verdicts.of_support(np.ones(4), np.arange(4.0), unknown)
-        assert f"there it may be off by {said} its typical action, most at" in found.said
+    def test_how_far_a_movement_may_be_off_is_said_of_its_middle(self):
+        for off, said in (([0.0, 0.3, 0.3, 30.0], "about 30% of"), ([9.0, 9.0, 9.0, 10.0], "as much as")):
+            found = verdicts.of_support(np.ones(4), np.arange(4.0), np.array(off))
+            assert f"there it may be off by {said} its typical action, most at 3.00 s." in found.said
 
-    @pytest.mark.parametrize("told", [None, 1.0])
-    def test_a_run_through_the_middle_of_a_circle_is_where_nobody_was(self, tmp_path, told):
+    def test_a_run_through_the_middle_of_a_circle_is_where_nobody_was(self, tmp_path):
         turn = np.linspace(0.0, 2 * np.pi, 200)
         states, actions = (np.column_stack([a(turn), b(turn)]) for a, b in ((np.cos, np.sin), (np.sin, np.cos)))
         policy = uc.LocallyLinearPolicy(learner="direct").fit(states, actions * [-1.0, 1.0])
-        uc.save(policy, tmp_path / "p.npz", {} if told is None else {"determined share of states": told})
+        uc.save(policy, tmp_path / "p.npz", {"determined share of states": 1.0})
         for start, sign in (("1,0", "✔ Near demonstrations for all"), ("0.1,0", "! No demonstration passes near for")):
-            ran = call(
-                "rollout", tmp_path / "p.npz", "--start", start, "--steps", 20, "-o", tmp_path / "r.csv", "--force"
-            )
-            assert ran.stdout.startswith(sign)
+            ran = call("rollout", tmp_path / "p.npz", "--start", start, "--steps", 20)
+            assert ran.stderr.startswith(sign)
 
 
 class TestInfo:
@@ -182,16 +177,13 @@ def test_fit_and_score_agree_on_a_policy_that_is_not_told_across(folder, tmp_pat
     again = (tmp_path / "again.csv").write_text((folder / "swing_0.csv").read_text() + "\n") and tmp_path / "again.csv"
     said = json.loads(call("score", folder / "p.npz", again, "--json").stdout)["verdict"]
     assert said["mark"] == "doubtful"
-    assert "held-out motion: good along it, not enough across it." in said["said"]
+    assert "held-out motion: good along the motion, but across it" in said["said"]
     assert verdicts.of_score(1.0, 5, told=0.5).mark is Mark.DOUBTFUL
     assert verdicts.of_score(1.0, 5, told=0.9).mark is Mark.GOOD
     assert verdicts.of_score(1.0, 5, 0.95, told=0.5).mark is Mark.GOOD  # under the constraint that is all there is
 
 
-@pytest.mark.parametrize(
-    ("times", "said"),
-    [(1000, "metres and mill"), (1 / 900, "metres and mill"), (60, "degrees and rad"), (1, ""), (9, "")],
-)
+@pytest.mark.parametrize(("times", "said"), [(1000, "metres"), (1 / 900, "metres"), (60, "degrees"), (1, ""), (9, "")])
 def test_recordings_in_another_unit_are_called_so(folder, tmp_path, times, said):
     table = np.loadtxt(folder / "swing_0.csv", delimiter=",", skiprows=1) * [1.0, *[times] * 4]
     np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="t,x,y,vx,vy", comments="")
@@ -211,9 +203,7 @@ def test_what_is_missed_by_more_than_all_is_said_in_words_with_a_cause():
 def test_a_fit_tells_programs_what_it_tells_people(folder):
     told = json.loads((folder / "fit.json").read_text())
     assert told["verdict"]["mark"] == "doubtful"  # one circle three times: nothing was seen across it
-    assert (
-        told["verdict"]["said"] == "The policy explains 100% of held-out motion: good along it, not enough across it."
-    )
+    assert told["verdict"]["said"].endswith("motion: good along the motion, but across it recordings tell too little.")
     assert told["held_out"] == pytest.approx(1.0, abs=1e-6)
     assert (told["demonstrations"], told["samples"]) == (3, 120)
     assert told["policy"].endswith("p.npz")

@@ -34,7 +34,7 @@ from .converting import convert, example
 from .diagnosing import diagnose
 from .exporting import export
 from .fitting import alpha_of, default_learner, learn, learner_of, options_for_model, policy_of
-from .informing import RAN, TOLD, info, learnt_from, provenance
+from .informing import MARK, RAN, TOLD, info, learnt_from, provenance
 from .looking import look, play
 from .printing import (
     Group,
@@ -238,7 +238,7 @@ def fit(
         say_fit(fitted, stream, judged, learner, verbose)
     refuse_warnings(reading["strict"])
     notes = provenance(paths, stream.recipe, stream.first, **reading)
-    uc.save(fitted, output, notes | {TOLD: told, RAN: judged.ran or None})
+    uc.save(fitted, output, notes | {TOLD: told, RAN: judged.ran or None, MARK: judged.verdict.mark.name.lower()})
     written = {"policy": output} | _reported(fitted, stream, report, Path(output).stem)
     say_written(written, judged.to_json() if as_json else None)
 

@@ -22,6 +22,9 @@ TOLD = "determined share of states"
 RAN = "from the same starts"
 """Note of size and pace of the policy's own movements over those of the demonstrations."""
 
+MARK = "verdict"
+"""Note of how ``fit`` judged it."""
+
 OF, HELD_BY, SHOWN, WHERE = "of", "held by", "shown by positions", "least and largest states"
 """Notes of a constraint: demonstrations that it is of; numbers of the mechanism; if that is sure; where it was learnt.
 """
@@ -77,7 +80,7 @@ def info(file: str, as_json: bool) -> None:
     rest = {
         name: value
         for name, value in notes.items()
-        if name not in ("recipe", "units", "digests", HELD_BY, SHOWN, WHERE)
+        if name not in ("recipe", "units", "digests", MARK, HELD_BY, SHOWN, WHERE)
     }
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held, notes), **rest}
     if as_json:
@@ -143,7 +146,10 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
         return uc.evaluation.verdicts.Verdict(mark, "Not fitted: it cannot predict.", next="unconstrain fit")
     told = len(policy.training_.split.fold_of) or uc.evaluation.diagnosis.ENOUGH
     shown = notes[TOLD] if isinstance(notes.get(TOLD), float) else None
-    return uc.evaluation.verdicts.of_explained(policy.held_out_score(), told, shown)
+    found = uc.evaluation.verdicts.of_explained(policy.held_out_score(), told, shown)
+    strays = found.mark is uc.evaluation.verdicts.Mark.GOOD and notes.get(MARK) == "doubtful"
+    ran = f" Run from the same starts: {notes[RAN]}." if isinstance(notes.get(RAN), str) else ""
+    return found._replace(said=found.said + ran, mark=uc.evaluation.verdicts.Mark.DOUBTFUL if strays else found.mark)
 
 
 def _said(value: Any) -> str:

@@ -100,7 +100,7 @@ class Verdict(NamedTuple):
 
 def _graded(share: float, good: float = GOOD, fair: float = FAIR, told: float | None = None) -> tuple[Mark, str]:
     if share >= good and told is not None and told < PARTLY:
-        return Mark.DOUBTFUL, "good along it, not enough across it"
+        return Mark.DOUBTFUL, "good along the motion, but across it recordings tell too little"
     if share >= good:
         return Mark.GOOD, "good"
     return (Mark.DOUBTFUL, "fair") if share >= fair else (Mark.BAD, "poor")
@@ -158,11 +158,8 @@ def of_score(
     """
     mark, word = _graded(share, told=told) if under is None else _graded(min(share, under))
     few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
-    known = (
-        ""
-        if under is None
-        else f", and {f'{under:.0%}' if under >= -1 else 'nothing'} under the constraint given (1 − nCPE)"
-    )
+    least = "nothing" if under is not None and under < -1 else f"{under or 0:.0%}"
+    known = "" if under is None else f", and {least} under the constraint given (1 − nCPE)"
     counted = (
         "Movement under other constraints. Noise, and motion faster or slower than learnt, count as missed in nCPE."
     )
@@ -247,9 +244,7 @@ def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bo
         said = "No direction was held: nothing constrained these movements, or each direction was seen."
         return Verdict(Mark.DOUBTFUL, said, next="Look whether the demonstrations were held in different ways.")
     if all(one.choice_.one_way for one in every) and not shown:
-        said = (
-            "Whether anything was held cannot be told: at each state only one direction was seen, as of a free policy."
-        )
+        said = "Whether anything was held cannot be told: each state was passed one way only, as by a free policy."
         then = "Record movements that cross each other, and learn it again; or name the --features."
         return Verdict(Mark.DOUBTFUL, said, doubt=f"That {min(ranks)} of {choice.actions} are held.", next=then)
     mark, word = _graded(1.0 - missed)
