@@ -678,7 +678,7 @@ def test_a_movement_far_from_the_data_is_noted(files, tmp_path):
     assert near.code == 0
     assert near.err.startswith("! Near demonstrations, but ")
     assert far.code == 0
-    assert far.err.startswith("✖ From 0.00 s on the movement is far from all data, 100% of the time:")
+    assert far.err.startswith("✖ No demonstration passes near for 100% of the time, first at 0.00 s:")
     assert len(far.out.splitlines()) == 4
 
 

@@ -321,7 +321,7 @@ def test_a_start_where_nothing_was_demonstrated_is_refused_unless_told_to_go_on(
         r"--start: nothing was demonstrated near 900, 0 \(support .*\)\. .* --least-support 0\.", refused(*start)
     )
     assert not list(tmp_path.iterdir())
-    assert run(*start, "--least-support", 0).startswith("✖ From 0.00 s on the movement is far from all data")
+    assert run(*start, "--least-support", 0).startswith("✖ No demonstration passes near for 100% of the time")
 
 
 def test_a_movement_that_ends_for_want_of_support_warns_by_a_class_of_its_own(policy):

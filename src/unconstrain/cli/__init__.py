@@ -290,9 +290,8 @@ def score(
     with shown("scoring"):
         rows = [scores(demo, demo.name, len(demo)) for demo in demonstrations]
         whole = scores(demonstrations, "all", sum(map(len, demonstrations)))
-    under = None if held is None else 1.0 - whole["ncpe"]
     known = learnt_from(learnt, notes, recordings)
-    more = under, None if known is None else len(known), notes.get(TOLD)
+    more = None if held is None else 1.0 - whole["ncpe"], None if known is None else len(known), notes.get(TOLD)
     judged = uc.evaluation.verdicts.of_score(1.0 - whole["ninc"], len(demonstrations), *more)
     with shown("running it from the same starts"):
         found = replayed(judged, learnt, demonstrations, recipe, held, recordings[0].units)

@@ -285,32 +285,27 @@ def of_support(support: Array, times: Array | None, unknown: Array | None = None
 
     ``unknown`` is how much of each action no recording tells, as a standard deviation, as a share of a typical one.
     """
-    seconds = np.arange(len(support)) if times is None else times
-    far, away = support < SUPPORTED, support < NEARBY
+    seconds = np.arange(len(support), dtype=np.float64) if times is None else times
+    away = support < NEARBY
     open_ = np.zeros_like(away) if unknown is None else (unknown > SMALL) & ~away
-    if not (away | open_).any():
+    if not (off := away | open_).any():
         return Verdict(Mark.GOOD, f"Near demonstrations for all {seconds[-1]:.2f} s: supported.")
-    first = int((away | open_).argmax())
-    trust = f"The first {seconds[first]:.2f} s." if first else ""
-    since, then = seconds[int(away.argmax())], "Start nearer, or demonstrate there."
-    if far.mean() > 0.5:
-        said = f"From {since:.2f} s on the movement is far from all data, {far.mean():.0%} of the time: extrapolated."
-        return Verdict(Mark.BAD, said, trust, "What is far from data.", then)
-    said = f"No demonstration passes near for {away.mean():.0%} of the time, first at {since:.2f} s: extrapolated."
-    doubt = "Where none passes, and what that leads to."
-    if open_.any():
-        told = f"{open_.mean():.0%} of the time, first at {seconds[int(open_.argmax())]:.2f} s, they do not tell the "
-        told += f"policy in every direction: there it may be off by {_off(unknown, open_, seconds)}."  # type: ignore[arg-type]
-        said, doubt = (f"{said} Near some, {told}", doubt) if away.any() else (f"Near demonstrations, but {told}", "")
-        doubt = f"{doubt} Directions that are not determined there.".lstrip()
-        then = f"{then if away.any() else ''} 'unconstrain diagnose' says what to record.".lstrip()
-    return Verdict(Mark.DOUBTFUL, said, trust, doubt, then)
+    trust = f"The first {seconds[int(off.argmax())]:.2f} s." if off.argmax() else ""
+    mark = Mark.BAD if (support < SUPPORTED).mean() > 0.5 else Mark.DOUBTFUL
+    none = f"No demonstration passes near for {_part(away, seconds)}: extrapolated."
+    if unknown is None or not open_.any():
+        doubt = "Where none passes, and what that leads to."
+        return Verdict(mark, none, trust, doubt, "Start nearer, or demonstrate there.")
+    middle, worst = float(np.median(unknown[open_])), seconds[int(np.where(open_, unknown, 0.0).argmax())]
+    said = f"{none} Near some" if away.any() else "Near demonstrations"
+    said += f", but {_part(open_, seconds)}, they do not tell the policy in every direction: there it may be off by "
+    said += f"{f'about {middle:.0%} of' if middle < 1 else 'as much as'} its typical action, most at {worst:.2f} s."
+    then = "'unconstrain diagnose' says what to record."
+    return Verdict(mark, said, trust, "Directions that are not determined there.", then)
 
 
-def _off(unknown: Array, where: NDArray[np.bool_], seconds: Array) -> str:
-    """How far a policy may be off where it is not told: in the middle, and when most."""
-    middle, worst = float(np.median(unknown[where])), seconds[int(np.where(where, unknown, 0.0).argmax())]
-    return f"{f'about {middle:.0%} of' if middle < 1 else 'as much as'} its typical action, most at {worst:.2f} s"
+def _part(where: NDArray[np.bool_], seconds: Array) -> str:
+    return f"{where.mean():.0%} of the time, first at {seconds[int(where.argmax())]:.2f} s"
 
 
 def of_replays(found: Verdict, extents: Array, paces: Array, apart: str, lasts: Sequence[float] = ()) -> Verdict:
@@ -372,9 +367,8 @@ def _strays(found: Verdict, how: str, what: str) -> Verdict:
 def of_early_end(found: Verdict, why: str) -> Verdict:
     """Add to a verdict on a movement that it stops, for a reason in one sentence, and what to do in another."""
     said, _, then = why.partition(". ")
-    mark = Mark.BAD if found.mark is Mark.BAD else Mark.DOUBTFUL
-    doubt = f"{found.doubt} What would have come after.".lstrip()
-    return found._replace(mark=mark, said=f"{said}. {found.said}", doubt=doubt, next=then)
+    mark, doubt = max(found.mark, Mark.DOUBTFUL, key=[*Mark].index), f"{found.doubt} What would have come after."
+    return found._replace(mark=mark, said=f"{said}. {found.said}", doubt=doubt.lstrip(), next=then)
 
 
 SAME_CAUSE = ("clock-gap", "seam", "few-demonstrations")
