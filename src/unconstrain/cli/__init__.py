@@ -491,7 +491,7 @@ def _support(policy: uc.Policy, states: Any) -> Any:
     with suppress(SettingError):
         return policy.support(states)
     form = policy.closed_form()
-    return (np.abs(form.embedding(np.array(states)) - form.origin) <= 2 * form.reach).all(axis=1) * 1.0
+    return (np.abs(form.embedding(np.array(states)) - form.origin) <= form.within).all(axis=1) * 1.0
 
 
 def _times(policy: uc.Policy, states: Any) -> float:

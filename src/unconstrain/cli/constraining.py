@@ -120,7 +120,7 @@ def _judged(learnt: Mapping[str, uc.LearntConstraint], named: Named | None) -> u
     shown, rank = None if named is None else named.shown, max(one.rank_ for one in learnt.values())
     found = uc.evaluation.verdicts.of_constraint(*learnt.values(), shown=shown)
     judged = uc.evaluation.verdicts.of_mechanism
-    return found if named is None else judged(found, rank, named.found.mechanism, named.sure)
+    return found if named is None else judged(found, rank, named.found.mechanism, bool(named.shown))
 
 
 def _report(
@@ -273,21 +273,17 @@ class Named(NamedTuple):
     """The last column."""
 
     @property
-    def sure(self) -> bool:
-        """Whether a movement can be held by it."""
-        return bool(self.found.decided and not self.found.doubt and self.found.mechanism.rank)
-
-    @property
     def shown(self) -> bool | None:
-        """Whether positions show what held them; None where they may show a habit."""
-        return True if self.sure else None if self.found.decided and self.found.mechanism.rank else False
+        """Whether positions show what held them, and a movement can be held by it; None where it may be a habit."""
+        decided = self.found.decided and self.found.mechanism.rank
+        return False if not decided else None if self.found.doubt else True
 
     def notes(self, name: str) -> dict[str, Any]:
         """What goes into the file of one demonstration, or of all together: words, and numbers where it is sure."""
         mechanisms = self.found.candidates[0].mechanisms
         own = mechanisms[self.names.index(name)] if name and len(mechanisms) > 1 else mechanisms[0]
         told = {"mechanism": dict(self.each).get(name, self.found.summary), SHOWN: self.shown}
-        return told | ({HELD_BY: own.numbers()} if self.sure and (name or len(mechanisms) == 1) else {})
+        return told | ({HELD_BY: own.numbers()} if self.shown and (name or len(mechanisms) == 1) else {})
 
     @property
     def each(self) -> list[tuple[str, str]]:
@@ -343,7 +339,7 @@ def _say(learnt: Mapping[str, uc.LearntConstraint], what: str, named: Named | No
     if named is not None:
         for sentence in named.sentences:
             click.echo(sentence)
-        click.echo(FOLLOWED if named.sure else NOT_FOLLOWED)
+        click.echo(FOLLOWED if named.shown else NOT_FOLLOWED)
     head, rows = table_of(learnt, named)
     if rows:
         print_table(head, rows)
@@ -361,8 +357,6 @@ def _say_one(learnt: uc.LearntConstraint, what: str) -> None:
     )
     rows = [[name, f"{share:.3g}"] for name, share in choice.candidates.items()]
     print_table(["features", "missed where held out"], rows)
-    for doubt in choice.doubts:
-        click.echo(f"Note: {doubt}", err=True)
 
 
 def table_of(

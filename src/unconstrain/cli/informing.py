@@ -107,13 +107,9 @@ def _columns(notes: Mapping[str, Any]) -> dict[str, Any]:
 def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
     """What was learnt, and how; a guided policy is told by the one in it."""
     if isinstance(held, uc.LearntConstraint):
-        named = _mechanism(notes)
-        count = max(held.rank_, named.rank if named else 0)
-        return {
-            "held": f"{count} of {held.choice_.actions} directions",
-            "features": held.choice_.name,
-            "noise": held.noise_,
-        }
+        count = max(held.rank_, uc.constraints.mechanisms.restored(notes[HELD_BY]).rank if notes.get(HELD_BY) else 0)
+        told = f"{count} of {held.choice_.actions} directions"
+        return {"held": told, "features": held.choice_.name, "noise": held.noise_}
     policy = innermost(held)
     solution = getattr(policy, "solution_", None)
     if solution is None:
@@ -131,14 +127,11 @@ def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _mechanism(notes: Mapping[str, Any]) -> Any:
-    return notes.get(HELD_BY) and uc.constraints.mechanisms.restored(notes[HELD_BY])
-
-
 def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:
     """Judge a policy, constraint or guided policy by what it explained where held out, and what ``fit`` wrote down."""
     if isinstance(held, uc.LearntConstraint):
-        found, named = uc.evaluation.verdicts.of_constraint(held, shown=notes.get(SHOWN)), _mechanism(notes)
+        found = uc.evaluation.verdicts.of_constraint(held, shown=notes.get(SHOWN))
+        named = notes.get(HELD_BY) and uc.constraints.mechanisms.restored(notes[HELD_BY])
         return uc.evaluation.verdicts.of_mechanism(found, held.rank_, named, sure=True) if named else found
     policy = innermost(held)
     if not hasattr(policy, "solution_"):
