@@ -395,7 +395,7 @@ def test_what_is_missed_where_held_out_is_the_verdict(tmp_path):
     given = ["fit", str(tmp_path / "*.csv"), "-o", str(tmp_path / "p.npz"), "--model", "rbf"]
     result = CliRunner().invoke(cli.main, [*given, "--learner", "inconsistency"])
     assert result.exit_code == 0
-    assert result.stdout.startswith("✖ The policy explains "), result.output
+    assert result.stdout.startswith("✖ The policy misses held-out motion by more than"), result.output
     assert "or they have too little in common" in " ".join(result.stdout.split())
 
 

@@ -120,7 +120,9 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     if not first:
         raise ReadError(NOTHING_LEFT)
     own = [found.name for found in surveys]
-    out = [one.name for one in surveys if own.count(one.name) == 1 and "leave_out=" in str(one.warnings)]
+    differ = [
+        one.name for one in surveys if own.count(one.name) == 1 and "unit-differs" in [w.code for w in one.warnings]
+    ]
     names = uc.readers.unique_names(own)
     surveys = [replace(found, name=name) for found, name in zip(surveys, names, strict=True)]
     keep_codes(remark.code for found in surveys for remark in found.warnings)
@@ -140,7 +142,7 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
             used = f"fit uses {said_recipe(uc.preparation.decide(recipe, first[0])[0], first[0])}.\n"
         except UnconstrainError as error:
             needed = as_typed(str(error))
-        left_out = [*reading["leave_out"], *out] if 0 < len(out) < len(own) else []
+        left_out = [*reading["leave_out"], *differ] if differ else []
         say_surveys(surveys, needed, _to_fit(recipe, first[0], bool(needed), left_out))
         click.echo(used, nl=False)
     refuse_warnings(reading["strict"])

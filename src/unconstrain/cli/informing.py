@@ -26,8 +26,7 @@ MARK = "verdict"
 """Note of how ``fit`` judged it."""
 
 OF, HELD_BY, SHOWN, WHERE = "of", "held by", "shown by positions", "least and largest states"
-"""Notes of a constraint: demonstrations that it is of; numbers of the mechanism; if that is sure; where it was learnt.
-"""
+"""Notes of a constraint: of which demonstrations; numbers of the mechanism; if that is sure; where it was learnt."""
 
 ENDS = 2**16
 """Bytes at either end of a file by which it is known again."""

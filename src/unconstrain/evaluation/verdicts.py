@@ -233,10 +233,7 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
 
 
 def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bool | None = None) -> Verdict:
-    """Judge a learnt constraint, or one for each demonstration, by what was missed where held out.
-
-    ``shown`` is whether positions show what held them, None where that is not known.
-    """
+    """Judge a constraint, or one for each demonstration, by what it missed, and whether positions show it, if known."""
     every = (learnt, *others)
     choice = max((one.choice_ for one in every), key=lambda each: each.held_out)
     missed, ranks = sum(one.choice_.held_out for one in every) / len(every), {one.rank_ for one in every}

@@ -21,12 +21,7 @@ MOST_MOVEMENTS = 60
 
 
 def diagnosis_page(
-    found: Diagnosis,
-    demonstrations: Sequence[Demonstration],
-    title: str,
-    states: Sequence[str],
-    actions: Sequence[str],
-    verdict: verdicts.Verdict | None = None,
+    found: Diagnosis, demonstrations: Sequence[Demonstration], title: str, states: Sequence[str], actions: Sequence[str]
 ) -> str:
     """Make the page of a diagnosis.
 
@@ -39,8 +34,6 @@ def diagnosis_page(
         Of the page.
     states, actions : sequence of str
         Names of the columns.
-    verdict : Verdict, optional
-        By default on what is found alone.
 
     Returns
     -------
@@ -55,7 +48,7 @@ def diagnosis_page(
     demos = list(demonstrations)
     return html.document(
         title,
-        verdict or verdicts.of_diagnosis(found),
+        diagnosis.about_recordings(verdicts.of_diagnosis(found), demos, states),
         html.words("diagnosis_lead"),
         html.section("What to record next", _next(found, states, actions)),
         html.section("Where three demonstrations do not tell", _map(found, demos, states, actions)),
