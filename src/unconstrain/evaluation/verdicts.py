@@ -185,8 +185,7 @@ def of_score(
 def of_unit(found: Verdict, times: float) -> Verdict:
     """Say first that units differ, where recordings are as many times as large as what a policy learnt from."""
     ratio, size = max(times, 1 / max(times, 1e-300)), "larger" if times > 1 else "smaller"
-    units = [f"{pair}: about {one:g} times" for pair, one in UNITS.items() if 1 / 3 < ratio / one < 3]
-    if not units:
+    if not (units := [f"{pair}: about {one:g} times" for pair, one in UNITS.items() if 1 / 3 < ratio / one < 3]):
         return found
     said = f"Recordings are {size} than what the policy learnt from, as in another unit ({units[0]}). {found.said}"
     return Verdict(Mark.BAD, said, doubt=found.doubt, next="Convert them to the unit of the policy.")
@@ -250,10 +249,10 @@ def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bo
     if len(ranks) > 1:
         held = f"At most {held}"
         apart += f" (in some up to {max(ranks)} look so, as does a direction in which nobody moved)"
-    said = f"{held}{apart}; {missed:.0%} of held-out motion is along them: {word}."
+    undecided = " Positions do not decide it." if shown is False else ""
+    said = f"{held}{apart}; {missed:.0%} of held-out motion is along them: {word}.{undecided}"
     then = "Use it with 'unconstrain rollout --constraint' or 'score --constraint'."
-    said += " Positions do not decide it." if shown is False else ""
-    if (choice.doubts or len(ranks) > 1 or shown is False) and mark is Mark.GOOD:
+    if (choice.doubts or len(ranks) > 1 or undecided) and mark is Mark.GOOD:
         mark = Mark.DOUBTFUL
     if choice.lacking:
         then = "Record what is missing, then learn it again."
@@ -291,14 +290,13 @@ def of_support(support: Array, times: Array | None, unknown: Array | None = None
     mark = Mark.BAD if (support < SUPPORTED).mean() > 0.5 else Mark.DOUBTFUL
     none = f"No demonstration passes near for {_part(away, seconds)}: extrapolated."
     if unknown is None or not open_.any():
-        doubt = "Where none passes, and what that leads to."
-        return Verdict(mark, none, trust, doubt, "Start nearer, or demonstrate there.")
+        return Verdict(mark, none, trust, "Where none passes, and after it.", "Start nearer, or demonstrate there.")
     middle, worst = float(np.median(unknown[open_])), seconds[int(np.where(open_, unknown, 0.0).argmax())]
     said = f"{none} Near some" if away.any() else "Near demonstrations"
     said += f", but {_part(open_, seconds)}, they do not tell the policy in every direction: there it may be off by "
     said += f"{f'about {middle:.0%} of' if middle < 1 else 'as much as'} its typical action, most at {worst:.2f} s."
-    then = "'unconstrain diagnose' says what to record."
-    return Verdict(mark, said, trust, "Directions that are not determined there.", then)
+    doubt = "Directions that are not determined there."
+    return Verdict(mark, said, trust, doubt, "'unconstrain diagnose' says what to record.")
 
 
 def _part(where: NDArray[np.bool_], seconds: Array) -> str:
