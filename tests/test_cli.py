@@ -395,7 +395,7 @@ def test_what_is_missed_where_held_out_is_the_verdict(tmp_path):
     given = ["fit", str(tmp_path / "*.csv"), "-o", str(tmp_path / "p.npz"), "--model", "rbf"]
     result = CliRunner().invoke(cli.main, [*given, "--learner", "inconsistency"])
     assert result.exit_code == 0
-    assert result.stdout.startswith("✖ The policy explains "), result.output
+    assert result.stdout.startswith("✖ The policy misses held-out motion by more than"), result.output
     assert "or they have too little in common" in " ".join(result.stdout.split())
 
 
@@ -678,7 +678,7 @@ def test_a_movement_far_from_the_data_is_noted(files, tmp_path):
     assert near.code == 0
     assert near.err.startswith("! Near demonstrations, but ")
     assert far.code == 0
-    assert far.err.startswith("✖ From 0.00 s on the movement is far from all data, 100% of the time:")
+    assert far.err.startswith("✖ No demonstration passes near for 100% of the time, first at 0.00 s:")
     assert len(far.out.splitlines()) == 4
 
 

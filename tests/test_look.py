@@ -52,7 +52,8 @@ def folder(tmp_path_factory):
     reading = ("--state", "x,y,z", "--differentiate")
     run("fit", *files, *reading, "-o", place / "policy.npz")
     run("constraint", files[0], *reading, "-o", place / "constraint.npz")
-    run("look", *files, *reading, place / "policy.npz", place / "constraint.npz", "-o", place / "look.html")
+    said = run("look", *files, *reading, place / "policy.npz", place / "constraint.npz", "-o", place / "look.html")
+    (place / "said.txt").write_text(said, "utf-8")
     return place
 
 
@@ -99,9 +100,15 @@ def test_a_gap_is_told_once_and_shown_where_it_is(absent):
     assert all(one.start is None for one in marks if not one.length)
 
 
-def test_the_first_lines_say_what_is_there_and_what_is_odd(page):
+def test_the_first_lines_say_what_is_there_and_what_is_odd(folder, page):
     assert text(page, "summary").startswith("4 demonstrations, ")
-    assert text(page, "verdict").startswith("! ")
+    said, verdict = " ".join((folder / "said.txt").read_text("utf-8").split()), text(page, "verdict")
+    assert verdict.startswith("! ")
+    assert said.startswith(verdict.removesuffix(" What looks odd is listed below."))
+    assert "constraint: of wipe_0, and drawn there alone" in said
+    near = page.execute_script("return shown.patches.map((one) => one.at)")
+    drawn = np.loadtxt(folder / "wipe_0.csv", delimiter=",", skiprows=1)[:, 1:]
+    assert np.abs(np.array(near)[:, None] - drawn).max(axis=2).min(axis=1).max() < 0.02
     notes = text(page, "notes")
     assert "clock-gap: wipe_1: 1 gap in the time stamps, the longest 0.706 s after 1.98319 s" in notes
     assert notes.count("gap: wipe_1") == 1
@@ -201,7 +208,9 @@ def test_the_start_is_dragged_and_the_scene_is_turned(page):
     assert_allclose(page.execute_script("return look.project(look.roll.start)"), np.add(ring, [40, -25]), atol=1.5)
     page.execute_script("look.roll.start = [9, 9, 9]; window.dispatchEvent(new Event('resize'));")
     page.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]));")
-    assert "Grey from 0 s on: far from all data." in text(page, "policy-says")
+    assert "No demonstration passes near for 100 % of the time, first at 0 s, where it is dashed" in text(
+        page, "policy-says"
+    )
     canvas.send_keys(Keys.ARROW_LEFT)
     assert page.execute_script("return look.view.yaw") != yaw
 

@@ -1,5 +1,6 @@
 """What somebody meets who has only the README and files of their own: each message leads on."""
 
+import html
 import json
 import re
 import shlex
@@ -309,7 +310,7 @@ def test_a_movement_where_the_policy_is_not_determined_is_not_supported(folder, 
         ran = call("rollout", tmp_path.parent / "one_line.npz", *start, "--plane", f"{plane[0]},{plane[1]}")
         assert ran.code == 0
         assert ran.out.startswith(f"{sign} Near demonstrations")
-        assert ("no recording tells the policy" in text(ran)) == (sign == "!")
+        assert ("they do not tell the policy" in text(ran)) == (sign == "!")
     one_line = tmp_path.parent / "one_line.npz"  # what all recordings together tell, as fit notes it, is no doubt
     uc.save(uc.load(one_line), one_line, uc.storage.load_notes(one_line) | {informing.TOLD: 1.0})
     assert run("rollout", one_line, *start, "--plane", f"{along[0]},{along[1]}").startswith("✔ Near demonstrations")
@@ -321,7 +322,7 @@ def test_a_start_where_nothing_was_demonstrated_is_refused_unless_told_to_go_on(
         r"--start: nothing was demonstrated near 900, 0 \(support .*\)\. .* --least-support 0\.", refused(*start)
     )
     assert not list(tmp_path.iterdir())
-    assert run(*start, "--least-support", 0).startswith("✖ From 0.00 s on the movement is far from all data")
+    assert run(*start, "--least-support", 0).startswith("✖ No demonstration passes near for 100% of the time")
 
 
 def test_a_movement_that_ends_for_want_of_support_warns_by_a_class_of_its_own(policy):
@@ -469,6 +470,17 @@ def test_a_value_that_is_none_is_answered_with_what_was_meant(folder, tmp_path, 
     assert refused("fit", folder, option, value, "-o", tmp_path / "p.npz").endswith(meant)
 
 
+def test_what_comes_next_has_columns_that_are_there_and_leaves_out_what_is_in_another_unit(tmp_path):
+    for k in range(4):
+        write(tmp_path / f"w{k}.csv", "t,x,y", stroke(k + 1) * np.array([1, *[1e4 if k == 3 else 1.0] * 2]))
+    for typed, then in (
+        (("--state", "x,yy", "--action", "vx"), "--state x,y --differentiate"),
+        (("--state", "x,y", "--leave-out", "w0"), "--state x,y --leave-out w0,w3"),
+        (("--state", "x,y", "--leave-out", "w3"), "--state x,y --leave-out w3"),
+    ):
+        assert f"unconstrain fit {tmp_path} {then} -o policy.npz\n" in run("inspect", tmp_path, *typed)
+
+
 def test_a_guess_at_the_states_is_a_command_that_runs(tmp_path):
     axes = [f"{side} {axis} [mm]" for side in ("linker 'Arm'", "rechts") for axis in "xyz"]
     for k in range(4):
@@ -569,7 +581,10 @@ def test_names_of_candidates_are_explained_where_they_stand(folder, policy, tmp_
 
 def test_regions_of_a_diagnosis_are_one_number_each(folder):
     said = " ".join(run("diagnose", folder, "-v").split())
-    told = json.loads(run("diagnose", folder, "--json"))["regions"]
+    report = ("-o", folder.parent / "d.html", "--force")
+    whole = json.loads(run("diagnose", folder, "--json", *report))
+    told = whole["regions"]
+    assert whole["verdict"]["next"].partition("'")[0] in html.unescape(report[1].read_text("utf-8"))
     alone, open_ = sum(len(one["shown_by"]) < 3 for one in told), sum(one["determined"] < 1 for one in told)
     assert f"Do not trust: {alone} of {len(told)} regions, where fewer than 3 demonstrations" in said
     where = (

@@ -57,7 +57,7 @@ class TestMarks:
 
     def test_how_many_directions_were_held_is_a_bound_where_demonstrations_disagree(self):
         def held(rank):
-            choice = SimpleNamespace(held_out=0.01, actions=4, doubts=(), lacking=(), several=True)
+            choice = SimpleNamespace(held_out=0.01, actions=4, doubts=(), lacking=(), several=True, one_way=False)
             return SimpleNamespace(rank_=rank, choice_=choice)
 
         sure, unsure = verdicts.of_constraint(held(1), held(1)), verdicts.of_constraint(held(3), held(1), held(2))
@@ -66,6 +66,14 @@ class TestMarks:
             "At most 1 of 4 directions were held, others in each of 3 demonstrations (in some up"
         )
         assert (sure.mark, unsure.mark) == (Mark.GOOD, Mark.DOUBTFUL)
+        alone = held(1)
+        assert verdicts.of_constraint(alone, shown=False).mark is Mark.DOUBTFUL
+        alone.choice_.several, alone.choice_.one_way = False, True
+        alike, known = verdicts.of_constraint(alone), verdicts.of_constraint(alone, shown=True)
+        assert (alike.mark, alike.said[:40]) == (Mark.DOUBTFUL, "Whether anything was held cannot be told")
+        assert known.said.startswith("1 of 4 directions were held")
+        both = verdicts.of_constraint(alone, alone, shown=True)
+        assert ["from several" in one.next for one in (known, both)] == [True, False]
 
     def test_a_command_that_comes_next_can_be_copied(self):
         command = f"unconstrain fit {'a  b ' * 30}-o policy.npz"
@@ -107,6 +115,23 @@ class TestSupport:
     def test_where_support_ends_is_said_in_seconds(self):
         found = verdicts.of_support(np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.5, 1.0]))
         assert (found.mark, found.trust) == (Mark.DOUBTFUL, "The first 1.00 s.")
+        ended = verdicts.of_early_end(found, "It stops. Go on.")
+        assert (ended.trust, ended.next) == ("The first 1.00 s.", "Go on.")
+        assert ended.said.startswith("It stops. No demonstration passes near for 33% of the time, first at 1.00 s")
+
+    def test_how_far_a_movement_may_be_off_is_said_of_its_middle(self):
+        for off, said in (([0.0, 0.3, 0.3, 30.0], "about 30% of"), ([9.0, 9.0, 9.0, 10.0], "as much as")):
+            found = verdicts.of_support(np.ones(4), np.arange(4.0), np.array(off))
+            assert f"there it may be off by {said} its typical action, most at 3.00 s." in found.said
+
+    def test_a_run_through_the_middle_of_a_circle_is_where_nobody_was(self, tmp_path):
+        turn = np.linspace(0.0, 2 * np.pi, 200)
+        states, actions = (np.column_stack([a(turn), b(turn)]) for a, b in ((np.cos, np.sin), (np.sin, np.cos)))
+        policy = uc.LocallyLinearPolicy(learner="direct").fit(states, actions * [-1.0, 1.0])
+        uc.save(policy, tmp_path / "p.npz", {"determined share of states": 1.0})
+        for start, sign in (("1,0", "✔ Near demonstrations for all"), ("0.1,0", "! No demonstration passes near for")):
+            ran = call("rollout", tmp_path / "p.npz", "--start", start, "--steps", 20)
+            assert ran.stderr.startswith(sign)
 
 
 class TestInfo:
@@ -152,18 +177,33 @@ def test_fit_and_score_agree_on_a_policy_that_is_not_told_across(folder, tmp_pat
     again = (tmp_path / "again.csv").write_text((folder / "swing_0.csv").read_text() + "\n") and tmp_path / "again.csv"
     said = json.loads(call("score", folder / "p.npz", again, "--json").stdout)["verdict"]
     assert said["mark"] == "doubtful"
-    assert "held-out motion: good along it, not enough across it." in said["said"]
+    assert "held-out motion: good along the motion, but across it" in said["said"]
     assert verdicts.of_score(1.0, 5, told=0.5).mark is Mark.DOUBTFUL
     assert verdicts.of_score(1.0, 5, told=0.9).mark is Mark.GOOD
     assert verdicts.of_score(1.0, 5, 0.95, told=0.5).mark is Mark.GOOD  # under the constraint that is all there is
 
 
+@pytest.mark.parametrize(("times", "said"), [(1000, "metres"), (1 / 900, "metres"), (60, "degrees"), (1, ""), (9, "")])
+def test_recordings_in_another_unit_are_called_so(folder, tmp_path, times, said):
+    table = np.loadtxt(folder / "swing_0.csv", delimiter=",", skiprows=1) * [1.0, *[times] * 4]
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="t,x,y,vx,vy", comments="")
+    found = json.loads(call("score", folder / "p.npz", tmp_path / "a.csv", "--json").stdout)["verdict"]
+    assert found["said"].startswith("Recordings are ") == bool(said)
+    assert said in found["said"]
+
+
+def test_what_is_missed_by_more_than_all_is_said_in_words_with_a_cause():
+    for found in (verdicts.of_explained(-2.4, 5), verdicts.of_score(-2.4, 5), verdicts.of_score(-9.0, 5, -9.0)):
+        assert "misses held-out motion by more than that motion itself" in found.said
+        assert "%" not in found.said
+    assert "units may be wrong" in verdicts.of_explained(-2.4, 5, learnt=0.5).next
+    assert "go where no other does" in verdicts.of_explained(-2.4, 5, learnt=0.95).next
+
+
 def test_a_fit_tells_programs_what_it_tells_people(folder):
     told = json.loads((folder / "fit.json").read_text())
     assert told["verdict"]["mark"] == "doubtful"  # one circle three times: nothing was seen across it
-    assert (
-        told["verdict"]["said"] == "The policy explains 100% of held-out motion: good along it, not enough across it."
-    )
+    assert told["verdict"]["said"].endswith("motion: good along the motion, but across it recordings tell too little.")
     assert told["held_out"] == pytest.approx(1.0, abs=1e-6)
     assert (told["demonstrations"], told["samples"]) == (3, 120)
     assert told["policy"].endswith("p.npz")

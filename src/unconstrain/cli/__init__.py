@@ -35,7 +35,7 @@ from .converting import convert, example
 from .diagnosing import diagnose
 from .exporting import export
 from .fitting import alpha_of, default_learner, guide_of, guided, learn, learner_of, options_for_model, policy_of
-from .informing import RAN, TOLD, info, learnt_from, provenance
+from .informing import MARK, RAN, TOLD, info, learnt_from, provenance
 from .looking import look, play
 from .printing import (
     Group,
@@ -119,7 +119,11 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
         surveys = uc.preparation.survey_set(recordings(), recipe)
     if not first:
         raise ReadError(NOTHING_LEFT)
-    names = uc.readers.unique_names(found.name for found in surveys)
+    own = [found.name for found in surveys]
+    differ = [
+        one.name for one in surveys if own.count(one.name) == 1 and "unit-differs" in [w.code for w in one.warnings]
+    ]
+    names = uc.readers.unique_names(own)
     surveys = [replace(found, name=name) for found, name in zip(surveys, names, strict=True)]
     keep_codes(remark.code for found in surveys for remark in found.warnings)
     if as_json:
@@ -133,21 +137,31 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
         ]
         click.echo(json.dumps(plain, indent=2))
     else:
-        used, needed, more = "", "", tuple[str, ...]()
+        used, needed = "", ""
         try:
             used = f"fit uses {said_recipe(uc.preparation.decide(recipe, first[0])[0], first[0])}.\n"
         except UnconstrainError as error:
-            needed, more = as_typed(str(error)), _guessed(recipe, first[0])
-        apart = next_command("inspect", "--group", without=["group"])
-        say_surveys(surveys, needed, next_command("fit", *more, "-o", "policy.npz"), apart)
+            needed = as_typed(str(error))
+        left_out = [*reading["leave_out"], *differ] if differ else []
+        say_surveys(surveys, needed, _to_fit(recipe, first[0], bool(needed), left_out))
         click.echo(used, nl=False)
     refuse_warnings(reading["strict"])
 
 
-def _guessed(recipe: uc.Recipe, first: uc.Recording) -> tuple[str, ...]:
-    """Options that may be what ``fit`` has to be told."""
-    states = () if recipe.states else ("--state", ",".join(likely_states(first.columns)))
-    return states if recipe.actions or recipe.differentiate else (*states, "--differentiate")
+def _to_fit(recipe: uc.Recipe, first: uc.Recording, guess: bool, left_out: Sequence[str]) -> str:
+    """The command that comes next; with what may be meant, where columns are not named or not there."""
+    states, actions = (not guess or _are_there(names, first) for names in (recipe.states, recipe.actions))
+    more = [] if states else ["--state", ",".join(likely_states(first.columns))]
+    more += [] if actions or recipe.differentiate else ["--differentiate"]
+    more += ["--leave-out", ",".join(left_out)] if left_out else []
+    wrong = [name for name, right in (("state", states), ("action", actions), ("leave_out", not left_out)) if not right]
+    return next_command("fit", *more, "-o", "policy.npz", without=wrong)
+
+
+def _are_there(names: Sequence[str] | None, recording: uc.Recording) -> bool:
+    with suppress(UnconstrainError):
+        return names is not None and recording.select(recording.resolve(names)) is not None
+    return False
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain fit wipe_*.csv --state x,y,z --differentiate -o wipe.npz")
@@ -232,7 +246,7 @@ def fit(
         say_fit(moving, stream, judged, learner, verbose)
     refuse_warnings(reading["strict"])
     notes = provenance(paths, stream.recipe, stream.first, **reading)
-    uc.save(moving, output, notes | {TOLD: told, RAN: judged.ran or None})
+    uc.save(moving, output, notes | {TOLD: told, RAN: judged.ran or None, MARK: judged.verdict.mark.name.lower()})
     written = {"policy": output} | _reported(moving, stream, report, Path(output).stem)
     say_written(written, judged.to_json() if as_json else None)
 
@@ -268,7 +282,7 @@ def score(
     """
     from ..pages.fit import replayed
 
-    moving, notes = fitted_policy(policy), uc.storage.load_notes(policy)
+    moving, notes, verdicts = fitted_policy(policy), uc.storage.load_notes(policy), uc.evaluation.verdicts
     learnt = innermost(moving)
     with shown("reading"):
         demonstrations, recipe, recordings = prepared(files, reading, notes)
@@ -285,12 +299,12 @@ def score(
     with shown("scoring"):
         rows = [scores(demo, demo.name, len(demo)) for demo in demonstrations]
         whole = scores(demonstrations, "all", sum(map(len, demonstrations)))
-    known = learnt_from(learnt, notes, recordings)
-    more = None if held is None else 1.0 - whole["ncpe"], None if known is None else len(known), notes.get(TOLD)
-    judged = uc.evaluation.verdicts.of_score(1.0 - whole["ninc"], len(demonstrations), *more)
+    known, under = learnt_from(learnt, notes, recordings), None if held is None else 1.0 - whole["ncpe"]
+    more = under, None if known is None else len(known), notes.get(TOLD)
+    judged = verdicts.of_score(1.0 - whole["ninc"], len(demonstrations), *more)
     with shown("running it from the same starts"):
         found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units)
-    verdict = uc.evaluation.verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0))
+    verdict = verdicts.of_unit(verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0)), _times(learnt, states))
     if as_json:
         told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known}
         click.echo(json.dumps({**told, "replayed": found.medians, "verdict": verdict.to_json()}, indent=2))
@@ -485,7 +499,21 @@ def _support(policy: uc.Policy, states: Any) -> Any:
     with suppress(SettingError):
         return policy.support(states)
     form = policy.closed_form()
-    return (np.abs(form.embedding(np.array(states)) - form.origin) <= 2 * form.reach).all(axis=1) * 1.0
+    return (np.abs(form.embedding(np.array(states)) - form.origin) <= form.within).all(axis=1) * 1.0
+
+
+def _times(policy: uc.Policy, states: Any) -> float:
+    """How many times as large states (N, n) are as what a policy learnt from, in the middle; 1 where not known."""
+    import numpy as np
+
+    try:
+        form = policy.closed_form()
+    except SettingError:
+        return 1.0
+    own = form.embedding(np.array(states))
+    extents = np.log(np.ptp(own, axis=0) / (2 * form.reach) + 1e-300)
+    sizes = np.log(np.abs(own).max(axis=0) / (np.abs(form.origin) + form.reach) + 1e-300)
+    return float(np.exp(np.median(np.where(np.abs(sizes) < np.abs(extents), sizes, extents))))
 
 
 def _as_far_as_it_goes(policy: uc.Policy, start: list[float], **how: Any) -> tuple[Any, str, DivergedError | None]:
@@ -509,9 +537,9 @@ def _supported(
 ) -> uc.evaluation.verdicts.Verdict:
     """How near data is along a movement, and whether it tells the policy, if not everywhere; and what ``held`` it."""
     verdicts = uc.evaluation.verdicts
-    ended = verdicts.of_early_end(why, float(path.times[-1])) if why else None
     untold = None if (told or 0.0) >= verdicts.MOSTLY else uc.evaluation.diagnosis.untold(policy, path)
-    found = ended or verdicts.of_support(_support(policy, path.states), path.times, untold)
+    found = verdicts.of_support(_support(policy, path.states), path.times, untold)
+    found = verdicts.of_early_end(found, why) if why else found
     passes = f" {held[:1].upper()}{held[1:]} passes through the start." if held else ""
     found = found._replace(said=f"{found.said}{passes}")
     if not obstacles:

@@ -15,7 +15,7 @@ import unconstrain as uc
 from ..base.display import bare, listed
 from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
-from .informing import HELD_BY, OF, WHERE, provenance
+from .informing import HELD_BY, OF, SHOWN, WHERE, provenance
 from .printing import of_option, option_for_json, print_table, refuse_warnings, say_verdict, say_written
 from .progress import shown
 from .reading import loaded, numbers, options_for_reading, prepared, said_recipe
@@ -108,14 +108,19 @@ def _of(name: str, named: Named | None, demonstrations: Sequence[uc.Demonstratio
     """What a file notes of the demonstration that it is of, of where that was, and of the mechanism."""
     states = uc.stack([one for one in demonstrations if name in ("", one.name)]).states
     where = {WHERE: [states.min(axis=0).tolist(), states.max(axis=0).tolist()]}
-    return where | ({OF: [name]} if name else {}) | ({} if named is None else named.notes(name))
+    return (
+        where
+        | {OF: [name] if name else [one.name for one in demonstrations]}
+        | ({} if named is None else named.notes(name))
+    )
 
 
 def _judged(learnt: Mapping[str, uc.LearntConstraint], named: Named | None) -> uc.evaluation.verdicts.Verdict:
     """What was learnt, and what it is by name where that holds more."""
-    found, rank = uc.evaluation.verdicts.of_constraint(*learnt.values()), max(one.rank_ for one in learnt.values())
+    shown, rank = None if named is None else named.shown, max(one.rank_ for one in learnt.values())
+    found = uc.evaluation.verdicts.of_constraint(*learnt.values(), shown=shown)
     judged = uc.evaluation.verdicts.of_mechanism
-    return found if named is None else judged(found, rank, named.found.mechanism, named.sure)
+    return found if named is None else judged(found, rank, named.found.mechanism, bool(named.shown))
 
 
 def _report(
@@ -268,16 +273,17 @@ class Named(NamedTuple):
     """The last column."""
 
     @property
-    def sure(self) -> bool:
-        """Whether a movement can be held by it."""
-        return bool(self.found.decided and not self.found.doubt and self.found.mechanism.rank)
+    def shown(self) -> bool | None:
+        """Whether positions show what held them, and a movement can be held by it; None where it may be a habit."""
+        decided = self.found.decided and self.found.mechanism.rank
+        return False if not decided else None if self.found.doubt else True
 
     def notes(self, name: str) -> dict[str, Any]:
         """What goes into the file of one demonstration, or of all together: words, and numbers where it is sure."""
         mechanisms = self.found.candidates[0].mechanisms
         own = mechanisms[self.names.index(name)] if name and len(mechanisms) > 1 else mechanisms[0]
-        told = {"mechanism": dict(self.each).get(name, self.found.summary)}
-        return told | ({HELD_BY: own.numbers()} if self.sure and (name or len(mechanisms) == 1) else {})
+        told = {"mechanism": dict(self.each).get(name, self.found.summary), SHOWN: self.shown}
+        return told | ({HELD_BY: own.numbers()} if self.shown and (name or len(mechanisms) == 1) else {})
 
     @property
     def each(self) -> list[tuple[str, str]]:
@@ -333,7 +339,7 @@ def _say(learnt: Mapping[str, uc.LearntConstraint], what: str, named: Named | No
     if named is not None:
         for sentence in named.sentences:
             click.echo(sentence)
-        click.echo(FOLLOWED if named.sure else NOT_FOLLOWED)
+        click.echo(FOLLOWED if named.shown else NOT_FOLLOWED)
     head, rows = table_of(learnt, named)
     if rows:
         print_table(head, rows)
@@ -351,8 +357,6 @@ def _say_one(learnt: uc.LearntConstraint, what: str) -> None:
     )
     rows = [[name, f"{share:.3g}"] for name, share in choice.candidates.items()]
     print_table(["features", "missed where held out"], rows)
-    for doubt in choice.doubts:
-        click.echo(f"Note: {doubt}", err=True)
 
 
 def table_of(

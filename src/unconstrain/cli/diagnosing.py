@@ -72,7 +72,8 @@ def diagnose(
     if report is not None:
         from ..pages.diagnosis import diagnosis_page
 
-        write(report, diagnosis_page(found, demonstrations, Path(report).stem, *recipe.labels(first.units)))
+        page = diagnosis_page(found, demonstrations, Path(report).stem, *recipe.labels(first.units), verdict)
+        write(report, page)
         click.echo(f"report: {report}", err=as_json)
 
 

@@ -10,7 +10,7 @@ import click
 import unconstrain as uc
 
 from ..base.errors import SettingError
-from .informing import RAN, verdict_of
+from .informing import verdict_of
 from .printing import option_for_json, say_verdict, say_written
 from .reading import fitted_policy
 from .writing import check_outputs, option_for_force
@@ -91,13 +91,12 @@ def export(
 
 
 def _judged(learnt: Any, notes: dict[str, Any], ros2: str | None) -> uc.evaluation.verdicts.Verdict:
-    """Of a policy that goes to a robot, also how it moved, and in which unit where nobody has said it."""
-    judged, ran, units = verdict_of(learnt, notes), notes.get(RAN), notes.get("units", {})
-    said = f"{judged.said} Run from the same starts: {ran}." if isinstance(ran, str) else judged.said
+    """Of a policy that goes to a robot, also in which unit where nobody has said it."""
+    judged, units = verdict_of(learnt, notes), notes.get("units", {})
     of_states = {units.get(name) for name in uc.Recipe.from_dict(notes.get("recipe", {})).states or ("",)}
     unit = "" if ros2 is None or of_states in ({"mm"}, {"m"}, {"rad"}) else _UNIT.format(ros2)
     far = "States far from all data, where its support is near 0."
-    return judged._replace(said=said, doubt=f"{far}{unit} {judged.doubt}".rstrip())
+    return judged._replace(doubt=f"{far}{unit} {judged.doubt}".rstrip())
 
 
 def _check(output: str | None, kind: str, ros2: str | None, name: str | None, single: bool) -> None:

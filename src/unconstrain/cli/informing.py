@@ -23,8 +23,11 @@ TOLD = "determined share of states"
 RAN = "from the same starts"
 """Note of size and pace of the policy's own movements over those of the demonstrations."""
 
-OF, HELD_BY, WHERE = "of", "held by", "least and largest states"
-"""Notes of a constraint: demonstrations that it is of, if not of all; numbers of the mechanism; where it was learnt."""
+MARK = "verdict"
+"""Note of how ``fit`` judged it."""
+
+OF, HELD_BY, SHOWN, WHERE = "of", "held by", "shown by positions", "least and largest states"
+"""Notes of a constraint: of which demonstrations; numbers of the mechanism; if that is sure; where it was learnt."""
 
 ENDS = 2**16
 """Bytes at either end of a file by which it is known again."""
@@ -76,7 +79,11 @@ def info(file: str, as_json: bool) -> None:
     A policy, guided or not, or a constraint.
     """
     held, notes = loaded(file, uc.Policy | uc.LearntConstraint | uc.Guided), uc.storage.load_notes(file)
-    rest = {name: value for name, value in notes.items() if name not in ("recipe", "units", "digests", HELD_BY, WHERE)}
+    rest = {
+        name: value
+        for name, value in notes.items()
+        if name not in ("recipe", "units", "digests", MARK, HELD_BY, SHOWN, WHERE)
+    }
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held, notes), **rest}
     if as_json:
         click.echo(json.dumps(told | {"verdict": verdict_of(held, notes).to_json()}, indent=2))
@@ -102,8 +109,9 @@ def _columns(notes: Mapping[str, Any]) -> dict[str, Any]:
 def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
     """What was learnt, and how; a guided policy is told by the one in it."""
     if isinstance(held, uc.LearntConstraint):
-        count = verdict_of(held, notes).said.partition(" were held")[0]
-        return {"held": count, "features": held.choice_.name, "noise": held.noise_}
+        count = max(held.rank_, uc.constraints.mechanisms.restored(notes[HELD_BY]).rank if notes.get(HELD_BY) else 0)
+        told = f"{count} of {held.choice_.actions} directions"
+        return {"held": told, "features": held.choice_.name, "noise": held.noise_}
     policy = innermost(held)
     solution = getattr(policy, "solution_", None)
     if solution is None:
@@ -124,8 +132,8 @@ def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
 def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:
     """Judge a policy, constraint or guided policy by what it explained where held out, and what ``fit`` wrote down."""
     if isinstance(held, uc.LearntConstraint):
-        found, numbers = uc.evaluation.verdicts.of_constraint(held), notes.get(HELD_BY)
-        named = numbers and uc.constraints.mechanisms.restored(numbers)
+        found = uc.evaluation.verdicts.of_constraint(held, shown=notes.get(SHOWN))
+        named = notes.get(HELD_BY) and uc.constraints.mechanisms.restored(notes[HELD_BY])
         return uc.evaluation.verdicts.of_mechanism(found, held.rank_, named, sure=True) if named else found
     policy = innermost(held)
     if not hasattr(policy, "solution_"):
@@ -133,7 +141,10 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
         return uc.evaluation.verdicts.Verdict(mark, "Not fitted: it cannot predict.", next="unconstrain fit")
     told = len(policy.training_.split.fold_of) or uc.evaluation.diagnosis.ENOUGH
     shown = notes[TOLD] if isinstance(notes.get(TOLD), float) else None
-    return uc.evaluation.verdicts.of_explained(policy.held_out_score(), told, shown)
+    found = uc.evaluation.verdicts.of_explained(policy.held_out_score(), told, shown)
+    strays = found.mark is uc.evaluation.verdicts.Mark.GOOD and notes.get(MARK) == "doubtful"
+    ran = f" Run from the same starts: {notes[RAN]}." if isinstance(notes.get(RAN), str) else ""
+    return found._replace(said=found.said + ran, mark=uc.evaluation.verdicts.Mark.DOUBTFUL if strays else found.mark)
 
 
 def _said(value: Any) -> str:

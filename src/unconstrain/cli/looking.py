@@ -89,13 +89,13 @@ def look(
 
         units = seen.recordings[0].units
         verdict = replayed(verdict, seen.policy, seen.demonstrations, seen.recipe, None, units, free=False).verdict
-    say_verdict(verdict._replace(next="" if live else then))
+    say_verdict(verdict := verdict._replace(next="" if live else then))
     for line in _about(seen):
         click.echo(line)
     samples = sum(map(len, seen.demonstrations))
     click.echo(f"{counted(len(seen.demonstrations), 'demonstration')}, {counted(samples, 'sample')}")
     if not live:
-        write(output, _page(seen, surveys))
+        write(output, _page(seen, surveys, verdict))
         click.echo(f"page: {output}")
     if scene is not None:
         _show(scene, rrd, live, robot, port)
@@ -145,7 +145,7 @@ def _seen(paths: Sequence[str | Path], reading: dict[str, Any]) -> Seen:
     )
 
 
-def _page(seen: Seen, surveys: Sequence[Any]) -> str:
+def _page(seen: Seen, surveys: Sequence[Any], verdict: uc.evaluation.verdicts.Verdict) -> str:
     from ..pages.look import look_page, marks_of
 
     found = zip(seen.recordings, surveys, seen.demonstrations, strict=True)
@@ -160,6 +160,7 @@ def _page(seen: Seen, surveys: Sequence[Any]) -> str:
         constraint=seen.constraint if seen.held else None,
         held=seen.held,
         free=_free(seen),
+        verdict=verdict,
     )
 
 
@@ -176,7 +177,8 @@ def _about(seen: Seen) -> Iterator[str]:
         yield f"policy: {open_} ('unconstrain diagnose' says where)."
     if seen.constraint is not None and len(seen.held) < count:
         of = listed(seen.notes[OF], 4)
-        yield f"constraint: of {of}, and drawn there alone; others may have been held in other ways."
+        drawn = "drawn there alone" if seen.held else "not drawn, as it is of none of these"
+        yield f"constraint: of {of}, and {drawn}; others may have been held in other ways."
     if said := said_elsewhere(seen.notes, uc.stack(seen.demonstrations).states):
         yield f"constraint: {said}"
 

@@ -92,11 +92,12 @@ def of_option(name: str) -> Iterator[None]:
         raise SettingError(f"{name}: {re.sub(r'^[a-z_]+: ', '', str(error))}") from None
 
 
-def say_surveys(surveys: Sequence[Any], needed: str, then: str, apart: str) -> None:
+def say_surveys(surveys: Sequence[Any], needed: str, then: str) -> None:
     """Print what was found in recordings: a line for each, columns, what is not as it seems, what fit has to know.
 
-    ``then`` is the command that comes next, or, before the column that does so, ``apart`` to tell demonstrations apart.
+    ``then`` is the command that comes next.
     """
+    apart = next_command("inspect", "--group", without=["group"])
     say_verdict(uc.evaluation.verdicts.of_surveys(surveys, needed, then, apart))
     rows = [
         [
@@ -180,7 +181,7 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     count, samples, missed = _walked(policy, stream)
     demos, open_ = stream.beginning(), told is not None and told < uc.evaluation.verdicts.MOSTLY
     there = _least_known(policy, demos, stream.recipe) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
-    found = uc.evaluation.verdicts.of_explained(held_out, count, told, there=there)
+    found = uc.evaluation.verdicts.of_explained(held_out, count, told, there, 1.0 - missed)
     ran = replayed(found, moving, demos, stream.recipe, None, stream.first.units, free=False)
     verdict = uc.evaluation.diagnosis.about_recordings(ran.verdict, demos, stream.recipe, moving)
     return Judged(verdict, ran.medians, ran.in_words, count, samples, 1.0 - missed, held_out)

@@ -78,17 +78,18 @@ def _bar() -> Iterator[Say]:
 
 @contextmanager
 def _lines() -> Iterator[Say]:
-    """A line after two seconds, four, eight, ..."""
+    """A line after two seconds, four, eight, ..., where it is another; the same is said again after a long time."""
     finished, begun, counted = threading.Event(), time.monotonic(), [""]
 
     def say(what: str, done: int, of: int | None) -> None:
         counted[0] = f"{what} {done:,} of {of:,}" if of else f"{what} {done:,}" if done else what
 
     def tell() -> None:
-        wait = FIRST_S
+        wait, said = FIRST_S, ""
         while not finished.wait(wait):
             spent = time.monotonic() - begun
-            click.echo(f"{counted[0]} ... ({spent:.0f} s)", err=True)
+            if counted[0] != said or wait > LONG_S:
+                click.echo(f"{(said := counted[0])} ... ({spent:.0f} s)", err=True)
             wait = spent
 
     teller = threading.Thread(target=tell, daemon=True)

@@ -107,17 +107,18 @@ class Choice:
     @property
     def lacking(self) -> bool:
         """Whether movements were not recorded that would tell what is held."""
-        return self._one_way or self.fields.next < HELD
+        return self.one_way or self.fields.next < HELD
 
     @property
-    def _one_way(self) -> bool:
+    def one_way(self) -> bool:
+        """Whether the motion is one function of the state, with or without anything that holds it."""
         return self.fields.rank == self.actions - 1 and self.explained > ONE_WAY
 
     @property
     def doubts(self) -> tuple[str, ...]:
         """What the data does not tell, in sentences."""
         said = []
-        if self._one_way:
+        if self.one_way:
             said.append(
                 "At each state only one direction was seen: a free policy that is a function of the state looks the "
                 "same. Record movements that cross each other, or name the features."

@@ -170,7 +170,7 @@ def _numbers(form: ClosedForm, name: str, policy: Callable[[Array], Array], sing
         "real": "float" if single else "double",
         "f": "f" if single else "",
         "origin": braced(form.origin),
-        "reach": braced(form.reach),
+        "reach": braced(form.within),
         "limits": braced(_limits(form)),
         "maps": braced(form.maps),
         "map": braced(form.maps[0]),
@@ -187,7 +187,7 @@ def _numbers(form: ClosedForm, name: str, policy: Callable[[Array], Array], sing
 
 def _limits(form: ClosedForm) -> Array:
     """Range of each state column in the data, (n, 2); without an end for angles and orientations."""
-    ends = np.column_stack([form.origin - form.reach, form.origin + form.reach])
+    ends = np.column_stack([form.origin - form.within, form.origin + form.within])
     if form.embedding.frame is None:
         return ends
     parts, place = [], 0

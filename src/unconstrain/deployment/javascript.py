@@ -36,7 +36,7 @@ def formula(form: ClosedForm) -> str:
     plain: dict[str, Any] = {"origin": form.origin.tolist(), "maps": form.maps.tolist()}
     more = {"exponents": form.exponents, "monomials": form.monomials, "precision": form.precisions}
     plain |= {name: values.tolist() for name, values in more.items() if values is not None}
-    plain |= {} if form.precisions is not None else {"reach": form.reach.tolist()}
+    plain |= {} if form.precisions is not None else {"reach": form.within.tolist()}
     if form.embedding.frame is not None:
         plain["frame"] = form.embedding.frame.tolist()
         plain["factors"] = [_factor(factor) for factor in form.embedding.space.factors]

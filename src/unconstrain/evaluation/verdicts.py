@@ -44,8 +44,11 @@ FAR_OFF = 1.5
 FORBIDDEN = 0.05
 """Share of recorded motion that a constraint given would not allow, from which on it is likely another."""
 
-OTHER_UNIT = 30.0
-"""Median size over that demonstrated, or the inverse, from which on units are likely to differ."""
+UNITS = {"metres and millimetres": 1000.0, "degrees and radians": 57.3}
+"""Units that are mixed up, and how many of one are the other."""
+
+NEARBY = 0.6
+"""Support of nearly all recorded states: they are within one width of a kernel, exp(−½). Below, none came by."""
 
 SMALL = 0.1
 """An undetermined spread below this share of the typical action is negligible."""
@@ -97,10 +100,14 @@ class Verdict(NamedTuple):
 
 def _graded(share: float, good: float = GOOD, fair: float = FAIR, told: float | None = None) -> tuple[Mark, str]:
     if share >= good and told is not None and told < PARTLY:
-        return Mark.DOUBTFUL, "good along it, not enough across it"
+        return Mark.DOUBTFUL, "good along the motion, but across it recordings tell too little"
     if share >= good:
         return Mark.GOOD, "good"
     return (Mark.DOUBTFUL, "fair") if share >= fair else (Mark.BAD, "poor")
+
+
+def _explains(share: float, what: str = "held-out motion") -> str:
+    return f"explains {share:.0%} of {what}" if share >= -1 else f"misses {what} by more than that motion itself"
 
 
 def of_untold(share: float) -> str:
@@ -108,19 +115,21 @@ def of_untold(share: float) -> str:
     return f"at {max(share, 0.0):.0%} of the recorded states no recording tells the policy in some direction"
 
 
-def of_explained(share: float, demonstrations: int, determined: float | None = None, there: str = "") -> Verdict:
+def of_explained(
+    share: float, demonstrations: int, determined: float | None = None, there: str = "", learnt: float = 0.0
+) -> Verdict:
     """Judge how much of held-out motion a policy explains, along the motion.
 
     ``share`` is 1 − the share left unexplained, NaN where nothing could be held out; fewer than three demonstrations
     give no verdict. ``determined`` is the share of the recorded states at which recordings tell the policy, and
-    ``there`` what to record where fewer show it.
+    ``there`` what to record where fewer show it. ``learnt`` is the share of what was learnt from.
     """
     across = "What constraints hid: no recording shows it, so no score does."
     if determined is not None and determined < MOSTLY and demonstrations >= ENOUGH:
         across = f"Across the motion: {of_untold(1 - determined)}"
         across += "." if there else "; 'unconstrain diagnose' says where."
     if demonstrations < ENOUGH or not np.isfinite(share):
-        seen = f"the policy explains {share:.0%} of held-out motion, but " if np.isfinite(share) else ""
+        seen = f"the policy {_explains(share)}, but " if np.isfinite(share) else ""
         few = f"{seen}no verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
         return Verdict(Mark.DOUBTFUL, few[0].upper() + few[1:], doubt=across, next=MORE)
     mark, word = _graded(share, told=determined)
@@ -131,8 +140,11 @@ def of_explained(share: float, demonstrations: int, determined: float | None = N
         "poor": "Look at the recordings ('unconstrain inspect'): columns, clocks or units may be wrong, or they have "
         "too little in common.",
     }.get(word, "Score it on recordings that were held in other ways.")
+    if mark is Mark.BAD and learnt >= GOOD:
+        advice = f"It explains {learnt:.0%} of what it learnt from: demonstrations that are held out go where no other "
+        advice += "does, or it is too flexible. Demonstrate between them, or try another --model."
     trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
-    said = f"The policy explains {share:.0%} of held-out motion: {word}."
+    said = f"The policy {_explains(share)}: {word}."
     return Verdict(mark, said, trust, across, f"{advice} {there}".rstrip())
 
 
@@ -146,12 +158,13 @@ def of_score(
     """
     mark, word = _graded(share, told=told) if under is None else _graded(min(share, under))
     few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
-    known = "" if under is None else f", and {under:.0%} under the constraint given (1 − nCPE)"
+    least = "nothing" if under is not None and under < -1 else f"{under or 0:.0%}"
+    known = "" if under is None else f", and {least} under the constraint given (1 − nCPE)"
     counted = (
         "Movement under other constraints. Noise, and motion faster or slower than learnt, count as missed in nCPE."
     )
     if learnt:
-        said = f"The policy explains {share:.0%} of the motion{known}, but it learnt from {learnt} of "
+        said = f"The policy {_explains(share, 'the motion')}{known}, but it learnt from {learnt} of "
         said += f"{_count(demonstrations)}: a score on what was learnt from is too good."
         return Verdict(Mark.DOUBTFUL, said, next="Hold some out of the fit (--leave-out, --episodes), and score these.")
     unknown = ", if none of it was learnt from" if learnt is None else ""
@@ -160,13 +173,22 @@ def of_score(
         across = f"Across the motion: {of_untold(1 - told)}. --plane or --constraint tells more."
     return Verdict(
         mark,
-        f"The policy explains {share:.0%} of held-out motion{known}{unknown}: {word}.",
+        f"The policy {_explains(share)}{known}{unknown}: {word}.",
         "" if mark is Mark.BAD else "Movement like this, along the directions that were recorded.",
         across if under is None else counted,
         f"Score it under other constraints.{few}"
         if mark is Mark.GOOD
         else "'unconstrain diagnose' says what to record.",
     )
+
+
+def of_unit(found: Verdict, times: float) -> Verdict:
+    """Say first that units differ, where recordings are as many times as large as what a policy learnt from."""
+    ratio, size = max(times, 1 / max(times, 1e-300)), "larger" if times > 1 else "smaller"
+    if not (units := [f"{pair}: about {one:g} times" for pair, one in UNITS.items() if 1 / 3 < ratio / one < 3]):
+        return found
+    said = f"Recordings are {size} than what the policy learnt from, as in another unit ({units[0]}). {found.said}"
+    return Verdict(Mark.BAD, said, doubt=found.doubt, next="Convert them to the unit of the policy.")
 
 
 def of_forbidden(found: Verdict, share: float) -> Verdict:
@@ -209,27 +231,32 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
     return Verdict(mark, said, trust, doubt, then)
 
 
-def of_constraint(learnt: LearntConstraint, *others: LearntConstraint) -> Verdict:
-    """Judge a learnt constraint, or one for each demonstration, by what was missed where held out."""
+def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bool | None = None) -> Verdict:
+    """Judge a constraint, or one for each demonstration, by what it missed, and whether positions show it, if known."""
     every = (learnt, *others)
     choice = max((one.choice_ for one in every), key=lambda each: each.held_out)
     missed, ranks = sum(one.choice_.held_out for one in every) / len(every), {one.rank_ for one in every}
     if max(ranks) == 0:
         said = "No direction was held: nothing constrained these movements, or each direction was seen."
         return Verdict(Mark.DOUBTFUL, said, next="Look whether the demonstrations were held in different ways.")
+    if all(one.choice_.one_way for one in every) and not shown:
+        said = "Whether anything was held cannot be told: each state was passed one way only, as by a free policy."
+        then = "Record movements that cross each other, and learn it again; or name the --features."
+        return Verdict(Mark.DOUBTFUL, said, doubt=f"That {min(ranks)} of {choice.actions} are held.", next=then)
     mark, word = _graded(1.0 - missed)
     held = f"{min(ranks)} of {choice.actions} directions were held"
     apart = f", others in each of {_count(len(every))}" if others else ""
     if len(ranks) > 1:
         held = f"At most {held}"
         apart += f" (in some up to {max(ranks)} look so, as does a direction in which nobody moved)"
-    said = f"{held}{apart}; {missed:.0%} of held-out motion is along them: {word}."
+    undecided = " Positions do not decide it." if shown is False else ""
+    said = f"{held}{apart}; {missed:.0%} of held-out motion is along them: {word}.{undecided}"
     then = "Use it with 'unconstrain rollout --constraint' or 'score --constraint'."
-    if (choice.doubts or len(ranks) > 1) and mark is Mark.GOOD:
+    if (choice.doubts or len(ranks) > 1 or undecided) and mark is Mark.GOOD:
         mark = Mark.DOUBTFUL
     if choice.lacking:
         then = "Record what is missing, then learn it again."
-    elif not choice.several:
+    elif not choice.several and not others:
         then = "Learn it from several demonstrations, from other starts: what one does not do looks held."
     doubt = "; ".join(text.rstrip(".") for text in choice.doubts)
     still = "A direction in which nobody wanted to move looks held, too."
@@ -254,27 +281,26 @@ def of_support(support: Array, times: Array | None, unknown: Array | None = None
 
     ``unknown`` is how much of each action no recording tells, as a standard deviation, as a share of a typical one.
     """
-    seconds = np.arange(len(support)) if times is None else times
-    far = support < SUPPORTED
-    open_ = np.zeros(len(far), np.bool_) if unknown is None else unknown > SMALL
-    if unknown is not None and not far.any() and open_.any():
-        return _of_open(open_, float(unknown.max()), np.asarray(seconds, np.float64))
-    if not far.any():
+    seconds = np.arange(len(support), dtype=np.float64) if times is None else times
+    away = support < NEARBY
+    open_ = np.zeros_like(away) if unknown is None else (unknown > SMALL) & ~away
+    if not (off := away | open_).any():
         return Verdict(Mark.GOOD, f"Near demonstrations for all {seconds[-1]:.2f} s: supported.")
-    since = seconds[int(far.argmax())]
-    mark = Mark.BAD if far.mean() > 0.5 else Mark.DOUBTFUL
-    said = f"From {since:.2f} s on the movement is far from all data, {far.mean():.0%} of the time: extrapolated."
-    trust = f"The first {since:.2f} s." if far.argmax() else ""
-    return Verdict(mark, said, trust, "What is far from data.", "Start nearer, or demonstrate there.")
+    trust = f"The first {seconds[int(off.argmax())]:.2f} s." if off.argmax() else ""
+    mark = Mark.BAD if (support < SUPPORTED).mean() > 0.5 else Mark.DOUBTFUL
+    none = f"No demonstration passes near for {_part(away, seconds)}: extrapolated."
+    if unknown is None or not open_.any():
+        return Verdict(mark, none, trust, "Where none passes, and after it.", "Start nearer, or demonstrate there.")
+    middle, worst = float(np.median(unknown[open_])), seconds[int(np.where(open_, unknown, 0.0).argmax())]
+    said = f"{none} Near some" if away.any() else "Near demonstrations"
+    said += f", but {_part(open_, seconds)}, they do not tell the policy in every direction: there it may be off by "
+    said += f"{f'about {middle:.0%} of' if middle < 1 else 'as much as'} its typical action, most at {worst:.2f} s."
+    doubt = "Directions that are not determined there."
+    return Verdict(mark, said, trust, doubt, "'unconstrain diagnose' says what to record.")
 
 
-def _of_open(open_: NDArray[np.bool_], most: float, seconds: Array) -> Verdict:
-    """Judge a movement that is near demonstrations, but goes where they do not tell the policy."""
-    since, then = seconds[int(open_.argmax())], "'unconstrain diagnose' says what to record."
-    said = f"Near demonstrations, but {open_.mean():.0%} of the time, first at {since:.2f} s, no recording tells the "
-    said += f"policy in a direction that it takes: undetermined, by up to {most:.0%} of its typical action."
-    trust = f"The first {since:.2f} s." if open_.argmax() else ""
-    return Verdict(Mark.DOUBTFUL, said, trust, "Directions that are not determined there.", then)
+def _part(where: NDArray[np.bool_], seconds: Array) -> str:
+    return f"{where.mean():.0%} of the time, first at {seconds[int(where.argmax())]:.2f} s"
 
 
 def of_replays(found: Verdict, extents: Array, paces: Array, apart: str, lasts: Sequence[float] = ()) -> Verdict:
@@ -298,10 +324,7 @@ def of_replays(found: Verdict, extents: Array, paces: Array, apart: str, lasts: 
         return found._replace(said=f"{found.said} R{ran}.")
     counted = ", ".join(f"{name} of {count} of {len(extents)}" for name, count in strays.items())
     which = f"; more than {OTHERWISE - 1:.0%} off: {counted}" if len(extents) > 1 else ""
-    judged = _strays(found, f"r{ran}{which}", " and ".join(strays))
-    if np.median(off.get("size", 0.0)) > np.log(OTHER_UNIT):
-        return judged._replace(next="Compare units: recordings look as if in another one than the policy's.")
-    return judged
+    return _strays(found, f"r{ran}{which}", " and ".join(strays))
 
 
 def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> str:
@@ -336,10 +359,11 @@ def _strays(found: Verdict, how: str, what: str) -> Verdict:
     )
 
 
-def of_early_end(why: str, seconds: float) -> Verdict:
-    """Judge a movement that stops after so many seconds, for a reason in one sentence, and what to do in another."""
+def of_early_end(found: Verdict, why: str) -> Verdict:
+    """Add to a verdict on a movement that it stops, for a reason in one sentence, and what to do in another."""
     said, _, then = why.partition(". ")
-    return Verdict(Mark.DOUBTFUL, f"{said}.", f"These {seconds:.2f} s.", "What would have come after.", then)
+    mark, doubt = max(found.mark, Mark.DOUBTFUL, key=[*Mark].index), f"{found.doubt} What would have come after."
+    return found._replace(mark=mark, said=f"{said}. {found.said}", doubt=doubt.lstrip(), next=then)
 
 
 SAME_CAUSE = ("clock-gap", "seam", "few-demonstrations")

@@ -107,6 +107,11 @@ class ClosedForm(Shown):
         return int(self.embedding.states(self.origin[None]).shape[1])
 
     @property
+    def within(self) -> Array:
+        """How far from the origin states are near the data: its reach, or without kernels twice that, (m,)."""
+        return self.reach * (2 if self.precisions is None else 1)
+
+    @property
     def is_affine(self) -> bool:
         """Whether the models are affine maps rather than constants."""
         return self.maps.shape[2] > 1

@@ -21,7 +21,12 @@ MOST_MOVEMENTS = 60
 
 
 def diagnosis_page(
-    found: Diagnosis, demonstrations: Sequence[Demonstration], title: str, states: Sequence[str], actions: Sequence[str]
+    found: Diagnosis,
+    demonstrations: Sequence[Demonstration],
+    title: str,
+    states: Sequence[str],
+    actions: Sequence[str],
+    verdict: verdicts.Verdict | None = None,
 ) -> str:
     """Make the page of a diagnosis.
 
@@ -34,6 +39,8 @@ def diagnosis_page(
         Of the page.
     states, actions : sequence of str
         Names of the columns.
+    verdict : Verdict, optional
+        To begin with, where more is known than the diagnosis says.
 
     Returns
     -------
@@ -48,7 +55,7 @@ def diagnosis_page(
     demos = list(demonstrations)
     return html.document(
         title,
-        verdicts.of_diagnosis(found),
+        verdict or verdicts.of_diagnosis(found),
         html.words("diagnosis_lead"),
         html.section("What to record next", _next(found, states, actions)),
         html.section("Where three demonstrations do not tell", _map(found, demos, states, actions)),

@@ -269,7 +269,7 @@ def _errors(policy: Policy, demos: list[Demonstration], held_out: list[float] | 
 
 
 def _share(missed: float) -> str:
-    return f"{1.0 - missed:.1%}" if np.isfinite(missed) else "–"
+    return "–" if not np.isfinite(missed) else f"{1.0 - missed:.1%}" if missed < 2.0 else "none"
 
 
 def _determined(policy: Policy) -> html.Markup:

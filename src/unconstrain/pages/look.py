@@ -66,6 +66,7 @@ def look_page(
     constraint: LearntConstraint | None = None,
     held: Sequence[Demonstration] | None = None,
     free: Array | None = None,
+    verdict: verdicts.Verdict | None = None,
 ) -> str:
     """Make the page, a whole HTML document that needs nothing else.
 
@@ -90,6 +91,8 @@ def look_page(
         Those that the constraint is of; by default all.
     free : ndarray, shape (N,), optional
         Probability that each of all samples was free, by a quick look; a policy that learnt from them knows better.
+    verdict : Verdict, optional
+        On all of it, which the page begins with.
     """
     demos = list(demonstrations)
     every = max(1, -(-sum(map(len, demos)) // MOST_SAMPLES))
@@ -108,6 +111,7 @@ def look_page(
         "patches": list(_patches(constraint, stack(held or thinned).states)),
         "samples": sum(map(len, demos)),
         "policy": described,
+        "verdict": "" if verdict is None else f"{verdict.mark.value} {verdict.said}",
     }
     runs = policy is not None and described is not None and not described["trouble"]
     script = policy.javascript() if policy is not None and runs else "null"

@@ -78,7 +78,7 @@ def replayed(
     known = [one for one in runs if one.held]
     if not known:
         unknown = " Its size and pace over time: not compared, as what held these recordings is not known."
-        return Replayed(found._replace(doubt=found.doubt + unknown) if runs else found, None, runs)
+        return Replayed(found._replace(doubt=(found.doubt + unknown).strip()) if runs else found, None, runs)
     extents, paces, lasts, apart = np.array([one[:4] for one in known]).T
     unit = {units.get(name, "") for name in recipe.states or ()}
     said = f"{np.median(apart):.3g} {unit.pop() if len(unit) == 1 else ''}".rstrip()

@@ -9,6 +9,7 @@
   const RAMPS = { light: ["#b98900", "#6c9430", "#1a8f70", "#1c7a92", "#31559b", "#481f70"],
     dark: ["#4a51a8", "#3b80b8", "#2fa8a0", "#5ec66f", "#b4da45", "#fde725"] };
   const NEAR_DATA = 1e-3; // support below which the policy is far from all data
+  const NEARBY = 0.6; // support below which no demonstration came by, as in the verdict of `unconstrain rollout`
   const STEPS = 1500; // of a roll-out, at most
   const BEYOND = 0.25; // how far it is followed beyond the data, as a share of the extent
   const isDark = () => window.matchMedia("(prefers-color-scheme: dark)").matches;
@@ -174,6 +175,7 @@
     } else {
       parts.push(`${several(demos.length, "demonstration")}, each in its colour; a dot is where it is at the time below.`);
     }
+    if (!flat()) parts.push("Light grey on the floor: their shadows.");
     if (shown.patches.length) parts.push("Faint pieces: what the learnt constraint leaves free.");
     legend.append(...parts.map((part) => {
       if (typeof part !== "string") return part;
@@ -400,20 +402,20 @@
     if (roll.plane && !axes.some((which) => which >= count)) drawPlane(context);
     const points = roll.track.map((state, i) =>
       project(axes.map((which) => (which < count ? state[which] : roll.times[i]))));
-    const kinds = roll.track.map((_, i) => (roll.support[i] < NEAR_DATA ? 0 : isOpen(i) ? 1 : 2));
-    for (const [kind, colour] of ["soft", "soft", "ink"].entries()) {
+    const kinds = roll.track.map((_, i) => (isAway(i) ? 0 : isOpen(i) ? 1 : 2));
+    for (const [kind, colour] of ["ink", "soft", "ink"].entries()) {
       context.strokeStyle = drawing.colour(colour);
-      context.lineWidth = [2, 2.8, 2.8][kind];
-      context.globalAlpha = [0.5, 0.8, 1][kind];
+      context.lineWidth = [1.6, 2.8, 2.8][kind];
+      context.setLineDash(kind ? [] : [3, 4]);
       context.beginPath();
       for (let i = 1; i < points.length; i++) {
         if (kinds[i] !== kind) continue;
-        context.moveTo(...points[i - 1]);
+        if (i === 1 || kinds[i - 1] !== kind) context.moveTo(...points[i - 1]);
         context.lineTo(...points[i]);
       }
       context.stroke();
     }
-    context.globalAlpha = 1;
+    context.setLineDash([]);
     context.fillStyle = drawing.colour("card");
     context.strokeStyle = drawing.colour("ink");
     context.lineWidth = 3;
@@ -450,23 +452,29 @@
     return [a, [y * a[2] - z * a[1], z * a[0] - x * a[2], x * a[1] - y * a[0]]];
   }
 
-  const isOpen = (i) => roll.untold !== null && roll.untold[i] > untold.small;
+  const isAway = (i) => roll.support[i] < NEARBY;
+  const isOpen = (i) => roll.untold !== null && roll.untold[i] > untold.small && !isAway(i);
 
   function sayPolicy() {
-    of("policy-says").textContent = `The bold line: where it goes from the ring, which can be dragged. ${howKnown()}`;
+    of("policy-says").textContent = `The black line: where it goes from the ring, which can be dragged. ${howKnown()}`;
   }
 
   /** The same as the verdict of `unconstrain rollout`. */
   function howKnown() {
-    const off = roll.support.findIndex((near) => near < NEAR_DATA), open = roll.track.findIndex((_, i) => isOpen(i));
-    if (off >= 0) return `Grey from ${number(roll.times[off])} s on: far from all data.`;
-    if (!untold) return "All of it is near the data; whether recordings tell the policy there is not known here.";
-    if (open < 0) return "All of it is near the data, and recordings tell the policy.";
     const lasts = roll.times.map(lasting), sum = (values) => values.reduce((total, one) => total + one, 0);
     const percent = (share) => `${Math.round(100 * share)} %`;
-    return `Near demonstrations, but ${percent(sum(lasts.filter((_, i) => isOpen(i))) / sum(lasts))} of the time, first at ` +
-      `${number(roll.times[open])} s, where it is grey, no recording tells the policy in a direction that it takes: ` +
-      `undetermined, by up to ${percent(Math.max(...roll.untold))} of its typical action.`;
+    const part = (is) => {
+      const first = roll.track.findIndex((_, i) => is(i)), share = sum(lasts.filter((_, i) => is(i))) / sum(lasts);
+      return first < 0 ? "" : `${percent(share)} of the time, first at ${number(roll.times[first])} s`;
+    };
+    const away = part(isAway), open = part(isOpen);
+    const said = away && `No demonstration passes near for ${away}, where it is dashed: extrapolated.`;
+    if (!untold) return said || "All of it is near the data; whether recordings tell the policy there is not known here.";
+    if (!open) return said || "All of it is near the data, and recordings tell the policy.";
+    const every = roll.untold.filter((_, i) => isOpen(i)).sort((one, other) => one - other);
+    const off = every[Math.floor(every.length / 2)];
+    return `${said ? `${said} Near some, ` : "Near demonstrations, but "}${open}, where it is grey, they do not tell the ` +
+      `policy in every direction: there it may be off by ${off < 1 ? `about ${percent(off)} of` : "as much as"} its typical action.`;
   }
 
   function begin(index) {
@@ -535,10 +543,8 @@
   function sayAll() {
     const warnings = demos.flatMap((demo) => demo.marks.map((mark) => ({ demo, mark })));
     const odd = warnings.filter(({ mark }) => mark.code !== "gap" && mark.code !== "pause");
-    of("verdict").textContent = odd.length
-      ? `! ${several(odd.length, "thing")} to look at, listed under What looks odd.`
-      : "✔ Nothing looks odd.";
-    of("verdict").className = odd.length ? "verdict warn" : "verdict";
+    of("verdict").textContent = shown.verdict + (odd.length ? " What looks odd is listed below." : "");
+    of("verdict").className = /^[!✖]/.test(shown.verdict) ? "verdict warn" : "verdict";
     const whole = number(demos.reduce((sum, demo) => sum + lengthOf(demo), 0));
     of("summary").textContent = `${several(demos.length, "demonstration")}, ${several(shown.samples, "sample")}, ` +
       `${shown.timed ? `${whole} s in all` : "without times"}; ` +

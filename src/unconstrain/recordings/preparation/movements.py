@@ -257,7 +257,7 @@ def trim(
     if not rows.size:
         raise InvalidDataError(
             f"'{demonstration.name}': nothing is left after trimming {start_s} s at the start, {end_s} s at the end"
-            f"{'' if still is None else f' and all that is slower than {still}'}. Trim less."
+            f"{'' if still is None else f' and all that is slower than {still}'}. Trim less, or compare units."
         )
     return demonstration[rows[0] : rows[-1] + 1]
 

@@ -96,7 +96,7 @@ def doubts(demonstrations: int, missed: float) -> tuple[Remark, ...]:
 def _explains_nothing(missed: float) -> tuple[Remark, ...]:
     """The remark on a policy that misses most of the motion that it learnt from, as a share; none where it does not."""
     message = (
-        f"misses {missed:.0%} of the motion that it learnt from; the actions may be no function of the state, "
+        f"misses {min(missed, 1):.0%} of the motion that it learnt from; the actions may be no function of the state, "
         "as where a movement goes out and back or stands still. Look at the warnings of a survey, and at states=."
     )
     return (Remark("explains-nothing", message),) if missed > MOST_MISSED else ()
