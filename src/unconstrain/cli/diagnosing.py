@@ -55,8 +55,7 @@ def diagnose(
     missed = 1.0 - policy.score(*uc.stack(demonstrations)[:2])
     say(uc.preparation.doubts(len(demonstrations), missed))
     refuse_warnings(reading["strict"])
-    states = recipe.states or ()
-    actions = recipe.actions or recipe.directions
+    states, actions = recipe.states or (), recipe.actions or recipe.directions
     judged = uc.evaluation.verdicts.of_diagnosis(found)
     verdict = uc.evaluation.diagnosis.about_recordings(judged, demonstrations, recipe, policy)
     if as_json:
