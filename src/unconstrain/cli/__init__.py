@@ -240,7 +240,7 @@ def fit(
         stream = stream_of(paths, speed_power, progress, **reading)
         with of_files(recordings_of(stream)):
             learn(fitted, stream, scheduler)
-            moving = guided(fitted, to, stream.beginning())
+            moving = guided(fitted, to, stream)
             judged = judge_fit(moving, stream, told := uc.evaluation.diagnosis.states_told(fitted), scheduler)
     if not as_json:
         say_fit(moving, stream, judged, learner, verbose)

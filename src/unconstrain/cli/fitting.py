@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Literal
 
@@ -112,13 +112,13 @@ def guide_of(text: str) -> str | tuple[float, ...]:
     return text if text in ("auto", "cycle") else numbers(text)
 
 
-def guided(policy: uc.Policy, to: str | tuple[float, ...] | None, shown: Sequence[uc.Demonstration]) -> Any:
+def guided(policy: uc.Policy, to: str | tuple[float, ...] | None, stream: uc.Stream) -> Any:
     """Keep a policy to a goal or a cycle; or leave it as it is."""
     if to is None:
         return policy
     with of_option("--guided"):
         goal, orbit = (None if isinstance(to, str) else to), ("shown" if to == "cycle" else None)
-        return uc.Guided(policy, goal, orbit, demonstrations=shown)
+        return uc.Guided(policy, goal, orbit, demonstrations=stream.beginning())
 
 
 def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None) -> None:
