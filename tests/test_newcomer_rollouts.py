@@ -2,6 +2,7 @@
 
 import json
 import re
+from html import unescape
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import pytest
 import unconstrain as uc
 from seen import opened
 from test_cli import call, refused, run, write
+from unconstrain.cli.informing import TOLD
 from unconstrain.evaluation.verdicts import Mark, Verdict, of_replays
 from unconstrain.pages.fit import policy_page
 from unconstrain.pages.replays import replayed
@@ -333,12 +335,19 @@ def test_a_policy_of_some_strokes_says_of_which(folder, tmp_path):
     assert "policy: learnt from 2 of these 3 demonstrations, held_3, held_4." in said
     said = run("look", files[2], tmp_path / "p.npz", "-o", tmp_path / "other.html")
     assert "policy: learnt from none of these 1 demonstration." in said
+    for told, doubted in ((0.69, True), (0.71, False)):  # as fit judges what is told across the motion
+        uc.save(uc.load(folder / "same.npz"), tmp_path / "q.npz", {TOLD: told})
+        said = " ".join(run("look", *files, tmp_path / "q.npz", "-o", tmp_path / "look.html", "--force").split())
+        assert ("But across the motion recordings tell the policy too little." in said) is doubted
 
 
 def test_a_fit_itself_says_how_its_policy_moves(folder, tmp_path):
     files = sorted(folder.glob("held_*.csv"))
     asked = ("fit", *files, "--state", "x,y,z", "--differentiate", "--learner", "hybrid", "-o", tmp_path / "p.npz")
-    found = json.loads(run(*asked, "--json"))
+    found = json.loads(run(*asked, "--json", "--report", tmp_path / "p.html"))
+    page = " ".join(unescape(re.sub(r"<[^>]*>", " ", (tmp_path / "p.html").read_text("utf-8"))).split())
+    assert "on a plane of its own" in found["verdict"]["trust"]
+    assert all(" ".join(found["verdict"][name].split()) in page for name in ("said", "trust", "doubt", "next"))
     told = re.search(r"un from the same starts: size (\S+) times", found["verdict"]["said"])
     assert float(told[1]) == pytest.approx(found["replayed"]["extent"], abs=0.006)
     assert re.fullmatch(r"size \S+ times \(\S+ to \S+\), pace .*times.* the demonstrated", found["ran"])

@@ -39,6 +39,7 @@ from .informing import MARK, RAN, TOLD, info, learnt_from, provenance
 from .looking import look, play
 from .printing import (
     Group,
+    Judged,
     judge_fit,
     keep_codes,
     of_option,
@@ -247,18 +248,21 @@ def fit(
     refuse_warnings(reading["strict"])
     notes = provenance(paths, stream.recipe, stream.first, **reading)
     uc.save(moving, output, notes | {TOLD: told, RAN: judged.ran or None, MARK: judged.verdict.mark.name.lower()})
-    written = {"policy": output} | _reported(moving, stream, report, Path(output).stem)
+    written = {"policy": output} | _reported(moving, stream, report, Path(output).stem, judged)
     say_written(written, judged.to_json() if as_json else None)
 
 
-def _reported(policy: uc.Policy | uc.Guided, stream: uc.Stream, report: str | None, title: str) -> dict[str, str]:
+def _reported(
+    policy: uc.Policy | uc.Guided, stream: uc.Stream, report: str | None, title: str, judged: Judged
+) -> dict[str, str]:
     """Write the page of a fit, if there is to be one; what and where."""
     if report is None:
         return {}
     from ..pages.fit import policy_page
 
     with shown("report: drawing"):
-        write(report, policy_page(policy, stream.beginning(), title, stream.recipe, stream.first.units))
+        demos, units = stream.beginning(), stream.first.units
+        write(report, policy_page(policy, demos, title, stream.recipe, units, judged.verdict))
     return {"report": report}
 
 

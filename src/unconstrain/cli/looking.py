@@ -89,6 +89,7 @@ def look(
 
         units = seen.recordings[0].units
         verdict = replayed(verdict, seen.policy, seen.demonstrations, seen.recipe, None, units, free=False).verdict
+        verdict = uc.evaluation.verdicts.of_told(verdict, seen.notes.get(TOLD))
     say_verdict(verdict := verdict._replace(next="" if live else then))
     for line in _about(seen):
         click.echo(line)

@@ -182,6 +182,14 @@ def of_score(
     )
 
 
+def of_told(found: Verdict, told: float | None) -> Verdict:
+    """Add to a verdict that recordings tell a policy at too small a share of their states, as :func:`of_explained`."""
+    if told is None or told >= PARTLY:
+        return found
+    said = f"{found.said} But across the motion recordings tell the policy too little."
+    return found._replace(mark=max(found.mark, Mark.DOUBTFUL, key=[*Mark].index), said=said)
+
+
 def of_unit(found: Verdict, times: float) -> Verdict:
     """Say first that units differ, where recordings are as many times as large as what a policy learnt from."""
     ratio, size = max(times, 1 / max(times, 1e-300)), "larger" if times > 1 else "smaller"

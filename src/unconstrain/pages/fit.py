@@ -46,6 +46,7 @@ def policy_page(
     title: str,
     recipe: Recipe | None = None,
     units: Mapping[str, str] | None = None,
+    verdict: verdicts.Verdict | None = None,
 ) -> str:
     """Make the page of a fitted policy.
 
@@ -61,6 +62,8 @@ def policy_page(
         That prepared them: it names the columns, and says whether actions are velocities; by default they are.
     units : mapping of str to str, optional
         Of columns whose unit is known.
+    verdict : Verdict, optional
+        To begin with, where more is known than the page says.
 
     Returns
     -------
@@ -94,7 +97,7 @@ def policy_page(
     parts += [html.section("Numbers", _summary(policy, demos), _determined(policy))]
     if is_dataclass(learner):
         parts.append(html.settings_table(learner))
-    return html.document(title, judged.verdict, _lead(policy, type(learner).__name__, xs, us), *parts)
+    return html.document(title, verdict or judged.verdict, _lead(policy, type(learner).__name__, xs, us), *parts)
 
 
 def _lead(policy: Policy, learner: str, states: Sequence[str], actions: Sequence[str]) -> html.Markup:
