@@ -87,8 +87,8 @@ def look(
     if seen.policy is not None:
         from ..pages.fit import replayed
 
-        units = seen.recordings[0].units
-        verdict = replayed(verdict, seen.policy, seen.demonstrations, seen.recipe, None, units, free=False).verdict
+        of = seen.policy, seen.demonstrations, seen.recipe, None, seen.recordings[0].units
+        verdict = replayed(verdict, *of, free=False).verdict
         verdict = uc.evaluation.verdicts.of_told(verdict, seen.notes.get(TOLD))
     say_verdict(verdict := verdict._replace(next="" if live else then))
     for line in _about(seen):

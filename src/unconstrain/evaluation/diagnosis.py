@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,10 +15,14 @@ from ..base.errors import InvalidDataError, MissingBeliefError
 from ..base.files import stem
 from ..learners import Solution, robust
 from ..models import Scale, choose_variance, cover
-from ..recordings import Demonstration, Recipe, readers, stack
+from ..recordings import Demonstration, stack
+from .shown import FLAT as FLAT
+from .shown import about_recordings as about_recordings
+from .shown import flat as flat
+from .shown import named as named
+from .shown import names_of, planes_of
 from .verdicts import ENOUGH as ENOUGH
 from .verdicts import SMALL as SMALL
-from .verdicts import Mark, Verdict
 
 if TYPE_CHECKING:
     from ..policies import Policy
@@ -34,16 +38,6 @@ FREE, CONSTRAINED = 0.5, 0.1
 
 MOST_NAMED = 8
 """So many samples that look wrong are named."""
-
-FLAT, ONE = 0.1, 0.03
-"""Held are directions of less spread than the first share of the longest, and all on one plane below the second."""
-
-SLOW, LONG = 0.2, 0.1
-"""Slower than the first share of a usual speed is rest, for more than the second share of the samples a long one."""
-
-BESIDE, PASSING = 0.05, 0.5
-"""Others that come nearer than the first share of the extents, faster than the second of a usual speed, move on there;
-near a goal all are slow. They end there within the first share, and elsewhere beyond twice that."""
 
 
 class Place(NamedTuple):
@@ -268,93 +262,12 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
         undecided_share=belief.undecided_share,
         regions=_regions(policy, demos, undetermined, known, typical),
         movements=_movements(demos, undetermined, known, free),
-        suspects=() if free is None else tuple(places_of(belief.suspects, zip(_names(demos), demos, strict=True))),
+        suspects=() if free is None else tuple(places_of(belief.suspects, zip(names_of(demos), demos, strict=True))),
         planes=len(planes_of(demos)),
         undetermined=undetermined,
         from_noise=from_noise,
         free=free,
     )
-
-
-def flat(states: Array, share: float = FLAT) -> tuple[Array, Array]:
-    """Directions, in rows, along which states (T, n) hardly spread, zero where they do (n, n), and most (2, n)."""
-    _, spread, axes = np.linalg.svd(states - states.mean(axis=0), full_matrices=False)
-    beyond = states.shape[1] - len(axes)
-    spread, axes = np.pad(spread, (0, beyond)), np.pad(axes, ((0, beyond), (0, 0)))
-    return axes * (spread < share * spread[0])[:, None], axes[:2]
-
-
-def planes_of(demonstrations: Sequence[Demonstration]) -> Array:
-    """Normals (K, 3) of the planes that demonstrations in space keep to: one, if it or parallel ones are all.
-
-    There are none where some keep to no plane or to a line, or where their planes differ as their places do.
-    """
-    whole, states = np.vstack([one.states for one in demonstrations]), [one.states for one in demonstrations]
-    if whole.shape[1] != 3 or demonstrations[0].actions.shape[1] != 3:
-        return whole[:0]
-    centred, each = np.vstack([one - one.mean(axis=0) for one in states]), np.array([flat(one)[0] for one in states])
-    common, together = flat(centred, ONE)[0], whole.var(axis=0).sum() < 2.0 * centred.var(axis=0).sum()
-    if common[2].any() and not common[1].any():
-        return common[2:]
-    return each[:, 2] if together and each[:, 2].any(axis=1).all() and not each[:, 1].any() else whole[:0]
-
-
-def about_recordings(
-    found: Verdict, demos: Sequence[Demonstration], recipe: Recipe, policy: Callable[[Array], Array]
-) -> Verdict:
-    """Add to a verdict which planes demonstrations keep to and, unless rest is trimmed, where a policy rests amiss."""
-    planes, states, trust, doubt = planes_of(demos), recipe.states or (), found.trust, found.doubt
-    if len(planes) == 1:
-        doubt = f"All demonstrations lie on one plane or parallel ones, of normal {named(planes[0], states)}: none "
-        doubt += f"tells what is across it; others at other tilts would. {found.doubt}"
-    elif len(planes):
-        apart = np.degrees(np.arccos(min(float(np.abs(planes @ planes.T).min()), 1.0)))
-        trust = f"{trust} Each demonstration lies on a plane of its own, up to {apart:.0f}° from the others.".strip()
-    found = found._replace(trust=trust, doubt=doubt)
-    return found if recipe.still else _about_rest(found, demos, states, policy)
-
-
-def _about_rest(
-    found: Verdict, demos: Sequence[Demonstration], states: Sequence[str], policy: Callable[[Array], Array]
-) -> Verdict:
-    """Say where a policy rests as something stopped a demonstration there, or that this cannot be told.
-
-    What the policy moves on from did no harm, and a goal, to which :data:`ENOUGH` come or all that rest, is its own.
-    """
-    speeds = [np.linalg.norm(one.actions, axis=1) for one in demos]
-    slow = float(f"{SLOW * np.quantile(np.concatenate(speeds), 0.9):.2g}")
-    rests, names = _rests(demos, speeds, slow), _names(list(demos))
-    goal = any(not by and together >= min(ENOUGH, max(len(rests), 2)) for _, by, together in rests)
-    kept = [(row, by) for row, by, _ in rests if 2.0 * np.linalg.norm(policy(demos[row].states[-1:])) < slow]
-    for row in [row for row, by in kept if by][:1]:
-        place = named(demos[row].states[-1], states)
-        said = f"The policy rests near {place}, where '{names[row]}' came to rest and others move on: likely something "
-        found = found._replace(doubt=f"{said}stopped it. {found.doubt}".rstrip())
-        if goal or any((speed >= slow).mean() < LONG for speed in speeds):
-            return found
-        return found._replace(next=f"--still {slow} leaves out rest at an end. {found.next}".rstrip())
-    if found.mark is Mark.GOOD or goal or not kept:
-        return found
-    said = f"{len(kept)} of {len(speeds)} demonstrations come to rest where no other moves on: whether something "
-    return found._replace(doubt=f"{said}stopped them cannot be told. {found.doubt}".rstrip())
-
-
-def _rests(
-    demonstrations: Sequence[Demonstration], speeds: Sequence[Array], slow: float
-) -> list[tuple[int, bool, int]]:
-    """Which end in a long rest; whether others move by there and end elsewhere, and how many rest there together."""
-    wide = np.maximum(np.ptp(np.vstack([one.states for one in demonstrations]), axis=0), 1e-300)
-    ends = np.array([one.states[-1] for one in demonstrations]) / wide
-    last = [np.flatnonzero(speed > slow).max(initial=-1) for speed in speeds]
-    rest = [row for row, at in enumerate(last) if at >= 0 and len(speeds[row]) - 1 - at > LONG * len(speeds[row])]
-    found = []
-    for row in rest:
-        far = np.linalg.norm(ends - ends[row], axis=1)
-        left = [i for i in range(len(ends)) if far[i] > 2.0 * BESIDE]
-        fast = [demonstrations[i].states[speeds[i] > PASSING / SLOW * slow] / wide for i in left]
-        by = any((np.linalg.norm(some - ends[row], axis=1) < BESIDE).any() for some in fast)
-        found.append((row, by, int((far[rest] < BESIDE).sum())))
-    return found
 
 
 def untold(policy: Policy, movement: Demonstration) -> Array | None:
@@ -388,13 +301,12 @@ def untold_at(policy: Policy, states: Array, typical: float, left: Array | None 
 
 def states_told(policy: Policy) -> float | None:
     """:attr:`Diagnosis.told_together` of a policy that has just learnt; None where not known."""
-    kept = policy.training_.kept
-    if kept is None or policy.solution_.belief is None or policy.n_outputs_ == 1:
+    kept, belief = policy.training_.kept, policy.solution_.belief
+    if kept is None or belief is None or policy.n_outputs_ == 1 or not kept.whole.actions.any():
         return None
     states, actions = map(on_host, kept.whole[:2])
     typical = float(np.sqrt((actions**2).sum(axis=1).mean()))
-    told = float((untold_at(policy.in_own_units(), states, typical) <= SMALL).mean()) if typical else None
-    return None if told is None else max(told, policy.solution_.belief.told_together)
+    return max(float((untold_at(policy.in_own_units(), states, typical) <= SMALL).mean()), belief.told_together)
 
 
 def _typical(actions: Array, solution: Solution) -> float:
@@ -427,7 +339,7 @@ def _regions(
     found.sort(key=lambda one: -undetermined[one[1]].max())
     worst = [int(rows[undetermined[rows].argmax()]) for _, rows in found]
     directions, along = _least_determined(policy, states[worst])
-    names, noise = _names(demos), policy.solution_.noise
+    names, noise = names_of(demos), policy.solution_.noise
     return tuple(
         Region(
             _numbers(centre),
@@ -470,12 +382,8 @@ def _movements(
             float(known[part].mean()),
             float(np.sqrt((undetermined[part] ** 2).mean())),
         )
-        for index, (name, part) in enumerate(zip(_names(demos), rows, strict=True))
+        for index, (name, part) in enumerate(zip(names_of(demos), rows, strict=True))
     )
-
-
-def _names(demos: list[Demonstration]) -> tuple[str, ...]:
-    return readers.unique_names([demo.name or f"demonstration {index + 1}" for index, demo in enumerate(demos)])
 
 
 def _numbers(values: Array) -> tuple[float, ...]:
@@ -604,8 +512,3 @@ def _about_freedom(found: Diagnosis) -> str:
     return f"{said}. Of {len(means)} demonstrations, {free} look free and {held} constrained" + (
         f"; of {between} that is not certain." if between else "."
     )
-
-
-def named(values: Sequence[float], names: Sequence[str]) -> str:
-    """Such as ``(x = 0.1, y = -2)``."""
-    return "(" + ", ".join(f"{name} = {value:.3g}" for name, value in zip(names, values, strict=True)) + ")"
