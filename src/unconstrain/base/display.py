@@ -16,6 +16,11 @@ Item = TypeVar("Item")
 _listener: ContextVar[Listener | None] = ContextVar("listener", default=None)
 
 
+def innermost(policy: Any) -> Any:
+    """The policy that is guided or moved, or itself."""
+    return innermost(policy.policy) if hasattr(policy, "policy") else policy
+
+
 class Shown:
     """Mixed into a class that says what it is made of in a few words; dataclasses then need ``repr=False``."""
 

@@ -10,11 +10,6 @@ from .arrays import Array, as_matrix, is_foreign
 from .errors import InvalidDataError
 
 
-def innermost(policy: Any) -> Any:
-    """The policy that is guided or moved, or itself."""
-    return innermost(policy.policy) if hasattr(policy, "policy") else policy
-
-
 def checked_states(estimator: Any, X: ArrayLike, *, reset: bool = False, convert: bool = True) -> Array:
     """States (N, n), finite, with the names and the number of columns that the estimator was fitted to.
 

@@ -16,7 +16,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import counted
+from ..base.display import counted, innermost
 from ..base.errors import (
     NOTHING_LEFT,
     DivergedError,
@@ -26,7 +26,6 @@ from ..base.errors import (
     SupportEndsWarning,
     UnconstrainError,
 )
-from ..base.estimators import innermost
 from ..base.files import write
 from ..paper import experiments
 from .certifying import certify

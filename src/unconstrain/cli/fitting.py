@@ -19,7 +19,7 @@ from .reading import numbers, recordings_of
 CENTRES = 25
 
 MODELS: dict[str, Callable[..., uc.Policy]] = {
-    "local": uc.LocallyLinearPolicy,
+    "local": lambda **chosen: uc.LocallyLinearPolicy(**chosen),
     "rbf": lambda centres=CENTRES, **chosen: uc.ParametricPolicy(uc.KMeansRBF(centres), **chosen),
     "auto": lambda **chosen: uc.ParametricPolicy("auto", **chosen),
     "affine": lambda **chosen: uc.ParametricPolicy(uc.Affine(), **chosen),

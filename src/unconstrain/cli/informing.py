@@ -13,7 +13,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.estimators import innermost
+from ..base.display import innermost
 from .printing import models_of, print_table, say_verdict
 from .reading import loaded, reading_of
 

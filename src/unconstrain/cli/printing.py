@@ -16,9 +16,8 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import bare, counted, listed
+from ..base.display import bare, counted, innermost, listed
 from ..base.errors import InvalidDataError, SettingError
-from ..base.estimators import innermost
 from .endings import REFUSED, ending
 from .reading import next_command, said_recipe
 from .speaking import as_typed, meant_of

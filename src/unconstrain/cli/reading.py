@@ -17,9 +17,8 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import bare
+from ..base.display import bare, innermost
 from ..base.errors import NOTHING_LEFT, InvalidDataError, ModelFileError, ReadError, SettingError, UnconstrainError
-from ..base.estimators import innermost
 from ..base.files import stem
 from .progress import Progress
 

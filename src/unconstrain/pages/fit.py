@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.display import counted_off, listening
+from ..base.display import counted_off, innermost, listening
 from ..base.errors import InvalidDataError, SettingError
-from ..base.estimators import innermost
 from ..evaluation import diagnosis, ncpe, ninconsistency, nupe, verdicts
 from ..learners import named
 from ..motion import Guided, rollout

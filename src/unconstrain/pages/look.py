@@ -13,8 +13,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Array
+from ..base.display import innermost
 from ..base.errors import MissingBeliefError, SettingError
-from ..base.estimators import innermost
 from ..evaluation import verdicts
 from ..recordings import Demonstration, Recording, stack
 from .alone import assembled, literal

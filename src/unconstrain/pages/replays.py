@@ -10,8 +10,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Array
+from ..base.display import innermost
 from ..base.errors import DivergedError
-from ..base.estimators import innermost
 from ..evaluation import diagnosis, verdicts
 from ..models import spaces
 from ..motion import rollout

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..base.arrays import Array
+from ..base.display import innermost
 from ..base.errors import SettingError
-from ..base.estimators import innermost
 from ..models import SUPPORTED
 from ..motion import rollout
 from ..recordings import Demonstration
