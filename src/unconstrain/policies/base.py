@@ -258,11 +258,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         """Share of the observed motion that the policy, projected onto each action, explains.
 
         ``1 − E_i / Σ w uᵀu`` (eq. 4); 1 is best. The usual R² would punish a policy for what constraints took away.
-
-        Parameters
-        ----------
-        X, y, sample_weight
-            As in :meth:`fit`.
+        Parameters as in :meth:`fit`.
         """
         check_is_fitted(self, "solution_")
         missed = moved = 0.0
@@ -410,7 +406,10 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         split = Split.begin(self.validation if self.validation is not None else Folds(), look, more)
         keep = None if learner.needs_samples else Training.MOST_KEPT if learner.uses_samples and together else 0
         begun = {name: Training.begin(look, one, split, keep, more=more) for name, one in places}
-        self.training_ = begun[next(iter(begun)) if len(begun) == 1 else Robust().suited(begun, seen, self._nested)]
+        if len(begun) > 1:
+            suited = getattr(learner, "suited", None) or Robust().suited
+            begun = {"": begun[suited(begun, seen, self._nested)]}
+        self.training_ = next(iter(begun.values()))
         return self
 
     def _learnt(self, batches: Iterable[Batch], learner: Learner) -> Self:
