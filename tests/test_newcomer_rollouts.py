@@ -338,7 +338,7 @@ def test_a_policy_of_some_strokes_says_of_which(folder, tmp_path):
     for told, doubted in ((0.69, True), (0.71, False)):  # as fit judges what is told across the motion
         uc.save(uc.load(folder / "same.npz"), tmp_path / "q.npz", {TOLD: told})
         said = " ".join(run("look", *files, tmp_path / "q.npz", "-o", tmp_path / "look.html", "--force").split())
-        assert ("But across the motion recordings tell the policy too little." in said) is doubted
+        assert ("across the motion recordings tell the policy too little." in said) is doubted
 
 
 def test_a_fit_itself_says_how_its_policy_moves(folder, tmp_path):

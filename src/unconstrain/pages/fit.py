@@ -85,7 +85,11 @@ def policy_page(
     judged = replayed(found, moving, demos, made, None, known)
     parts = [
         *([html.section("Guided", html.paragraph(moving.aim_.promise))] if isinstance(moving, Guided) else []),
-        *_replays(judged.runs, judged.verdict.said.removeprefix(f"{found.said} ").removeprefix("But "), xs),
+        *_replays(
+            judged.runs,
+            judged.verdict.said.removeprefix(f"{found.said} ").removeprefix("But ").removeprefix("And "),
+            xs,
+        ),
         html.section("The demonstrations", _movements(moving, demos, xs)),
         *_reproduced(moving, demos, xs),
         html.section("Predicted and observed actions", _actions(policy, demos, us)),
