@@ -39,6 +39,7 @@ from .looking import look, play
 from .printing import (
     Group,
     Judged,
+    explained,
     judge_fit,
     keep_codes,
     of_option,
@@ -137,15 +138,27 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
         ]
         click.echo(json.dumps(plain, indent=2))
     else:
-        used, needed = "", ""
-        try:
-            used = f"fit uses {said_recipe(uc.preparation.decide(recipe, first[0])[0], first[0])}.\n"
-        except UnconstrainError as error:
-            needed = as_typed(str(error))
-        left_out = [*reading["leave_out"], *differ] if differ else []
-        say_surveys(surveys, needed, _to_fit(recipe, first[0], bool(needed), left_out))
+        used, needed, lacking = _used(recipe, first[0], surveys)
+        left_out = [*reading["leave_out"], *dict.fromkeys([*differ, *lacking])] if differ or lacking else []
+        say_surveys(surveys, needed, _to_fit(recipe, first[0], bool(needed and not lacking), left_out))
         click.echo(used, nl=False)
     refuse_warnings(reading["strict"])
+
+
+def _used(recipe: uc.Recipe, first: uc.Recording, surveys: Sequence[Any]) -> tuple[str, str, list[str]]:
+    """What ``fit`` uses, a line; what it has to know, a sentence; and the recordings that lack a column of it."""
+    try:
+        decided = uc.preparation.decide(recipe, first)[0]
+    except UnconstrainError as error:
+        return "", as_typed(str(error)), []
+    wanted = [*(decided.states or ()), *(decided.actions or ())]
+    lacking = {one.name: sorted({*wanted} - {*one.columns}, key=wanted.index) for one in surveys}
+    without = [name for name, missing in lacking.items() if missing]
+    needed = ""
+    if without:
+        has = next(one.columns for one in surveys if one.name == without[0])
+        needed = f"'{without[0]}' has no column {', '.join(lacking[without[0]])}; it has {', '.join(has)}."
+    return f"fit uses {said_recipe(decided, first)}.\n", needed, without
 
 
 def _to_fit(recipe: uc.Recipe, first: uc.Recording, guess: bool, left_out: Sequence[str]) -> str:
@@ -304,7 +317,7 @@ def score(
         whole = scores(demonstrations, "all", sum(map(len, demonstrations)))
     known, under = learnt_from(learnt, notes, recordings), None if held is None else 1.0 - whole["ncpe"]
     more = under, None if known is None else len(known), notes.get(TOLD)
-    judged = verdicts.of_score(1.0 - whole["ninc"], len(demonstrations), *more)
+    judged = verdicts.of_score(explained(moving, demonstrations), len(demonstrations), *more)
     with shown("running it from the same starts"):
         found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units)
     verdict = verdicts.of_unit(verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0)), _times(learnt, states))

@@ -21,6 +21,9 @@ from .progress import shown
 from .reading import loaded, numbers, options_for_reading, prepared, said_recipe
 from .writing import check_name, check_outputs, option_for_force
 
+RESTS = 0.1
+"""Samples slower than this share of the root mean square speed are at rest."""
+
 MOST_POSITIONS = 4000
 """Positions, at most, by which a mechanism is named; more are thinned evenly."""
 
@@ -304,11 +307,16 @@ def mechanism_of(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe, 
     names = recipe.states or ()
     if not _are_positions(recipe):
         return None
-    positions, _, groups = uc.stack(demonstrations)
+    positions, actions, groups = uc.stack(demonstrations)
+    speeds = (actions**2).sum(axis=1) ** 0.5
+    moves = speeds > RESTS * (speeds**2).mean() ** 0.5  # where somebody rests, all that positions keep to is a point
+    positions, groups = positions[moves], groups[moves]
     every = -(-len(positions) // MOST_POSITIONS)
     try:
         unit = _unit_of([first.units.get(name, "") for name in names])
         found = uc.constraints.identify(positions[::every], groups=groups[::every], unit=unit)
+        if found.mechanism.rank == len(names):
+            raise InvalidDataError("positions keep to a point, which would hold every motion.")
     except InvalidDataError as error:
         click.echo(f"Note: no mechanism is named: {error}", err=True)
         return None
@@ -343,7 +351,7 @@ def _say(learnt: Mapping[str, uc.LearntConstraint], what: str, named: Named | No
     head, rows = table_of(learnt, named)
     if rows:
         print_table(head, rows)
-    if named is not None and named.each:
+    if named is not None and named.shown is not False and named.each:
         click.echo("Where each is: --json, and --report draws it.")
 
 
@@ -369,7 +377,7 @@ def table_of(
         "missed where held out": [f"{one.choice_.held_out:.3g}" for one in own.values()],
     }
     names = list(own)
-    if named is not None and named.each:
+    if named is not None and named.shown is not False and named.each:
         names, axes = named.names, [one.axis for one in named.found.candidates[0].mechanisms]
         columns[f"tilt from {bare(named.up)}"] = [
             f"{math.degrees(math.acos(min(abs(axis[-1]), 1.0))):.1f}°" for axis in axes

@@ -14,7 +14,7 @@ import unconstrain as uc
 from ..base.display import counted
 from ..base.files import write
 from .fitting import options_for_model, policy_of
-from .printing import option_for_json, print_table, refuse_warnings, say, say_scale, say_verdict
+from .printing import explained, option_for_json, print_table, refuse_warnings, say, say_scale, say_verdict
 from .progress import shown
 from .reading import options_for_reading, prepared, said_recipe
 from .writing import check_outputs, option_for_force
@@ -52,8 +52,7 @@ def diagnose(
         demonstrations, recipe, (first, *_) = prepared(paths, reading)
         policy.fit_demonstrations(demonstrations)
         found = uc.evaluation.diagnose(policy, demonstrations)
-    missed = 1.0 - policy.score(*uc.stack(demonstrations)[:2])
-    say(uc.preparation.doubts(len(demonstrations), missed))
+    say(uc.preparation.doubts(len(demonstrations), 1.0 - explained(policy, demonstrations)))
     refuse_warnings(reading["strict"])
     states, actions = recipe.states or (), recipe.actions or recipe.directions
     judged = uc.evaluation.verdicts.of_diagnosis(found)

@@ -177,8 +177,10 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
         return Judged(
             uc.evaluation.verdicts.of_explained(held_out, count, told), None, "", count, 0, float("nan"), held_out
         )
-    count, samples, missed = _walked(policy, stream)
-    demos, open_ = stream.beginning(), told is not None and told < uc.evaluation.verdicts.MOSTLY
+    demos = stream.beginning()
+    usual = float((uc.stack(demos).actions ** 2).sum(axis=1).mean() ** 0.5)
+    count, samples, missed = _walked(policy, stream, usual)
+    open_ = told is not None and told < uc.evaluation.verdicts.MOSTLY
     there = _least_known(policy, demos, stream.recipe) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
     found = uc.evaluation.verdicts.of_explained(held_out, count, told, there, 1.0 - missed)
     ran = replayed(found, moving, demos, stream.recipe, None, stream.first.units, free=False)
@@ -227,7 +229,7 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
     elif learner != "direct":
         _say_determined(solution, learner)
     click.echo(
-        "share of the observed motion left unexplained (inconsistency): "
+        "share of the observed motion left unexplained, of what is slow less: "
         + (f"{1.0 - judged.training:.4g} on the training data, " if known else "")
         + (
             f"{1.0 - judged.held_out:.4g} where held out."
@@ -291,15 +293,20 @@ def _said_of_samples(solution: uc.Solution, actions: Sequence[str]) -> str:
     )
 
 
-def _walked(policy: uc.Policy, stream: uc.Stream) -> tuple[int, int, float]:
+def explained(policy: Any, demonstrations: Sequence[uc.Demonstration]) -> float:
+    """Share of the motion that a policy explains along it; none where nothing moves."""
+    missed, motion = uc.evaluation.metrics.along_motion(policy, demonstrations)
+    return 1.0 - missed / motion if motion > 0 else 0.0
+
+
+def _walked(policy: uc.Policy, stream: uc.Stream, usual: float) -> tuple[int, int, float]:
     """Numbers of demonstrations and samples, and the unexplained share of their motion, without sample weights."""
     names, samples, unexplained, energy = set(), 0, 0.0, 0.0
     for name, demonstration in stream.named_demonstrations():
         names.add(name)
         samples += len(demonstration)
-        motion = float((demonstration.actions**2).sum())
-        energy += motion
-        unexplained += motion * (1.0 - policy.score(demonstration.states, demonstration.actions))
+        missed, motion = uc.evaluation.metrics.along_motion(policy, demonstration, usual)
+        unexplained, energy = unexplained + missed, energy + motion
     return len(names), samples, unexplained / energy if energy > 0 else 1.0
 
 

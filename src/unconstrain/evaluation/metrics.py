@@ -20,11 +20,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..base.arrays import Array
+from ..base.arrays import Array, by_speed
 from ..base.errors import InvalidDataError, SettingError
 from ..constraints import Constraint, constraint_matrices
 from ..recordings import Demonstration, stack
-from ..risks import action_projection, null_space_projection, project
+from ..risks import action_projection, null_space_projection, project, unit_actions
 
 PolicyLike = Callable[[Array], Array]
 Demonstrations = Demonstration | Sequence[Demonstration]
@@ -139,6 +139,25 @@ def ninconsistency(policy: PolicyLike, demonstrations: Demonstrations) -> float:
     0.0
     """
     return inconsistency(policy, demonstrations) / _norm(demonstrations)
+
+
+def along_motion(policy: PolicyLike, demonstrations: Demonstrations, usual: float | None = None) -> tuple[float, float]:
+    """``Σ w (‖u‖ − ûᵀ π̃)²`` and ``Σ w ‖u‖²``: the first over the second is the share of the motion left unexplained.
+
+    As the inconsistency (eq. 4), but w falls from one to zero below half a usual length of actions, by default their
+    root mean square: what rests against something has the direction of its noise, in which no policy moves.
+
+    Examples
+    --------
+    >>> demonstration = uc.Demonstration([[0.0, 0.0], [1.0, 1.0]], [[1.0, 0.0], [0.0, 3.0]])
+    >>> uc.evaluation.metrics.along_motion(lambda x: np.ones_like(x), demonstration)
+    (4.0, 9.8)
+    """
+    demos = _listed(demonstrations)
+    directions, lengths = unit_actions(stack(demos).actions)
+    weights = by_speed(lengths, float(np.sqrt(np.mean(lengths**2))) if usual is None else usual)
+    missed = lengths - (directions * _predicted(policy, demos)).sum(axis=1)
+    return float(weights @ missed**2), float(weights @ lengths**2)
 
 
 def nppe(constraint: Constraint, demonstrations: Demonstrations) -> float:

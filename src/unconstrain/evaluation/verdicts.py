@@ -186,7 +186,8 @@ def of_told(found: Verdict, told: float | None) -> Verdict:
     """Add to a verdict that recordings tell a policy at too small a share of their states, as :func:`of_explained`."""
     if told is None or told >= PARTLY:
         return found
-    said = f"{found.said} {'But' if found.mark is Mark.GOOD else 'And'} across the motion recordings tell the policy too little."
+    but = "But" if found.mark is Mark.GOOD else "And"
+    said = f"{found.said} {but} across the motion recordings tell the policy too little."
     return found._replace(mark=max(found.mark, Mark.DOUBTFUL, key=[*Mark].index), said=said)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -25,9 +26,15 @@ from .potential import PACE, Potential, descended
 _AT_REST = 0.3
 """A demonstration ends at rest, or nearly, below this share of its fastest motion."""
 
+_STILL = 0.02
+"""A policy rests where it wants less than this share of its fastest motion, or twice as much as where it rests most."""
+
 _TOGETHER = 0.1
 """Demonstrations end in one place within this share of their extent."""
 
+
+_BENT = 0.2
+"""Demonstrations show a cycle if they turn by so much of it, in their mean, and are said to."""
 
 _ROUND = 0.9
 """Demonstrations of a cycle turn by so much of it, in their mean."""
@@ -141,6 +148,8 @@ class Guided(Exportable, Shown):
         demos = [shown] if isinstance(shown, Demonstration) else list(shown)
         wanted = _velocities(policy, stack(demos).states)
         round_ = orbit is not None or (goal is None and _repeat(demos))
+        if orbit is not None and (round_about := turns(demos)) < _BENT:
+            raise SettingError(f"orbit: demonstrations make {round_about:.2f} turns, too little of a cycle to find it.")
         self.aim_ = encircled(demos, policy) if round_ else _descent(demos, wanted, goal, dt)
 
     @property
@@ -287,9 +296,10 @@ def _rests(demo: Demonstration) -> bool:
 def _found(demos: Sequence[Demonstration], wanted: Array) -> Array:
     """Where demonstrations end at rest, (n,); those that end where the policy rests, too, if any do, were not held."""
     last = np.cumsum([len(demo) for demo in demos]) - 1
-    slow = np.linalg.norm(wanted[last], axis=1) <= _AT_REST * np.linalg.norm(wanted, axis=1).max()
+    left = np.linalg.norm(wanted[last], axis=1) / max(float(np.linalg.norm(wanted, axis=1).max()), 1e-300)
     rests = np.array([_rests(demo) for demo in demos])
-    ends = stack(demos).states[last[rests & slow if (rests & slow).any() else rests]]
+    slow = rests & (left <= max(_STILL, 2.0 * float(left[rests].min(initial=1.0)))) & (left <= _AT_REST)
+    ends = stack(demos).states[last[slow if slow.any() else rests]]
     if not len(ends):
         raise SettingError(
             "goal: no demonstration ends at rest, and they do not go round either, so that none is found. Pass goal=, "
@@ -302,6 +312,13 @@ def _found(demos: Sequence[Demonstration], wanted: Array) -> Array:
         raise InvalidDataError(
             f"goal: demonstrations end at rest in places up to {apart:.3g} from their mean, {apart / extent:.0%} of "
             "their extent; expected one place; give it with goal=."
+        )
+    if not slow.any():
+        warnings.warn(
+            f"goal: where demonstrations end at rest the policy goes on, at {left[rests].min():.0%} of its fastest: "
+            "something may have stopped them there. Give the goal with goal=.",
+            UserWarning,
+            stacklevel=3,
         )
     return np.asarray(goal)
 

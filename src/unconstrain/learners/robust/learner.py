@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
-from ...base.arrays import Array, check_at_least
+from ...base.arrays import Array, by_speed, check_at_least
 from ...base.display import counted
 from ...base.errors import SettingError
 from ...models import Scale
@@ -384,10 +384,10 @@ def _most_noise(samples: Samples) -> float:
 
 
 def _explained(samples: Samples, policy: Array) -> float:
-    """Share of the squared motion explained: one minus the inconsistency of predictions (N, d) over the energy."""
+    """Share of the squared motion explained along it by predictions (N, d); slow samples count less."""
     directions, lengths = unit_actions(samples.actions)
-    loss = samples.counts @ (lengths - (directions * policy).sum(axis=1)) ** 2
-    return float(1.0 - loss / (samples.counts @ lengths**2))
+    counts = samples.counts * by_speed(lengths, float(np.sqrt(samples.energy)))
+    return float(1.0 - counts @ (lengths - (directions * policy).sum(axis=1)) ** 2 / (counts @ lengths**2))
 
 
 def _trivial(samples: Samples) -> bool:
