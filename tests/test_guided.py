@@ -322,3 +322,20 @@ def test_commands_make_a_guided_policy_and_take_it(commands):
 def test_what_cannot_be_guided_to_is_said_by_the_option(commands, to, status, said):
     learn = "fit", "FILES", "--state", "x,y,z", "--differentiate", "--learner", "direct", "--model", "cubic"
     assert said in commands(*learn, "--guided", to, "-o", "HERE/none.npz", status=status)
+
+
+def test_a_goal_is_where_the_policy_rests_most_though_planes_stop_others_near_it():
+    planes = [Plane(each) for each in np.random.default_rng(6).normal(size=(4, 3))]
+    starts = GOAL + 0.4 * np.random.default_rng(7).normal(size=(6, 3))
+    held = [uc.rollout(spiral, start, 400, 0.05, plane) for start, plane in zip(starts[2:], planes, strict=True)]
+    free = [uc.rollout(spiral, start, 400, 0.05) for start in starts[:2]]
+    assert_allclose(uc.Guided(spiral, demonstrations=[*held, *free]).goal_, GOAL, atol=1e-3)
+
+
+def test_strokes_that_do_not_go_round_show_no_cycle():
+    def straight(states):
+        return GOAL - states
+
+    shown = uc.rollout(straight, STARTS[:8], 50, 0.05)
+    with pytest.raises(SettingError, match=r"orbit: demonstrations make 0\.\d\d turns, too little of a cycle"):
+        uc.Guided(straight, orbit="shown", demonstrations=shown)

@@ -200,3 +200,23 @@ def test_demonstrations_of_different_width_are_refused(metric):
     odd = uc.Demonstration(np.ones((2, 1)), np.ones((2, 1)), truth=truth, name="odd")
     with pytest.raises(InvalidDataError, match=r"demonstration 1 \('odd'\) has 1 state and 1 action columns"):
         metric(guess, [demo, odd])
+
+
+@pytest.mark.parametrize("resting", [0, 200])
+def test_what_rests_against_something_does_not_count_by_its_noise(resting):
+    """Against a plane the policy pushes on while only noise moves: in its direction nothing is missed."""
+    rng = np.random.default_rng(0)
+    moving = uc.rollout(lambda x: -x, [1.0, 0.5], 60, 0.05)
+    noise = 0.01 * rng.standard_normal((resting, 2))
+    states = np.vstack([moving.states, np.tile([1.0, 0.0], (resting, 1))])
+    demo = uc.Demonstration(states, np.vstack([moving.actions, noise]))
+    usual = float(np.sqrt((moving.actions**2).sum(axis=1).mean()))
+
+    def explained(policy, **how):
+        missed, motion = uc.evaluation.metrics.along_motion(policy, demo, **how)
+        return 1.0 - missed / motion
+
+    assert explained(lambda x: -x, usual=usual) > 0.95
+    assert 0.85 < explained(lambda x: -0.7 * x, usual=usual) < 0.95
+    assert explained(np.zeros_like, usual=usual) == 0.0
+    assert (uc.ninconsistency(lambda x: -x, demo) > 0.5) == (resting > 0)  # which counts it
