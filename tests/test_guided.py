@@ -10,7 +10,7 @@ from scipy.optimize import check_grad, minimize
 
 import unconstrain as uc
 from recorded import needs_data
-from unconstrain.base.errors import InvalidDataError, SettingError
+from unconstrain.base.errors import InvalidDataError, ModelFileError, SettingError
 from unconstrain.cli import main
 from unconstrain.constraints.known import Plane, SwitchingLine
 from unconstrain.motion.potential import descended, excess, steepest
@@ -197,6 +197,10 @@ def test_it_survives_its_file(learnt, tmp_path):
     assert_array_equal(again(STARTS), learnt(STARTS))
     assert_array_equal(again.step(STARTS[0]), learnt.step(STARTS[0]))
     assert (again.dt_, again.aim_.pace) == (learnt.dt_, learnt.aim_.pace)
+    with pytest.raises(
+        ModelFileError, match=r"holds a guided policy, expected a policy\. .* uc\.load\(path, uc\.Guided\)"
+    ):
+        uc.load(tmp_path / "guided.npz")
 
 
 def test_the_slope_of_v_and_of_what_it_is_learnt_by_are_those_of_finite_differences(guided):

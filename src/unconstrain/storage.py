@@ -189,6 +189,7 @@ def load(path: str | os.PathLike[str], kind: type[Any] = Policy) -> Any:
             wanted = "policy" if issubclass(Policy, kind) else _WORDS.get(kind, kind.__name__)
             held = next((each for each in _WORDS if isinstance(policy, each)), type(policy))
             use = " Give it beside a policy, as constraint= of rollout." if held is LearntConstraint else ""
+            use = " In Python, load it with uc.load(path, uc.Guided)." if held is Guided and kind is Policy else use
             raise ModelFileError(f"{path}: holds a {_WORDS.get(held, held.__name__)}, expected a {wanted}.{use}")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # states have no names here

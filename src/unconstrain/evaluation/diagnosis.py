@@ -429,8 +429,8 @@ def _about_noise(found: Diagnosis) -> str:
     if found.noise_share < 0.5 * SMALL or found.noise < MISFIT * found.jitter:
         return said
     return said + (
-        f" Only {found.jitter:.3g} of it changes from sample to sample; the rest is misfit of the model, which a "
-        "smaller --variance or --model rbf may reduce."
+        f" Only {found.jitter:.3g} of it changes from sample to sample; the rest is what the model does not follow, or "
+        "people who vary."
     )
 
 
