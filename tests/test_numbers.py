@@ -44,7 +44,8 @@ LEFT = {
     "a bound in the code": (
         r"than\s+1100 times|to 32 MB is kept|about 8 MB: larger|at most 1 MB|least 0\.7 in one|than\s+30 % of a mean"
         r"|from 5 % on there|hold it to 1e-5"
-        r"|support is below 0\.001, 3\.7|fails where less than 95 %|from 0\.95?, \w+ from 0\.7|^     - 0\.6$|From 0\.001 on down"
+        r"|support is below 0\.001, 3\.7|fails where less than 95 %|from 0\.95?, \w+ from 0\.7|^     - 0\.6$"
+        r"|From 0\.001 on down"
     ),
     "a setting of an experiment": (
         r"6 × 6 over|5 × 5 kernels|0\.3, geometric|best α, 0\.03|α = 0\.3, other|α from 0\.1 to 0\.5|= 1e-2\), in the"
