@@ -197,9 +197,7 @@ def test_it_survives_its_file(learnt, tmp_path):
     assert_array_equal(again(STARTS), learnt(STARTS))
     assert_array_equal(again.step(STARTS[0]), learnt.step(STARTS[0]))
     assert (again.dt_, again.aim_.pace) == (learnt.dt_, learnt.aim_.pace)
-    with pytest.raises(
-        ModelFileError, match=r"expected a policy\. .* uc\.load\(path, uc\.Guided\)"
-    ):
+    with pytest.raises(ModelFileError, match=r"expected a policy\. .* uc\.load\(path, uc\.Guided\)"):
         uc.load(tmp_path / "guided.npz")
 
 
