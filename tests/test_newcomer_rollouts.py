@@ -357,7 +357,10 @@ def test_a_fit_itself_says_how_its_policy_moves(folder, tmp_path):
     assert f"un from the same starts: {found['ran']}." in notes["verdict"]["said"]
     doubted = {"from the same starts": "size 0.5 times", "verdict": "doubtful"}
     uc.save(uc.load(folder / "same.npz"), tmp_path / "q.npz", doubted)
-    assert json.loads(run("info", tmp_path / "q.npz", "--json"))["verdict"]["mark"] == "doubtful"
+    again = json.loads(run("info", tmp_path / "q.npz", "--json"))["verdict"]
+    assert again["mark"] == "doubtful"
+    assert "good. But run from the same starts: size 0.5 times." in again["said"]
+    assert again["doubt"].startswith("Its movement over time.")
     run("export", tmp_path / "p.npz", "-o", tmp_path / "p.c")
     assert found["ran"] in " ".join((tmp_path / "p.h").read_text("utf-8").replace(" * ", " ").split())
 

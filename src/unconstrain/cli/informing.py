@@ -143,8 +143,10 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
     shown = notes[TOLD] if isinstance(notes.get(TOLD), float) else None
     found = uc.evaluation.verdicts.of_explained(policy.held_out_score(), told, shown)
     strays = found.mark is uc.evaluation.verdicts.Mark.GOOD and notes.get(MARK) == "doubtful"
-    ran = f" Run from the same starts: {notes[RAN]}." if isinstance(notes.get(RAN), str) else ""
-    return found._replace(said=found.said + ran, mark=uc.evaluation.verdicts.Mark.DOUBTFUL if strays else found.mark)
+    run, doubt = ("But run", f"Its movement over time. {found.doubt}") if strays else ("Run", found.doubt)
+    ran = f" {run} from the same starts: {notes[RAN]}." if isinstance(notes.get(RAN), str) else ""
+    mark = uc.evaluation.verdicts.Mark.DOUBTFUL if strays else found.mark
+    return found._replace(mark=mark, said=found.said + ran, doubt=doubt)
 
 
 def _said(value: Any) -> str:
