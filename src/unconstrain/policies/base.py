@@ -257,8 +257,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
         """Share of the observed motion that the policy, projected onto each action, explains.
 
-        ``1 − E_i / Σ w uᵀu`` (eq. 4); 1 is best. The usual R² would punish a policy for what constraints took away.
-        Parameters as in :meth:`fit`.
+        ``1 − E_i / Σ w uᵀu`` (eq. 4); 1 is best, of parameters as in :meth:`fit`. R² would punish what constraints took.
         """
         check_is_fitted(self, "solution_")
         missed = moved = 0.0
@@ -272,7 +271,8 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
     def held_out_score(self) -> float:
         """:meth:`score` on each fold by what is learnt from the others; NaN where there is nothing to hold out.
 
-        From the moments alone, each local model by itself in its own field; by samples where the learner looks at them.
+        From the moments alone, each local model by itself in its own field; by samples where the learner looks at them,
+        of which slow ones count less (:func:`~unconstrain.evaluation.metrics.along_motion`).
         """
         check_is_fitted(self, "solution_")
         belief = self.solution_.belief
