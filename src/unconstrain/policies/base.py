@@ -257,7 +257,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
         """Share of the observed motion that the policy, projected onto each action, explains.
 
-        ``1 − E_i / Σ w uᵀu`` (eq. 4); 1 is best, of parameters as in :meth:`fit`. R² would punish what constraints took.
+        ``1 − E_i / Σ w uᵀu`` (eq. 4); 1 is best; parameters as in :meth:`fit`. R² punishes what constraints took.
         """
         check_is_fitted(self, "solution_")
         missed = moved = 0.0
