@@ -33,9 +33,6 @@ _TOGETHER = 0.1
 """Demonstrations end in one place within this share of their extent."""
 
 
-_BENT = 0.2
-"""Demonstrations show a cycle if they turn by so much of it, in their mean, and are said to."""
-
 _ROUND = 0.9
 """Demonstrations of a cycle turn by so much of it, in their mean."""
 
@@ -148,9 +145,7 @@ class Guided(Exportable, Shown):
         demos = [shown] if isinstance(shown, Demonstration) else list(shown)
         wanted = _velocities(policy, stack(demos).states)
         round_ = orbit is not None or (goal is None and _repeat(demos))
-        if orbit is not None and (round_about := turns(demos)) < _BENT:
-            raise SettingError(f"orbit: demonstrations make {round_about:.2f} turns, too little of a cycle to find it.")
-        self.aim_ = encircled(demos, policy) if round_ else _descent(demos, wanted, goal, dt)
+        self.aim_ = _encircled(demos, policy) if round_ else _descent(demos, wanted, goal, dt)
 
     @property
     def potential_(self) -> Potential:
@@ -241,6 +236,16 @@ def _single(policy: Callable[[Array], Array]) -> Callable[..., Array]:
     """A policy as a function of one state (n,) and of where to put the velocity, or None."""
     step: Callable[..., Array] | None = getattr(policy, "step", None)
     return step or (lambda x, out: np.concatenate(policy(np.asarray([x], np.float64)), out=out))
+
+
+def _encircled(demos: Sequence[Demonstration], policy: Callable[[Array], Array]) -> Orbit:
+    """The cycle that was shown; strokes that do not go round, but straight on, show none."""
+    try:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return encircled(demos, policy)
+    except InvalidDataError as error:
+        made = f"{turns(demos):.2f} turns in the mean"
+        raise SettingError(f"orbit: demonstrations make {made}, and no cycle is near them.") from error
 
 
 def _descent(demos: Sequence[Demonstration], wanted: Array, goal: ArrayLike | None, dt: float | None) -> Descent:
