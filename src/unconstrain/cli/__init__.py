@@ -500,8 +500,10 @@ def _obstacle(given: tuple[float, ...], n: int) -> uc.motion.obstacles.Ellipsoid
 
 def _check_start(policy: uc.Policy | uc.Guided, start: tuple[float, ...], least: float) -> None:
     """Refuse to begin where nothing was demonstrated, unless the policy is guided from anywhere."""
-    support = float(_support(innermost(policy), [start])[0])
-    if support < least and innermost(policy) is policy:
+    if innermost(policy) is not policy:
+        return
+    support = float(_support(policy, [start])[0])
+    if support < least:
         raise InvalidDataError(
             f"--start: nothing was demonstrated near {', '.join(f'{one:.4g}' for one in start)} (support "
             f"{support:.2g}). Start nearer, demonstrate there, or go on in spite of it with --least-support 0."

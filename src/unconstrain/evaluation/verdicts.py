@@ -186,9 +186,19 @@ def of_told(found: Verdict, told: float | None) -> Verdict:
     """Add to a verdict that recordings tell a policy at too small a share of their states, as :func:`of_explained`."""
     if told is None or told >= PARTLY:
         return found
-    but = "But" if found.mark is Mark.GOOD else "And"
-    said = f"{found.said} {but} across the motion recordings tell the policy too little."
-    return found._replace(mark=max(found.mark, Mark.DOUBTFUL, key=[*Mark].index), said=said)
+    return _doubted(found, "across the motion recordings tell the policy too little")
+
+
+def _doubted(found: Verdict, how: str) -> Verdict:
+    """Go on in a sentence that leaves a verdict no better than doubtful."""
+    return found._replace(
+        mark=_no_better(found.mark), said=f"{found.said} {'But' if found.mark is Mark.GOOD else 'And'} {how}."
+    )
+
+
+def _no_better(mark: Mark) -> Mark:
+    """Doubtful, or bad as it is."""
+    return Mark.BAD if mark is Mark.BAD else Mark.DOUBTFUL
 
 
 def of_unit(found: Verdict, times: float) -> Verdict:
@@ -202,10 +212,9 @@ def of_unit(found: Verdict, times: float) -> Verdict:
 
 def of_forbidden(found: Verdict, share: float) -> Verdict:
     """Add to a score under a constraint that it would not allow some share of the recorded motion, nPOE, if much."""
-    mark = Mark.BAD if found.mark is Mark.BAD else Mark.DOUBTFUL
     said = f"The constraint given forbids {share:.0%} of this motion (nPOE): likely another held it. {found.said}"
     then = "Score without it, or give what held them ('unconstrain constraint' learns that)."
-    return found if share <= FORBIDDEN else found._replace(mark=mark, said=said, next=then)
+    return found if share <= FORBIDDEN else found._replace(mark=_no_better(found.mark), said=said, next=then)
 
 
 def of_diagnosis(found: Diagnosis) -> Verdict:
@@ -359,9 +368,7 @@ def of_divergence(found: Verdict) -> Verdict:
 
 
 def _strays(found: Verdict, how: str, what: str) -> Verdict:
-    return found._replace(
-        mark=Mark.BAD if found.mark is Mark.BAD else Mark.DOUBTFUL,
-        said=f"{found.said} {'But' if found.mark is Mark.GOOD else 'And'} {how}.",
+    return _doubted(found, how)._replace(
         doubt=f"Its {what} over time. {found.doubt}".rstrip(),
         next="Look at it ('unconstrain look'). More demonstrations may come nearer, or another --model: 'auto' tries "
         "several.",
@@ -371,8 +378,8 @@ def _strays(found: Verdict, how: str, what: str) -> Verdict:
 def of_early_end(found: Verdict, why: str) -> Verdict:
     """Add to a verdict on a movement that it stops, for a reason in one sentence, and what to do in another."""
     said, _, then = why.partition(". ")
-    mark, doubt = max(found.mark, Mark.DOUBTFUL, key=[*Mark].index), f"{found.doubt} What would have come after."
-    return found._replace(mark=mark, said=f"{said}. {found.said}", doubt=doubt.lstrip(), next=then)
+    doubt = f"{found.doubt} What would have come after."
+    return found._replace(mark=_no_better(found.mark), said=f"{said}. {found.said}", doubt=doubt.lstrip(), next=then)
 
 
 SAME_CAUSE = ("clock-gap", "seam", "few-demonstrations")

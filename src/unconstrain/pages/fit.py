@@ -119,7 +119,7 @@ def _held_out(policy: Policy, demos: list[Demonstration]) -> list[float] | None:
     for fold in counted_off(range(count), "report: learning again, each time without some demonstrations:"):
         rest = [demo for index, demo in enumerate(demos) if index % count != fold]
         with listening(lambda *_: None):  # their own steps would look as if the policy were learnt anew
-            learnt = copy(again).fit_demonstrations(rest)
+            learnt = again.fit_demonstrations(rest)
         for index in range(fold, len(demos), count):
             found[index] = _or_nan(ninconsistency, learnt, [demos[index]])
     return found

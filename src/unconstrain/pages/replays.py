@@ -91,7 +91,7 @@ def replayed(
 
 def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Policy | Guided) -> verdicts.Verdict:
     """With what cures a policy that strays, unless it was tried."""
-    strays = judged.next != before.next and "unit" not in judged.next
+    strays = judged.next != before.next
     return judged._replace(next=f"{judged.next} {GUIDE}") if strays and innermost(policy) is policy else judged
 
 
