@@ -1,5 +1,7 @@
 """How far a policy is from the truth."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,6 +13,7 @@ import unconstrain as uc
 from samples import draw
 from unconstrain.base.errors import InvalidDataError, SettingError
 from unconstrain.constraints.known import Plane
+from unconstrain.risks import along_motion
 
 
 def demonstrations(seed=0, noise=0.0, groups=3):
@@ -220,3 +223,70 @@ def test_what_rests_against_something_does_not_count_by_its_noise(resting):
     assert 0.85 < explained(lambda x: -0.7 * x, usual=usual) < 0.95
     assert explained(np.zeros_like, usual=usual) == 0.0
     assert (uc.ninconsistency(lambda x: -x, demo) > 0.5) == (resting > 0)  # which counts it
+
+
+MATRIX, GOAL = np.array([[1.0, 0.2], [-0.1, 1.1]]), np.array([0.9, 0.8])
+
+
+def towards_goal(states, degrees=0.0):
+    """A policy of two joints; turned, a wrong one."""
+    return -(states - GOAL) @ MATRIX.T @ rotation(degrees).T
+
+
+def rotation(degrees):
+    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[cosine, -sine], [sine, cosine]])
+
+
+def jacobian(joints):
+    """Of the hand of a planar arm with links of 30 and 25 cm, (N, 2, 2)."""
+    first, both = joints[:, 0], joints.sum(axis=1)
+    along = 0.25 * np.stack([-np.sin(both), np.cos(both)], axis=1)
+    return np.stack([0.3 * np.stack([-np.sin(first), np.cos(first)], axis=1) + along, along], axis=2)
+
+
+def reaches(noise, seed=3):
+    """Six movements along lines of the hand that leave little of the policy, from positions by differences."""
+    rng = np.random.default_rng(seed)
+    for side in (1, -1) * 3:
+        start = GOAL + rng.uniform(0.3, 0.6, 2) * np.where(rng.random(2) < 0.5, -1, 1)
+        normal = rotation(10 * side) @ jacobian(start[None])[0] @ towards_goal(start)
+        line = normal / np.linalg.norm(normal)
+        path = uc.rollout(towards_goal, start, 200, 0.02, lambda x, t, line=line: (line @ jacobian(x))[:, None])
+        recorded = path.states + noise * rng.standard_normal(path.states.shape)
+        actions = (recorded[2:] - recorded[:-2]) / 0.04
+        yield uc.Demonstration(recorded[1:-1], actions, path.times[1:-1])
+
+
+def explained(policy, demos, **how):
+    missed, motion = uc.evaluation.metrics.along_motion(policy, demos, **how)
+    return 1.0 - missed / motion
+
+
+def test_what_is_slow_beside_the_noise_counts_less():
+    demos = list(reaches(1e-3))
+    actions = uc.stack(demos).actions
+    assert explained(towards_goal, demos) > 0.7
+    for degrees in (37.0, -37.0):
+        assert explained(lambda x, by=degrees: towards_goal(x, by), demos) < -0.3
+    missed, motion = along_motion(actions, towards_goal(uc.stack(demos).states))
+    assert 1.0 - missed / motion < -0.3  # where the noise is not known
+    silent = [replace(demo, noise=np.zeros(2)) for demo in demos]
+    assert explained(towards_goal, silent) == pytest.approx(1.0 - missed / motion)
+
+
+def test_without_noise_nothing_is_slow_beside_it():
+    demos = list(reaches(1e-7))
+    missed, motion = along_motion(uc.stack(demos).actions, towards_goal(uc.stack(demos).states, 37.0))
+    assert explained(lambda x: towards_goal(x, 37.0), demos) == pytest.approx(1.0 - missed / motion)
+    short = demos[0][:4]  # no differences to tell noise by
+    assert explained(towards_goal, short) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_fit_counts_what_it_holds_out_in_the_same_way(monkeypatch):
+    demos = list(reaches(1e-3))
+    policy = uc.ParametricPolicy(uc.Affine(), uc.NoiseCorrected()).fit_demonstrations(demos)
+    known = policy.held_out_score()
+    monkeypatch.setattr("unconstrain.risks.projection.TURNED", 0.0)
+    unknown = policy.fit_demonstrations(demos).held_out_score()
+    assert known > unknown + 0.1

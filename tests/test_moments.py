@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import naive
 from unconstrain.risks import moments as module
-from unconstrain.risks.moments import Moments, Sums, gather, total
+from unconstrain.risks.moments import Moments, Sums, gather
 from unconstrain.risks.objectives import inconsistency, standard_risk, unvec, vec
 
 NAMES = ("weight", "energy", "cross", "gram", "consistent")
@@ -97,7 +97,7 @@ def test_the_size_of_blocks_does_not_change_the_sums(monkeypatch, models):
 
 def test_total_adds_several():
     parts = [gather(*table(seed)) for seed in range(3)]
-    for whole, *each in zip(total(parts).sums, *(part.sums for part in parts), strict=True):
+    for whole, *each in zip(Moments.total(parts).sums, *(part.sums for part in parts), strict=True):
         assert_allclose(whole, np.sum(each, axis=0))
 
 

@@ -203,11 +203,6 @@ def slices(table: Any, rows: int) -> Iterator[slice]:
     return (slice(start, min(start + rows, samples)) for start in range(0, samples, rows))
 
 
-def by_speed(lengths: Array, usual: float) -> Array:
-    """Weights (N,) of actions by their lengths: one from half a usual one on, less where noise gives the direction."""
-    return np.minimum(1.0, (2.0 * lengths / max(usual, 1e-300)) ** 2)
-
-
 def power_of_two(size: float) -> float:
     """The largest power of two up to a size; 1 for zero. Dividing by it costs no digit."""
     return math.ldexp(1.0, math.frexp(size)[1] - 1) if size > 0.0 else 1.0

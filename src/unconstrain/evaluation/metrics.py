@@ -20,11 +20,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..base.arrays import Array, by_speed
+from ..base.arrays import Array
 from ..base.errors import InvalidDataError, SettingError
 from ..constraints import Constraint, constraint_matrices
+from ..learners import robust
 from ..recordings import Demonstration, stack
-from ..risks import action_projection, null_space_projection, project, unit_actions
+from ..risks import action_projection, null_space_projection, project
+from ..risks import along_motion as along
 
 PolicyLike = Callable[[Array], Array]
 Demonstrations = Demonstration | Sequence[Demonstration]
@@ -145,7 +147,7 @@ def along_motion(policy: PolicyLike, demonstrations: Demonstrations, usual: floa
     """``Σ w (‖u‖ − ûᵀ π̃)²`` and ``Σ w ‖u‖²``: the first over the second is the share of the motion left unexplained.
 
     As the inconsistency (eq. 4), but w falls from one to zero below half a usual length of actions, by default their
-    root mean square: what rests against something has the direction of its noise, in which no policy moves.
+    root mean square, and below ten standard deviations of their noise: it gives the direction of what is slow.
 
     Examples
     --------
@@ -154,10 +156,8 @@ def along_motion(policy: PolicyLike, demonstrations: Demonstrations, usual: floa
     (4.0, 9.8)
     """
     demos = _listed(demonstrations)
-    directions, lengths = unit_actions(stack(demos).actions)
-    weights = by_speed(lengths, float(np.sqrt(np.mean(lengths**2))) if usual is None else usual)
-    missed = lengths - (directions * _predicted(policy, demos)).sum(axis=1)
-    return float(weights @ missed**2), float(weights @ lengths**2)
+    noise = np.repeat([_noise(demo) for demo in demos], [len(demo) for demo in demos])
+    return along(stack(demos).actions, _predicted(policy, demos), usual=usual, noise=noise)
 
 
 def nppe(constraint: Constraint, demonstrations: Demonstrations) -> float:
@@ -275,6 +275,14 @@ def _constrained(demos: list[Demonstration], constraint: Constraint | None) -> A
         # N π rather than the observed u: noise on the actions is no error of the policy.
         return np.concatenate([project(d.truth.projections, d.truth.policy) for d in demos if d.truth is not None])
     return stack(demos).actions
+
+
+def _noise(demo: Demonstration) -> float:
+    """Variance of the noise on each action coordinate: as known, or by differences; zero where these are too few."""
+    if demo.noise is not None:
+        return float(np.mean(demo.noise**2))
+    found = robust.noise_by_differences(demo.actions, np.zeros(len(demo), dtype=np.intp))
+    return found if np.isfinite(found) else 0.0
 
 
 def _squares(vectors: Array) -> float:

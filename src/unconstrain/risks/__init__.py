@@ -2,9 +2,9 @@
 
 from .autocorrelation import autocorrelations
 from .folded_moments import FoldedMoments
-from .moments import Moments, Sums, gather, total
+from .moments import Moments, Sums, gather
 from .objectives import inconsistency, standard_risk, unvec, vec
-from .projection import action_projection, null_space_projection, project, unit_actions
+from .projection import action_projection, along_motion, null_space_projection, project, unit_actions
 from .quadratic import (
     NOISE,
     SECONDARY_NOISE,
@@ -25,6 +25,7 @@ __all__ = [
     "Quadratic",
     "Sums",
     "action_projection",
+    "along_motion",
     "autocorrelations",
     "eigensystem",
     "gather",
@@ -35,7 +36,6 @@ __all__ = [
     "project",
     "softened_minima",
     "standard_risk",
-    "total",
     "unit_actions",
     "unvec",
     "vec",

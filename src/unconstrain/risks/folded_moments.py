@@ -8,7 +8,7 @@ from operator import add
 
 from ..base.arrays import Array
 from ..base.display import Shown, counted
-from .moments import Moments, total
+from .moments import Moments
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,7 +29,7 @@ class FoldedMoments(Shown):
     @property
     def whole(self) -> Moments:
         """Moments of all folds."""
-        return total(self.parts)
+        return Moments.total(self.parts)
 
     @property
     def filled(self) -> list[int]:

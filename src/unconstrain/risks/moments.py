@@ -79,6 +79,11 @@ class Moments(Shown):
             np.zeros((models, weights, weights)),
         )
 
+    @staticmethod
+    def total(parts: Iterable[Moments]) -> Moments:
+        """Sum of several moments."""
+        return reduce(add, parts)
+
     def __add__(self, other: Moments) -> Moments:
         """Moments of both data sets together."""
         return Moments(*(mine + theirs for mine, theirs in zip(self.sums, other.sums, strict=True)))
@@ -136,11 +141,6 @@ class Moments(Shown):
         models, d, p = self.cross.shape
         sizes = counted(models, "model"), counted(d, "action"), counted(p, "feature")
         return *sizes, f"weight={float(self.weight.sum()):.4g}"
-
-
-def total(parts: Iterable[Moments]) -> Moments:
-    """Sum of several moments."""
-    return reduce(add, parts)
 
 
 def gather(features: Array, actions: Array, weights: Array | None = None, at_rest: float = 0.0) -> Moments:

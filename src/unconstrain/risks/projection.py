@@ -17,6 +17,14 @@ RANK_TOLERANCE = 1e-9
 ROW_TOLERANCE = 1e-12
 """Rows shorter than this share of the longest are rounding errors, as in a Jacobian at a singular posture."""
 
+TURNED = 10.0
+"""Actions shorter than so many standard deviations of the noise are turned by it: where much is held, far too much.
+
+Of 120 sets of six reaches of a planar arm along lines of its hand, with noise of 1 mrad on positions and velocities by
+differences, the right policy explained 70 % of the motion in 39 % without, in 53 % with 5, in 84 % with 10 and in 89 %
+with 20. One turned by 37 degrees did in 7 % where there was no noise, and in 0, 6, 19 and 36 %.
+"""
+
 
 def null_space_projection(constraint_matrix: Array, tolerance: float = RANK_TOLERANCE) -> Array:
     """Projection onto the null space of constraints, ``N = I − A⁺A`` (eq. 3).
@@ -113,6 +121,37 @@ def action_projection(actions: Array) -> Array:
     """
     directions, _ = unit_actions(actions)
     return directions[..., :, None] * directions[..., None, :]
+
+
+def along_motion(
+    actions: Array,
+    predicted: Array,
+    counts: Array | None = None,
+    usual: float | None = None,
+    noise: float | Array = 0.0,
+) -> tuple[float, float]:
+    """``Σ w (‖u‖ − ûᵀ π̃)²`` and ``Σ w ‖u‖²``: the first over the second is the share of the motion left unexplained.
+
+    As the inconsistency (eq. 4), but w falls from the sample weight to zero below half a usual length of actions, and
+    below :data:`TURNED` standard deviations of the noise: it gives the direction of what is slow, and no policy does.
+
+    Parameters
+    ----------
+    actions, predicted : ndarray, shape (N, d)
+    counts : ndarray, shape (N,), optional
+        Sample weights.
+    usual : float, optional
+        Usual length of actions, by default their root mean square.
+    noise : float or ndarray, shape (N,)
+        Variance of the noise on each action coordinate, of all samples or of each.
+    """
+    directions, lengths = unit_actions(actions)
+    counts = np.ones(len(lengths)) if counts is None else counts
+    usual = float(np.sqrt(counts @ lengths**2 / counts.sum())) if usual is None else usual
+    knee = np.maximum(max(0.5 * usual, 1e-300), TURNED * np.sqrt(noise))
+    weights = counts * np.minimum(1.0, lengths / knee) ** 2
+    missed = lengths - (directions * predicted).sum(axis=1)
+    return float(weights @ missed**2), float(weights @ lengths**2)
 
 
 def project(projections: Array, vectors: Array) -> Array:

@@ -19,7 +19,6 @@ from ...risks import (
     inconsistency,
     softened_minima,
     standard_risk,
-    total,
     unvec,
     vec,
 )
@@ -172,7 +171,7 @@ class _Folds:
     def corrected(self, variance: float, without: int | None = None) -> _Corrected:
         """Noise-corrected objectives of the whole, or without one fold."""
         kept = [fold for fold in range(len(self._parts)) if fold != without] or [0]
-        weighted, plain = (total(moments[fold] for fold in kept) for moments in (self._weighted, self._plain))
+        weighted, plain = (Moments.total(moments[fold] for fold in kept) for moments in (self._weighted, self._plain))
         return _Corrected(weighted, plain, variance, self._samples.sizes)
 
     def held_out(self, softnesses: Sequence[float], smooth: Quadratic, variance: float) -> tuple[Array, Array, Array]:

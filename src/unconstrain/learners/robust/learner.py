@@ -8,11 +8,11 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
-from ...base.arrays import Array, by_speed, check_at_least
+from ...base.arrays import Array, check_at_least
 from ...base.display import counted
 from ...base.errors import SettingError
 from ...models import Scale
-from ...risks import inconsistency, unit_actions, vec
+from ...risks import along_motion, inconsistency, vec
 from ...training import Batch, Samples, Training
 from ..direct import Direct
 from ..hybrid import Hybrid
@@ -76,7 +76,7 @@ class SampleLearner(Learner):
             found = self._plain(training, samples, everything)
         else:
             chosen, more = self.candidate(samples, training)
-            more["held_out_score"] = _explained(samples, chosen.held_out)
+            more["held_out_score"] = _explained(samples, chosen)
             second = None if self.secondary is None else on(self.secondary, training)(training.folds.whole)
             found = solution(chosen, samples, everything, training.model, second, **more)
         return replace(found, notes=everything.notes)
@@ -383,11 +383,12 @@ def _most_noise(samples: Samples) -> float:
     return min(noise_by_differences(samples.actions, samples.groups), samples.energy)
 
 
-def _explained(samples: Samples, policy: Array) -> float:
-    """Share of the squared motion explained along it by predictions (N, d); slow samples count less."""
-    directions, lengths = unit_actions(samples.actions)
-    counts = samples.counts * by_speed(lengths, float(np.sqrt(samples.energy)))
-    return float(1.0 - counts @ (lengths - (directions * policy).sum(axis=1)) ** 2 / (counts @ lengths**2))
+def _explained(samples: Samples, policy: Candidate) -> float:
+    """Share of the squared motion explained along it where held out; slow samples count less."""
+    noise = noise_of_each(samples.actions, samples.groups, _most_noise(samples), samples.noise)
+    noise = np.minimum(noise, policy.variance)  # constraints that change at every sample look like noise
+    missed, motion = along_motion(samples.actions, policy.held_out, samples.counts, noise=noise)
+    return 1.0 - missed / motion
 
 
 def _trivial(samples: Samples) -> bool:

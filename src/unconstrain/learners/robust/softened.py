@@ -4,7 +4,7 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...base.display import counted_off
-from ...risks import Moments, inconsistency, minimum, softened_minima, standard_risk, total, unvec, vec
+from ...risks import Moments, inconsistency, minimum, softened_minima, standard_risk, unvec, vec
 from ...training import Samples
 from ..thresholds import judged
 from .candidate import Candidate, scaled
@@ -20,9 +20,9 @@ _NAMES = ("direct", *(f"softened hybrid, {softness:g}" for softness in CANDIDATE
 def softened(samples: Samples) -> list[Candidate]:
     """Direct regression and the minima of ``E_i + s E_2`` for each softness s, the softest first."""
     parts = samples.moments_by_fold
-    whole, d = total(parts), samples.actions.shape[1]
+    whole, d = Moments.total(parts), samples.actions.shape[1]
     left_out = counted_off(parts, "softened hybrids: fold")
-    refits = np.stack([_path(total([one for one in parts if one is not part]), d) for part in left_out])
+    refits = np.stack([_path(Moments.total([one for one in parts if one is not part]), d) for part in left_out])
     learnt = zip(_path(whole, d), samples.held_out(refits), np.moveaxis(refits, 1, 0), strict=True)
     return [
         _candidate(name, softness, *found, whole, samples)
