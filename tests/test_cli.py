@@ -551,6 +551,27 @@ def test_a_report_of_more_than_memory_shows_its_beginning(folder, tmp_path, monk
     assert len(uc.Stream(stream.paths).beginning()) == 2
 
 
+def test_inspect_asks_what_was_meant_by_a_column_that_a_file_lacks(tmp_path):
+    for name, columns in (("a", "t,x,y"), ("b", "t,x,Y")):
+        rows = "\n".join(f"{0.1 * i:.1f},{i},{i % 5}" for i in range(30))
+        (tmp_path / f"{name}.csv").write_text(f"{columns}\n{rows}\n")
+    said = run("inspect", tmp_path / "a.csv", tmp_path / "b.csv", "--state", "x,y", "--differentiate")
+    assert "'b' has no column 'y'; it has x, Y. Did you mean 'Y'?" in " ".join(said.split())
+
+
+def test_the_beginning_is_kept_of_what_was_read(folder, monkeypatch):
+    from unconstrain.recordings import streams
+
+    monkeypatch.setattr(streams, "HELD_BYTES", 3000)
+    stream = uc.Stream(sorted(folder.glob("swing_*.csv")))
+    before = stream.beginning()
+    for _ in stream:
+        pass
+    monkeypatch.setattr(streams, "read_blocks", None)  # nothing is read again
+    for one, again in zip(before, stream.beginning(), strict=True):
+        assert_allclose(one.states, again.states, rtol=0)
+
+
 # score
 
 

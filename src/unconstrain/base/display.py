@@ -89,6 +89,13 @@ def meant(asked: Iterable[str], known: Iterable[str]) -> str:
     return f" Did you mean {' or '.join(map(repr, near))}?" if near else ""
 
 
+def has_no_column(name: str, missing: Sequence[str], columns: Sequence[str], words: Sequence[str] = ()) -> str:
+    """Say that a recording lacks columns, which ones it has, of numbers and of words, and what may have been meant."""
+    of_words = f", and of words, for group=, {listed(words)}" if words else ""
+    has = f"it has {listed(columns)}{of_words}.{meant(missing, columns)}"
+    return f"'{name}' has no column {listed([*map(repr, missing)])}; {has}"
+
+
 @contextmanager
 def listening(listener: Listener) -> Iterator[None]:
     """Tell a listener what goes on inside the block, in its threads too."""

@@ -105,10 +105,6 @@ def cover(states: Array, variance: float, at_least: float = 0.7) -> ReceptiveFie
     at_least : float
         The membership to reach, between 0 and 1.
 
-    Returns
-    -------
-    ReceptiveFields
-
     Raises
     ------
     SettingError

@@ -1,4 +1,7 @@
-"""What a person looks at: pages and their figures. None needs a network."""
+"""What a person looks at: pages and their figures. None needs a network.
+
+Where jinja2 or matplotlib is not installed, they raise a ``MissingExtraError``.
+"""
 
 import lazy_loader
 

@@ -51,16 +51,6 @@ def constraint_page(
         Head and rows of a table: what held each demonstration, where they differ.
     verdict : Verdict, optional
         By default on what was learnt alone.
-
-    Returns
-    -------
-    str
-        A whole HTML document.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib or jinja2 is not installed.
     """
     demos, choice = list(demonstrations), learnt[0].choice_
     parts = (

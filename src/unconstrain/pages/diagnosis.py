@@ -41,16 +41,6 @@ def diagnosis_page(
         Names of the columns.
     verdict : Verdict, optional
         To begin with, where more is known than the diagnosis says.
-
-    Returns
-    -------
-    str
-        A whole HTML document.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib or jinja2 is not installed.
     """
     demos = list(demonstrations)
     return html.document(

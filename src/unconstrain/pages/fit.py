@@ -63,16 +63,6 @@ def policy_page(
         Of columns whose unit is known.
     verdict : Verdict, optional
         To begin with, where more is known than the page says.
-
-    Returns
-    -------
-    str
-        A whole HTML document.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib or jinja2 is not installed.
     """
     policy, demos = innermost(moving), list(demonstrations)
     n, d = demos[0].states.shape[1], demos[0].actions.shape[1]

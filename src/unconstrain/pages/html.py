@@ -41,11 +41,6 @@ def document(title: str, verdict: verdicts.Verdict, lead: str, *parts: Markup) -
         What one sees, in plain words.
     *parts : Markup
         The body.
-
-    Raises
-    ------
-    MissingExtraError
-        If jinja2 is not installed.
     """
     page = _templates().get_template("page.html")
     return str(page.render(title=title, parts=[_part("verdict", verdict), _part("lead", lead), *parts]))

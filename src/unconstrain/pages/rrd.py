@@ -20,21 +20,12 @@ def recorded(scene: Scene) -> bytes:
     """Record demonstrations, what the policy makes of each, and what the constraint leaves free.
 
     Each has its way in space, a point that runs along it, and its states and actions over time: below
-    ``demonstrations/NAME``, ``policy/NAME`` and ``constraint``.
+    ``demonstrations/NAME``, ``policy/NAME`` and ``constraint``. Bytes of a file that ends in ``.rrd``; a
+    MissingExtraError where rerun is not installed.
 
     Parameters
     ----------
     scene : Scene
-
-    Returns
-    -------
-    bytes
-        Of a file that ends in ``.rrd``.
-
-    Raises
-    ------
-    MissingExtraError
-        If rerun is not installed.
     """
     rr = require_extra("rerun", "rerun")
     stream = rr.RecordingStream("unconstrain")

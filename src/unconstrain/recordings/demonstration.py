@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array, as_matrix, as_vector
-from ..base.display import Shown, counted, listed, meant, shortened
+from ..base.display import Shown, counted, has_no_column, shortened
 from ..base.errors import InvalidDataError
 from ..models import spaces
 from .columns import resolve
@@ -79,11 +79,10 @@ class Recording(Shown):
         """
         missing = [name for name in names if name not in self._places]
         if missing:
-            has_not = f"'{self.name}' has no column {listed([*map(repr, missing)])}; it has {listed(self.columns)}"
-            words = f", and of words, for group=, {listed(self.words)}" if self.words else ""
-            others = len(missing) == len(names) <= len(self.columns)
+            said = has_no_column(self.name, missing, self.columns, self.words)
+            others = len(missing) == len(names) <= len(self.columns) and not said.endswith("?")
             cure = " Name those of this file with states= and actions=, or all of its columns with columns=."
-            raise InvalidDataError(f"{has_not}{words}.{meant(missing, self.columns) or (cure if others else '')}")
+            raise InvalidDataError(said + cure * others)
         return self.values[:, [self._places[name] for name in names]]
 
     def resolve(self, names: Sequence[str]) -> tuple[str, ...]:

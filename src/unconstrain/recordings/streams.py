@@ -100,6 +100,7 @@ class Stream:
         self._asked = recipe or Recipe()
         self._first_file = 0
         self._held: list[tuple[str, Demonstration]] | None = None
+        self._begun: list[Demonstration] = []
         self._rows: int | None = None
         self._walked = False
         self._came: dict[str, None] = {}
@@ -157,18 +158,19 @@ class Stream:
             size += sum(table.nbytes for table in (named[1].states, named[1].actions))
             if size <= HELD_BYTES:
                 held.append(named)
-            else:
-                held.clear()
             yield named
         if not self._walked:
             self._say_what_differs()
             check_left_out(sorted(self.leave_out), self._came)
         self._walked = True
+        self._begun = [demonstration for _, demonstration in held]
         if size <= HELD_BYTES:
             self._held = held
 
     def beginning(self) -> list[Demonstration]:
         """Demonstrations, as many from the first on as :data:`HELD_BYTES` hold: what a page can show."""
+        if self._begun:
+            return list(self._begun)
         shown: list[Demonstration] = []
         size = 0
         for _, demonstration in self.named_demonstrations():
@@ -248,4 +250,4 @@ class Stream:
         return counts
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_held": None, "_progress": None}
+        return {**self.__dict__, "_held": None, "_begun": [], "_progress": None}

@@ -110,10 +110,6 @@ class Moments(Shown):
         ----------
         change : ndarray, shape (M, p', p)
             T for each model.
-
-        Returns
-        -------
-        Moments
         """
         models, d, p = self.cross.shape
         new = change.shape[1]
@@ -157,10 +153,6 @@ def gather(features: Array, actions: Array, weights: Array | None = None, at_res
         a single model if None.
     at_rest : float
         Actions of at most this length have no direction.
-
-    Returns
-    -------
-    Moments
 
     Examples
     --------

@@ -221,10 +221,6 @@ def lexicographic_path(first: Quadratic, second: Quadratic | None = None) -> Pat
     second : Quadratic, optional
         Minimised over the rest (eqs 8–13). Without it the undetermined
         directions stay zero: the truncated pseudo-inverse.
-
-    Returns
-    -------
-    Path
     """
     xp = namespace(first.hessian)
     eigenvalues, vectors = eigensystem(first.hessian)

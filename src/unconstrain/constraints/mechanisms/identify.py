@@ -208,10 +208,6 @@ def identify(
     unit : str
         Of the positions; empty where it is not known.
 
-    Returns
-    -------
-    Identification
-
     Raises
     ------
     InvalidDataError

@@ -11,17 +11,7 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...base.display import counted_off
-from ...risks import (
-    NOISE,
-    Moments,
-    Quadratic,
-    eigensystem,
-    inconsistency,
-    softened_minima,
-    standard_risk,
-    unvec,
-    vec,
-)
+from ...risks import NOISE, Moments, Quadratic, eigensystem, inconsistency, softened_minima, standard_risk, unvec, vec
 from ...training import Samples
 from ..hybrid import SOFTNESSES
 from ..thresholds import judged, within_errors

@@ -43,17 +43,13 @@ def noise_by_differences(actions: Array, groups: NDArray[np.intp]) -> float:
 
     The median of the squared fourth differences within demonstrations, which
     is robust to constraints that switch now and then. Biased upwards where a
-    constraint changes at every sample: that looks like noise.
+    constraint changes at every sample: that looks like noise. Infinity where
+    no demonstration is long enough.
 
     Parameters
     ----------
     actions : ndarray, shape (N, d)
     groups : ndarray of int, shape (N,)
-
-    Returns
-    -------
-    float
-        Infinity where no demonstration is long enough.
     """
     weights = np.array([(-1) ** i * comb(DIFFERENCE_ORDER, i) for i in range(DIFFERENCE_ORDER + 1)], dtype=np.float64)
     count = len(actions) - DIFFERENCE_ORDER
@@ -104,17 +100,12 @@ def correlation_time(residuals: Array, groups: NDArray[np.intp]) -> float:
     """Integrated autocorrelation time of residuals, ``1 + 2 Σ_k r_k``, in samples.
 
     N samples carry the information of N over this number of independent ones.
-    The sum ends at the first autocorrelation r_k near zero.
+    The sum ends at the first autocorrelation r_k near zero; it is at least 1.
 
     Parameters
     ----------
     residuals : ndarray, shape (N, k)
     groups : ndarray of int, shape (N,)
-
-    Returns
-    -------
-    float
-        At least 1.
     """
     time = 1.0
     for correlation in autocorrelations(residuals, groups, MOST_LAGS):

@@ -18,16 +18,13 @@ from .constants import HELD_VARIANCES, LEAST_SEGMENT, SEGMENT_SIGNAL_TO_NOISE, S
 def projection_of(actions: Array, noise: float) -> Array:
     """Projection onto the subspace spanned by the actions of one segment, by a singular value decomposition.
 
+    Shape (d, d), and of rank 0 where all singular values are within the noise.
+
     Parameters
     ----------
     actions : ndarray, shape (T, d)
     noise : float
         Standard deviation of the noise on each coordinate.
-
-    Returns
-    -------
-    ndarray, shape (d, d)
-        Of rank 0 where all singular values are within the noise.
     """
     _, singular, rows = np.linalg.svd(actions, full_matrices=False)
     size = singular / np.sqrt(len(actions))
@@ -39,7 +36,8 @@ def projection_of(actions: Array, noise: float) -> Array:
 def change_points(actions: Array, noise: float) -> NDArray[np.intp]:
     """Change points of the constraint along one demonstration, by the Bayesian information criterion.
 
-    Dynamic programming over all segmentations. The cost of a segment of rank
+    First sample of each segment but the first, ascending, by dynamic
+    programming over all segmentations. The cost of a segment of rank
     k is −2 times its log-likelihood plus ``(k (d − k) + 1) log T``: k (d − k)
     parameters of the subspace and one of the cut (BIC; Schwarz, *Annals of
     Statistics* 6(2), 1978). Actions are normal, with the demonstration's
@@ -50,11 +48,6 @@ def change_points(actions: Array, noise: float) -> NDArray[np.intp]:
     actions : ndarray, shape (T, d)
     noise : float
         Standard deviation of the noise on each coordinate.
-
-    Returns
-    -------
-    ndarray of int
-        First sample of each segment but the first, ascending.
     """
     count, d = actions.shape
     sums = np.concatenate([np.zeros((1, d, d)), np.cumsum(actions[:, :, None] * actions[:, None, :], axis=0)])

@@ -79,10 +79,6 @@ def figure(title: str = "", x: str = "", y: str = "", height: int = 320, rows: i
         Axes below each other, with one horizontal axis.
     **axes
         For matplotlib's axes.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     with _look():
         made = require_extra("matplotlib.figure", "viz").Figure(figsize=(1.0, height / 72))

@@ -28,10 +28,6 @@ def align(recordings: Sequence[Recording], name: str | None = None) -> Recording
     name : str, optional
         Of the result; that of the first by default.
 
-    Returns
-    -------
-    Recording
-
     Raises
     ------
     InvalidDataError

@@ -81,10 +81,6 @@ def survey(recording: Recording, recipe: Recipe | None = None) -> Survey:
     recipe : Recipe, optional
         Says which columns are actions, the rate where there are no times, and
         from where on an interval is a gap. What it leaves open is guessed where possible.
-
-    Returns
-    -------
-    Survey
     """
     asked = recipe or Recipe()
     return _survey(subject_of(recording, asked), asked)

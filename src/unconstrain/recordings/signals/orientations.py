@@ -21,17 +21,7 @@ class Wrap(NamedTuple):
 
 
 def wraps(angle: Array) -> Wrap | None:
-    """Find jumps by a whole turn inside a range of one turn.
-
-    Parameters
-    ----------
-    angle : ndarray, shape (T,)
-
-    Returns
-    -------
-    Wrap or None
-        None where it is no wrapped angle.
-    """
+    """Find jumps by a whole turn inside a range of one turn, in columns (T,); None where it is no wrapped angle."""
     for turn in TURNS:
         rows = _jumps_by(angle, turn)
         if rows:

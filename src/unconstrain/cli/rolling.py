@@ -1,0 +1,180 @@
+"""``unconstrain rollout``: a policy in motion, as far as demonstrations support it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import click
+
+import unconstrain as uc
+
+from ..base.display import counted, innermost
+from ..base.errors import DivergedError, InvalidDataError, SettingError, SupportEndsWarning
+from ..base.files import write
+from .constraining import held_of, options_for_held
+from .informing import TOLD
+from .printing import of_option, option_for_json, say_verdict, say_written, show_warning
+from .reading import fitted_policy, numbers
+from .scoring import support_of
+from .writing import check_outputs, option_for_force
+
+
+@click.command(epilog="\b\nExample:\n  unconstrain rollout wipe.npz --start 0.1,0,0 --plane 0,0.3,1 -o path.csv")
+@click.argument("policy", type=click.Path())
+@click.option("--start", type=numbers, required=True, help="Initial state, one number for each state column.")
+@click.option("--steps", type=click.IntRange(1), default=200, help="Number of samples.")
+@click.option("--dt", type=float, default=0.02, help="Seconds between samples.")
+@options_for_held("to stay on")
+@click.option(
+    "--obstacle",
+    "obstacles",
+    type=numbers,
+    multiple=True,
+    help="Centre of a ball to go round, and its radius; or of an ellipsoid, and its radii. More than once for several.",
+)
+@click.option(
+    "--method",
+    type=click.Choice(["euler", "rk4", "adaptive"]),
+    help="How a step is taken: Runge-Kutta by default, or by euler as the loop of a controller does.",
+)
+@click.option(
+    "--order",
+    type=click.IntRange(1, 2),
+    default=1,
+    help="2 where states are positions, then velocities, and actions accelerations.",
+)
+@click.option(
+    "--least-support",
+    type=click.FloatRange(0.0, 1.0),
+    default=lambda: uc.models.SUPPORTED,
+    show_default="0.001",
+    help="Stop where demonstrations support less, 1 near and 0 far from them; 0 goes on.",
+)
+@click.option(
+    "-o", "--output", type=click.Path(dir_okay=False, allow_dash=True), default="-", help="CSV file; - prints."
+)
+@option_for_force
+@option_for_json
+def rollout(
+    policy: str,
+    start: tuple[float, ...],
+    plane: tuple[float, ...] | None,
+    constraint: str | None,
+    obstacles: tuple[tuple[float, ...], ...],
+    output: str,
+    force: bool,
+    as_json: bool,
+    **how: Any,
+) -> None:
+    """Roll POLICY out, freely or under a constraint, to a CSV.
+
+    It stops where demonstrations no longer support it, and says so; where they do not support the start, it is refused.
+    """
+    check_outputs(() if output == "-" else (output,), (policy, constraint), force)
+    moving, notes = fitted_policy(policy), uc.storage.load_notes(policy)
+    learnt, recipe = innermost(moving), uc.Recipe.from_dict(notes.get("recipe", {}))
+    if len(start) != learnt.n_features_in_:
+        raise SettingError(f"--start: got {len(start)} numbers, expected {learnt.n_features_in_}, one for each state.")
+    _check_start(moving, start, how["least_support"])
+    places = learnt.n_outputs_ if how["order"] == 2 else len(start)  # what a constraint is a function of
+    at = replace(recipe, states=recipe.states and recipe.states[:places])
+    held = held_of(plane, constraint, at, [start[:places]], learnt.n_outputs_, "one for each action")
+    task = held.target if isinstance(held, uc.LearntConstraint) and held.task else None
+    round_ = [_obstacle(given, len(start)) for given in obstacles]
+    path, why, trouble = _as_far_as_it_goes(moving, list(start), constraint=held, task=task, obstacles=round_, **how)
+    named = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))
+    kept = "the plane" if plane is not None else getattr(held, "title", "")
+    verdict = _supported(learnt, path, why, round_, kept, notes.get(TOLD))
+    accelerations = named.actions or tuple(f"a{name}" for name in (named.states or ())[:places])
+    columns = ["t", *(named.states or ()), *(accelerations if how["order"] == 2 else named.directions)]
+    if output != "-":
+        write(output, _csv(columns, path))
+    elif not as_json:
+        click.echo(_csv(columns, path), nl=False)
+    if as_json:
+        rows = None if output != "-" else _rows(path).tolist()
+        click.echo(json.dumps({"columns": columns, "rows": rows, "output": output, "verdict": verdict.to_json()}))
+    elif trouble is None:
+        say_verdict(verdict, err=output == "-")
+    if trouble is not None:
+        raise trouble
+    if output != "-" and not as_json:
+        say_written({"movement": output}, None)
+
+
+def _obstacle(given: tuple[float, ...], n: int) -> uc.motion.obstacles.Ellipsoid:
+    import numpy as np
+
+    if len(given) not in {n + 1, 2 * n}:
+        raise SettingError(
+            f"--obstacle: got {len(given)} numbers, expected {n} of a centre, then a radius or {n} radii."
+        )
+    with of_option("--obstacle"):
+        return uc.motion.obstacles.Ellipsoid(np.array(given[:n]), given[n:] if len(given) > n + 1 else given[n])
+
+
+def _check_start(policy: uc.Policy | uc.Guided, start: tuple[float, ...], least: float) -> None:
+    """Refuse to begin where nothing was demonstrated, unless the policy is guided from anywhere."""
+    if innermost(policy) is not policy:
+        return
+    support = float(support_of(policy, [start])[0])
+    if support < least:
+        raise InvalidDataError(
+            f"--start: nothing was demonstrated near {', '.join(f'{one:.4g}' for one in start)} (support "
+            f"{support:.2g}). Start nearer, demonstrate there, or go on in spite of it with --least-support 0."
+        )
+
+
+def _as_far_as_it_goes(policy: uc.Policy, start: list[float], **how: Any) -> tuple[Any, str, DivergedError | None]:
+    """A movement; why it stops early, or nothing; and what went wrong, where it is only the part before."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        try:
+            path = uc.rollout(policy, start, **{name: given for name, given in how.items() if given is not None})
+        except DivergedError as error:
+            if error.part is None:
+                raise
+            return error.part, "", error
+    for one in said:
+        if one.category is not SupportEndsWarning:
+            show_warning(one.message)
+    return path, " ".join(str(one.message) for one in said if one.category is SupportEndsWarning), None
+
+
+def _supported(
+    policy: uc.Policy, path: Any, why: str, obstacles: Sequence[Any], held: str, told: float | None
+) -> uc.evaluation.verdicts.Verdict:
+    """How near data is along a movement, and whether it tells the policy, if not everywhere; and what ``held`` it."""
+    verdicts = uc.evaluation.verdicts
+    untold = None if (told or 0.0) >= verdicts.MOSTLY else uc.evaluation.diagnosis.untold(policy, path)
+    found = verdicts.of_support(support_of(policy, path.states), path.times, untold)
+    found = verdicts.of_early_end(found, why) if why else found
+    passes = f" {held[:1].upper()}{held[1:]} passes through the start." if held else ""
+    found = found._replace(said=f"{found.said}{passes}")
+    if not obstacles:
+        return found
+    nearest = min((float(one(path.states)[0].min()), number) for number, one in enumerate(obstacles, start=1))
+    return found._replace(
+        said=f"{found.said} It keeps clear of {counted(len(obstacles), 'obstacle')}, at the nearest of number "
+        f"{nearest[1]} by {nearest[0]:.0%} of its radius."
+    )
+
+
+def _csv(header: Sequence[str], path: uc.Demonstration) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows([f"{value:.9g}" for value in row] for row in _rows(path))
+    return text.getvalue()
+
+
+def _rows(path: uc.Demonstration) -> Any:
+    import numpy as np
+
+    return np.column_stack([*([] if path.times is None else [path.times]), path.states, path.actions])

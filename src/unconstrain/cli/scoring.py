@@ -1,0 +1,97 @@
+"""``unconstrain score``: how well a policy explains recordings."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any
+
+import click
+
+import unconstrain as uc
+
+from ..base.display import innermost
+from ..base.errors import SettingError
+from .constraining import held_of, options_for_held
+from .informing import TOLD, learnt_from
+from .printing import explained, option_for_json, print_table, refuse_warnings, say_verdict
+from .progress import shown
+from .reading import fitted_policy, options_for_reading, prepared
+
+
+@click.command(epilog="\b\nExample:\n  unconstrain score wipe.npz other.csv --plane 0,0.3,1 --json")
+@click.argument("policy", type=click.Path())
+@options_for_reading
+@options_for_held("that held these recordings, to score under it, too")
+@option_for_json
+def score(
+    policy: str,
+    files: Sequence[str],
+    plane: tuple[float, ...] | None,
+    constraint: str | None,
+    as_json: bool,
+    **reading: Any,
+) -> None:
+    """Score how well POLICY explains recordings.
+
+    The demonstrations in each FILE are read and prepared as the training data of the policy was, but for what options
+    say.
+    """
+    from ..pages.fit import replayed
+
+    moving, notes, verdicts = fitted_policy(policy), uc.storage.load_notes(policy), uc.evaluation.verdicts
+    learnt = innermost(moving)
+    with shown("reading"):
+        demonstrations, recipe, recordings = prepared(files, reading, notes)
+    refuse_warnings(reading["strict"])
+    states = uc.stack(demonstrations).states
+    held = held_of(plane, constraint, recipe, states, learnt.n_outputs_, "one for each action")
+    if 2 * (support_of(learnt, states) < uc.models.SUPPORTED).sum() > len(states):
+        click.echo(f"Note: {policy}: learnt far from most of these states: are they of another task?", err=True)
+
+    def scores(of: uc.Demonstration | Sequence[uc.Demonstration], name: str, samples: int) -> dict[str, Any]:
+        found = {"demonstration": name, "samples": samples, "ninc": uc.ninconsistency(moving, of)}
+        return found if held is None else found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(moving, of, held)}
+
+    with shown("scoring"):
+        rows = [scores(demo, demo.name, len(demo)) for demo in demonstrations]
+        whole = scores(demonstrations, "all", sum(map(len, demonstrations)))
+    known, under = learnt_from(learnt, notes, recordings), None if held is None else 1.0 - whole["ncpe"]
+    more = under, None if known is None else len(known), notes.get(TOLD)
+    judged = verdicts.of_score(explained(moving, demonstrations), len(demonstrations), *more)
+    with shown("running it from the same starts"):
+        found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units)
+    verdict = verdicts.of_unit(verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0)), _times(learnt, states))
+    if as_json:
+        told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known}
+        click.echo(json.dumps({**told, "replayed": found.medians, "verdict": verdict.to_json()}, indent=2))
+        return
+    say_verdict(verdict)
+    rows.append(whole)
+    head = ["demonstration", "samples", "normalised inconsistency", *([] if held is None else ["nPOE", "nCPE"])]
+    print_table(head, [[str(v) if not isinstance(v, float) else f"{v:.4g}" for v in one.values()] for one in rows])
+
+
+def support_of(policy: uc.Policy, states: Any) -> Any:
+    """How near data is to states (N, n), (N,); of a policy without kernels 1 within six standard deviations, else 0."""
+    import numpy as np
+
+    with suppress(SettingError):
+        return policy.support(states)
+    form = policy.closed_form()
+    return (np.abs(form.embedding(np.array(states)) - form.origin) <= form.within).all(axis=1) * 1.0
+
+
+def _times(policy: uc.Policy, states: Any) -> float:
+    """How many times as large states (N, n) are as what a policy learnt from, in the middle; 1 where not known."""
+    import numpy as np
+
+    try:
+        form = policy.closed_form()
+    except SettingError:
+        return 1.0
+    own = form.embedding(np.array(states))
+    extents = np.log(np.ptp(own, axis=0) / (2 * form.reach) + 1e-300)
+    sizes = np.log(np.abs(own).max(axis=0) / (np.abs(form.origin) + form.reach) + 1e-300)
+    return float(np.exp(np.median(np.where(np.abs(sizes) < np.abs(extents), sizes, extents))))
