@@ -374,7 +374,7 @@ def test_a_cluster_computes_no_samples(files, tmp_path):
 @pytest.mark.parametrize("model", fitting.MODELS)
 def test_each_model_takes_each_learner(files, tmp_path, model, learner):
     said = run("fit", *files[:4], "--model", model, "--learner", learner, "-o", tmp_path / "p.npz")
-    assert ("local models" in said) == (model == "local")
+    assert ("one affine model for all states" in said) == (model == "local")  # as these movements are
     assert ("The inconsistency determined" in said) == (learner in ("hybrid", "inconsistency"))
     assert ("samples were free" in said) == (learner == "robust")
     assert type(storage.load(tmp_path / "p.npz").learner).__name__.lower() == learner
@@ -697,7 +697,7 @@ def test_a_movement_far_from_the_data_is_noted(files, tmp_path):
     near = call("rollout", tmp_path / "p.npz", "--start", f"{STARTS[0][0]},{STARTS[0][1]}", "--steps", 3)
     far = call("rollout", tmp_path / "p.npz", "--start", "90,0", "--steps", 3, "--least-support", 0)
     assert near.code == 0
-    assert near.err.startswith("! Near demonstrations, but ")
+    assert near.err.startswith("✔ Near demonstrations for all 0.04 s")
     assert far.code == 0
     assert far.err.startswith("✖ No demonstration passes near for 100% of the time, first at 0.00 s:")
     assert len(far.out.splitlines()) == 4

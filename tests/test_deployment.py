@@ -319,7 +319,7 @@ def test_support_limits_and_steps_of_c_and_of_cpp_are_those_of_the_policy(kind, 
         found = [support((real * n)(*map(float, x))) for x in at]
         expected = one(at)
         assert np.abs(action - expected).max() <= (1e-5 if single else 1e-12) * np.abs(expected).max()
-        if hasattr(one.training_.model.fields, "support") or hasattr(one.features_, "support"):
+        if getattr(one.training_.model.fields, "support", None) or hasattr(one.features_, "support"):
             assert_allclose(found, one.support(at), atol=1e-6 if single else 1e-14)
         else:
             assert_array_equal(found, ((limits[:, 0] <= at) & (at <= limits[:, 1])).all(axis=1))

@@ -283,9 +283,10 @@ def five_strokes(kind, seed):
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 @pytest.mark.parametrize("kind", ["own planes", "one plane", "far apart"])
-def test_what_fit_and_diagnose_call_told_is_told(kind, seed):
+@pytest.mark.parametrize("variance", ["auto", None])
+def test_what_fit_and_diagnose_call_told_is_told(variance, kind, seed):
     demos = five_strokes(kind, seed)
-    policy = uc.LocallyLinearPolicy().fit_demonstrations(demos)
+    policy = uc.LocallyLinearPolicy(variance).fit_demonstrations(demos)
     found, told = diagnose(policy, demos), uc.evaluation.diagnosis.states_told(policy)
     assert found.told_together == pytest.approx(told)
     states, wanted = uc.stack(demos).states, np.vstack([one.truth.policy for one in demos])
@@ -299,12 +300,12 @@ def test_what_fit_and_diagnose_call_told_is_told(kind, seed):
     assert ("as all lie on one plane" in whole.said) == (kind == "one plane")
     if kind == "own planes":
         assert missed < 0.3
-        assert told > 0.5
+        assert told > 0.5 or np.isinf(policy.variance_)  # which is too stiff for a cycle, and its misfit says so
         assert fit.mark is not verdicts.Mark.BAD
-        assert ("across" in fit.said) == (told < verdicts.PARTLY)
+        assert ("across" in fit.said) == (told < verdicts.PARTLY and policy.held_out_score() >= verdicts.GOOD)
         assert whole.mark is not verdicts.Mark.BAD
         hangs = "whichever two are left out: it may hang on one or two" in whole.said
-        assert hangs == (told >= verdicts.PARTLY)
+        assert hangs == (told >= verdicts.PARTLY > found.states_determined)
     else:
         assert told < 0.05 < 0.2 < missed
         assert whole.mark is verdicts.Mark.BAD

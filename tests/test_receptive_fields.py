@@ -1,5 +1,7 @@
 """Receptive fields and where they are put."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -118,16 +120,48 @@ def test_the_variance_is_chosen_by_what_is_held_out(monkeypatch):
     groups = np.repeat(np.arange(8), 60)
     winding = np.column_stack([np.ones(480), 2.0 * np.cos(2.0 * states[:, 0])]) + rng.normal(0.0, 0.05, (480, 2))
     straight = states @ [[-1.0, 0.5], [-0.5, -1.0]] + rng.normal(0.0, 0.05, (480, 2))
-    usual = uc.LocallyLinearPolicy(None, learner="direct").fit(states, straight, groups=groups).fields_.variance
+    usual = uc.LocallyLinearPolicy(None, learner="direct").fit(states, straight, groups=groups).variance_
     compared, tried = uc.Robust.compared, list[int]()
     monkeypatch.setattr(uc.Robust, "compared", lambda self, *of: tried.append(1) or compared(self, *of))
     winds = uc.LocallyLinearPolicy("auto", learner="direct").fit(states, winding, groups=groups)
-    assert len(tried) == 5
-    chosen = [winds, uc.LocallyLinearPolicy("auto", learner="direct").fit(states, straight, groups=groups)]
-    assert len(tried) == 5 + 3  # two that are worse in turn
-    assert chosen[0].fields_.variance <= usual / 4
-    assert chosen[1].fields_.variance == usual
-    given = uc.LocallyLinearPolicy(chosen[0].fields_.variance, learner="direct").fit(states, winding, groups=groups)
-    assert_allclose(given.predict(states), chosen[0].predict(states))
+    assert len(tried) == 6
+    affine = uc.LocallyLinearPolicy("auto", learner="direct").fit(states, straight, groups=groups)
+    assert len(tried) == 6 + 3  # two that are worse in turn
+    assert winds.variance_ == winds.fields_.variance <= usual / 4
+    assert affine.variance_ == np.inf
+    assert affine.fields_.variance == usual
+    given = uc.LocallyLinearPolicy(centres=winds.fields_.centres, learner="direct").fit(states, straight, groups=groups)
+    assert given.variance_ <= usual  # fields that were asked for are taken
+    for one, actions in ((winds, winding), (affine, straight)):
+        again = uc.LocallyLinearPolicy(one.variance_, learner="direct").fit(states, actions, groups=groups)
+        assert_allclose(again.predict(states), one.predict(states))
     with pytest.raises(SettingError, match="variance: got 'narrow', expected a number"):
         uc.LocallyLinearPolicy("narrow").fit(states, winding)
+
+
+def test_few_noisy_strokes_of_a_simple_policy_are_not_learnt_in_pieces():
+    errors = {"auto": list[float](), None: list[float]()}
+    for seed in range(5):
+        rng, truth, runs = np.random.default_rng(seed), np.array([[-1.0, 0.1], [-0.2, -1.1]]), list[uc.Demonstration]()
+        for _ in range(6):
+            line = uc.constraints.Plane(rng.standard_normal(2))
+            run = uc.rollout(lambda at, truth=truth: at @ truth, rng.uniform(-0.7, 0.7, 2), 60, 0.025, line)
+            runs.append(replace(run, actions=run.actions + 0.03 * rng.standard_normal(run.actions.shape)))
+        states, wanted = uc.stack(runs).states, uc.stack(runs).states @ truth
+        for variance, found in errors.items():
+            policy = uc.LocallyLinearPolicy(variance).fit_demonstrations(runs)
+            found.append(((policy(states) - wanted) ** 2).sum() / (wanted**2).sum())
+    assert np.median(errors["auto"]) < 0.02 < 0.1 < np.median(errors[None])
+
+
+def test_one_model_for_all_states_is_that_of_affine_features_and_knows_where_data_is():
+    rng = np.random.default_rng(0)
+    states = rng.normal(size=(200, 2))
+    actions = states @ [[-1.0, 0.5], [-0.5, -1.0]] * np.eye(2)[np.arange(200) % 2]
+    one = uc.LocallyLinearPolicy(np.inf, learner="hybrid").fit(states, actions)
+    far = np.concatenate([states, states + 1e3])
+    assert one.solution_.weights.shape == (1, 2, 3)
+    assert_allclose(one(far), uc.ParametricPolicy(uc.Affine(), "hybrid").fit(states, actions)(far), rtol=1e-6)
+    assert_allclose(one.support(far), uc.LocallyLinearPolicy(None, learner="hybrid").fit(states, actions).support(far))
+    assert_allclose([one.step(state) for state in states], one(states), atol=1e-12)
+    assert one.closed_form().sizes == (2, 2, len(one.fields_.centres))

@@ -9,7 +9,7 @@ import sys
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from math import isfinite
+from math import isfinite, isinf
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
@@ -202,8 +202,10 @@ def _least_known(policy: uc.Policy, demonstrations: Sequence[uc.Demonstration], 
 
 def models_of(policy: uc.Policy) -> str:
     """Number and width of the local models, or the features of the one."""
-    if isinstance(policy, uc.LocallyLinearPolicy) and len(policy.solution_.weights) > 1:
-        return f"{len(policy.solution_.weights)} local models of σ² {policy.fields_.variance:.4g}"
+    if isinstance(policy, uc.LocallyLinearPolicy) and isinf(policy.variance_):
+        return "one affine model for all states"
+    if isinstance(policy, uc.LocallyLinearPolicy):
+        return f"{counted(len(policy.solution_.weights), 'local model')} of σ² {policy.variance_:.4g}"
     return str(policy.features_)
 
 
@@ -216,7 +218,7 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
     if moving is not policy:
         click.echo(f"Guided: {moving.aim_.promise}")
     solution, known = policy.solution_, isfinite(judged.training)
-    models = models_of(policy) if len(solution.weights) > 1 else ""
+    models = models_of(policy) if hasattr(policy, "fields_") else ""
     counts = f"{counted(judged.demonstrations, 'demonstration')}, {counted(judged.samples, 'sample')}" if known else ""
     if counts or models:
         click.echo(f"{', '.join(filter(None, (counts, models)))}.")

@@ -288,14 +288,15 @@ def untold_at(policy: Policy, states: Array, typical: float, left: Array | None 
     """What no recording tells of the policy at N states, shape (N,).
 
     A standard deviation, as a share of the typical length of actions, in all directions or in those that projections
-    ``left`` (N, d, d) leave; zero where noise is more. Above :data:`SMALL` no recording tells the policy there.
+    ``left`` (N, d, d) leave; zero where noise is more, but less than a typical action. Above :data:`SMALL` no recording
+    tells the policy there.
     """
     spread = policy.uncertainty(states)
     noise, open_ = (np.linalg.norm(one, axis=1) for one in (spread.from_noise, spread.undetermined))
     if left is not None:
         variances = np.trace(left @ policy.covariances(states) @ left, axis1=1, axis2=2)
         open_ = np.sqrt(np.maximum(variances, 0.0))
-    told: Array = np.where(open_ < noise, 0.0, open_) / typical
+    told: Array = np.where((open_ < noise) & (noise < typical), 0.0, open_) / typical
     return told
 
 

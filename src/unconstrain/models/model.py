@@ -1,7 +1,7 @@
 """Model of a policy: features and receptive fields, without weights."""
 
 from dataclasses import dataclass, field, replace
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -63,6 +63,7 @@ class Model(Shown):
     fields: ReceptiveFields | Everywhere
     embedding: Embedding = _STATES
     centring: Array | None = field(init=False, repr=False)
+    USUAL: ClassVar[str] = "1/1"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centring", self.fields.centring(self.features, self.embedding))
@@ -76,13 +77,17 @@ class Model(Shown):
         centres: ArrayLike | None = None,
         embedding: Embedding = _STATES,
     ) -> Self:
-        """Affine models in receptive fields over some coordinates, on regressors of one origin (section III-D)."""
-        width = variance if variance is not None else choose_variance(coordinates, at_least)
+        """Affine models in receptive fields over some coordinates, on regressors of one origin (section III-D).
+
+        A variance of infinity is one model everywhere.
+        """
+        width = variance if variance not in (None, np.inf) else choose_variance(coordinates, at_least)
         if centres is None:
             fields = cover(coordinates, width, at_least)
         else:
             fields = ReceptiveFields(embedding(as_matrix(centres, "centres")), width)
-        return cls(Affine(fields.centres.mean(axis=0), np.sqrt(width)), fields, embedding)
+        features = Affine(fields.centres.mean(axis=0), np.sqrt(width))
+        return cls(features, Everywhere(fields) if variance == np.inf else fields, embedding)
 
     @classmethod
     def to_choose_from(cls, coordinates: Array, actions: int, embedding: Embedding = _STATES) -> dict[str, Self]:
@@ -110,13 +115,19 @@ class Model(Shown):
         centres: ArrayLike | None = None,
         embedding: Embedding = _STATES,
     ) -> dict[str, Self]:
-        """Local models of a variance, or "auto" of the default one and narrower, up to :data:`MOST_FIELDS`, by name."""
+        """Local models of a variance, or for "auto" several by name, each finer than the one before.
+
+        One affine model for all states, unless centres are given; fields of the default variance, ``USUAL``; and
+        narrower ones, up to :data:`MOST_FIELDS`.
+        """
         if variance != "auto":
             return {"": cls.local(coordinates, variance, at_least, centres, embedding)}
-        widest, found = choose_variance(coordinates, at_least), dict[str, Self]()
+        widest = choose_variance(coordinates, at_least)
+        everywhere = cls.local(coordinates, np.inf, at_least, embedding=embedding)
+        found = {"affine": everywhere} if centres is None else {}
         for share in NARROWER:
             one = cls.local(coordinates, widest / share, at_least, centres, embedding)
-            if found and one.fields.shares(coordinates[:1]).shape[1] > MOST_FIELDS:
+            if share > 1 and one.fields.shares(coordinates[:1]).shape[1] > MOST_FIELDS:
                 break
             found[f"1/{share}"] = one
         return found

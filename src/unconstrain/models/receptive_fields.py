@@ -1,6 +1,8 @@
 """Receptive fields: membership of states in local models (section III-D), or in a single one."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -69,7 +71,21 @@ class ReceptiveFields(Kernels):
 
 @dataclass(frozen=True)
 class Everywhere:
-    """One field that is 1 at every state: the policy is a single model."""
+    """One field that is 1 at every state, as wide as can be: the policy is a single model.
+
+    Parameters
+    ----------
+    around : ReceptiveFields, optional
+        Fields over the data, which measure support.
+    """
+
+    around: ReceptiveFields | None = None
+    variance: ClassVar[float] = np.inf
+
+    @property
+    def support(self) -> Callable[[Array], Array] | None:
+        """Support of states by the data; None where features have to tell it."""
+        return None if self.around is None else self.around.support
 
     def weights(self, states: Array) -> Array:
         """Membership of each state, ones of shape (N, 1)."""
@@ -85,7 +101,9 @@ class Everywhere:
         """Features of a single model stay as they are."""
 
     def formula(self, features: FeatureMap, weights: Array) -> ClosedForm | None:
-        """Closed form of the features with weights (1, d, p), where they offer one."""
+        """Closed form of the features with weights (1, d, p), where they offer one; of affine ones in each field."""
+        if self.around is not None:
+            return self.around.formula(features, np.repeat(weights, len(self.around.centres), axis=0))
         closed = getattr(features, "closed_form", None)
         return None if closed is None else closed(weights[0])
 

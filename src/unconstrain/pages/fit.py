@@ -105,7 +105,7 @@ def _held_out(policy: Policy, demos: list[Demonstration]) -> list[float] | None:
         return None
     found, again = [float("nan")] * len(demos), copy(policy)
     if hasattr(again, "fields_"):  # as wide as was chosen
-        again.variance = again.fields_.variance
+        again.variance = again.variance_
     for fold in counted_off(range(count), "report: learning again, each time without some demonstrations:"):
         rest = [demo for index, demo in enumerate(demos) if index % count != fold]
         with listening(lambda *_: None):  # their own steps would look as if the policy were learnt anew

@@ -19,7 +19,7 @@ from ..base.errors import InvalidDataError, SettingError
 from ..base.estimators import checked_states
 from ..base.parameters import Parameters
 from ..deployment import Deployable
-from ..learners import Belief, Learner, Robust, Solution, Uncertainty, named
+from ..learners import Learner, Robust, Solution, Uncertainty, named
 from ..models import FeatureMap, Model, Scale, spaces
 from ..recordings import Demonstration, noise_of, preparation, stack, times_of
 from ..risks import Moments, unit_actions
@@ -65,7 +65,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
     n_outputs_: int
     _flat: bool
     _space: spaces.Space
-    _nested: ClassVar[bool] = False
+    _usual: ClassVar[str | None] = None
 
     @abstractmethod
     def places(self, look: FirstLook) -> Mapping[str, Model]:
@@ -220,8 +220,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
 
     def in_own_units(self) -> Self:
         """The same policy from states to actions in units of its own, those of ``scale_``."""
-        other = copy(self)
-        other.__dict__.pop("_prepared", None)
+        other = self._draft("_prepared")
         other.scale_ = None
         return other
 
@@ -296,7 +295,8 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         SettingError
             If the learner does not look at samples; :class:`~unconstrain.Robust` does.
         """
-        own = self._believed().uncertainty(self.training_.model, on_host(self._within(X)))
+        model, told = self._fitted_model(), self.solution_.believed
+        own = told.uncertainty(model, on_host(self._within(X)))
         return own if self.scale_ is None else Uncertainty(*map(self.scale_.given, own))
 
     def covariances(self, X: ArrayLike) -> Array:
@@ -304,12 +304,9 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
 
         Its diagonal is the square of ``uncertainty(X).undetermined``. Raises as :meth:`uncertainty` does.
         """
-        own = self._believed().covariances(self.training_.model, on_host(self._within(X)))
+        model, told = self._fitted_model(), self.solution_.believed
+        own = told.covariances(model, on_host(self._within(X)))
         return own if self.scale_ is None else own * np.multiply.outer(self.scale_.actions, self.scale_.actions)
-
-    def _believed(self) -> Belief:
-        check_is_fitted(self, "solution_")
-        return self.solution_.believed
 
     def support(self, states: ArrayLike) -> Array:
         """How near to the data each state is, from 1 to 0 far from all of it, shape (N,).
@@ -365,9 +362,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         if asked is None or (auto and self._is_curved):
             return None
         if self._is_curved:
-            raise SettingError(
-                f"scale: got one for states in {self._space}, expected Euclidean states, without angles."
-            )
+            raise SettingError(f"scale: got one for states in {self._space}, expected Euclidean states.")
         if auto:
             some = batch.at(np.unique(np.linspace(0, batch.states.shape[0] - 1, _LOOKED_AT).astype(np.intp)))
             asked = Scale.comparable(*some[:2], partial(self._consistency, some))
@@ -408,7 +403,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         begun = {name: Training.begin(look, one, split, keep, more=more) for name, one in places}
         if len(begun) > 1:
             suited = getattr(learner, "suited", None) or Robust().suited
-            begun = {"": begun[suited(begun, seen, self._nested)]}
+            begun = {"": begun[suited(begun, seen, self._usual)]}
         self.training_ = next(iter(begun.values()))
         return self
 

@@ -20,8 +20,8 @@ class LocallyLinearPolicy(Policy):
     ----------
     variance : float, "auto" or None
         The fields' σ². None is a quarter of the states' total variance, more where that takes over 100 fields. "auto"
-        halves that, down to a sixteenth, until two in turn are worse by estimated error: movements that wind need
-        narrower fields. That takes four times as long.
+        takes infinity, one affine model for all states, then that, then halves, down to a sixteenth, until two in turn
+        are worse by estimated error, in four times as long.
     at_least : float
         Fields are added until every sample has at least this weight in one.
     centres : array_like, shape (M, n), optional
@@ -40,7 +40,9 @@ class LocallyLinearPolicy(Policy):
     solution_ : Solution
         Weights (M, d, n + 1) over ``((x − origin) / σ, 1)``, with one origin, and what the data determined.
     fields_ : ReceptiveFields
-        The fields in use, among the coordinates of the state space.
+        The fields in use, among the coordinates of the state space; around one affine model for all, those of support.
+    variance_ : float
+        Their σ², infinity for one model.
 
     Examples
     --------
@@ -50,7 +52,7 @@ class LocallyLinearPolicy(Policy):
     array([[-1., -2.]])
     """
 
-    _nested = True
+    _usual = Model.USUAL
 
     def __init__(
         self,
@@ -80,4 +82,10 @@ class LocallyLinearPolicy(Policy):
     @property
     def fields_(self) -> ReceptiveFields:
         """The fields in use."""
-        return cast(ReceptiveFields, self._fitted_model().fields)
+        fields = self._fitted_model().fields
+        return cast(ReceptiveFields, getattr(fields, "around", fields))
+
+    @property
+    def variance_(self) -> float:
+        """Their σ², infinity for one model."""
+        return self._fitted_model().fields.variance

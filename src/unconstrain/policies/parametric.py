@@ -16,10 +16,9 @@ class ParametricPolicy(Policy):
     Parameters
     ----------
     features : callable or "auto", optional
-        A feature map, such as :class:`~unconstrain.NormalisedRBF` or
-        :class:`~unconstrain.Polynomial`, or anything that maps (N, n) to (N, p).
-        By default 25 normalised RBFs placed on the data. "auto" chooses among
-        affine, quadratic and cubic features, these RBFs and local models by estimated error.
+        A feature map, such as :class:`~unconstrain.NormalisedRBF` or :class:`~unconstrain.Polynomial`, or anything that
+        maps (N, n) to (N, p). By default 25 normalised RBFs placed on the data. "auto" chooses among affine, quadratic
+        and cubic features, these RBFs and local models by estimated error.
     learner : Learner or str, optional
         Or its name: "robust", "hybrid", "inconsistency", "direct"; :class:`~unconstrain.Robust` by default.
     validation : Folds or HeldOut, optional
@@ -67,8 +66,6 @@ class ParametricPolicy(Policy):
             return Model.to_choose_from(look.states, look.actions, look.embedding)
         features = self.features if self.features is not None else KMeansRBF()
         if not callable(features) and not isinstance(features, Placeable):
-            raise SettingError(
-                f"features: got {features!r}, expected 'auto' or a function of states such as NormalisedRBF."
-            )
+            raise SettingError(f"features: got {features!r}, expected 'auto' or a function such as NormalisedRBF.")
         placed = features.place(look.states) if isinstance(features, Placeable) else features
         return {"": Model(placed, Everywhere(), look.embedding)}

@@ -321,12 +321,12 @@ class Robust(_Maximising):
         beside = Comparison([found.best, *held], found.noise, samples).as_consistent if held else []
         return Comparison([*learnt, *beside], found.noise, samples) if beside else found
 
-    def suited(self, begun: Mapping[str, Training], seen: Iterable[Batch], nested: bool = False) -> str:
+    def suited(self, begun: Mapping[str, Training], seen: Iterable[Batch], usual: str | None = None) -> str:
         """The name of the model in which the policy of least estimated error is learnt.
 
         Candidates are the best of each model, by the rule of :mod:`.choice`, which takes them for equally biased
-        before held-out data refutes any. They do not know the Jacobian, and who does takes the first of nested models:
-        in finer ones noise hides what was held.
+        before held-out data refutes any. They do not know the Jacobian, and who does takes none that is finer than
+        usual: there noise hides what was held.
 
         Parameters
         ----------
@@ -334,22 +334,23 @@ class Robust(_Maximising):
             Training in each model, by name, with nothing seen.
         seen : iterable of Batch
             What to learn from; about the first 50,000 samples of it are looked at.
-        nested : bool
-            Whether each model is finer than the one before: those after two that are worse are not tried.
+        usual : str, optional
+            Given where each model is finer than the one before: those after two that are worse are not tried. It is
+            taken where nothing can be held out.
         """
-        chosen = next(iter(begun))
-        if nested and self.jacobian is not None:
-            return chosen
-        first = list(Training.opening(seen))
+        names = list(begun)
+        if usual is not None and self.jacobian is not None:
+            names = names[: names.index(usual) + 1]
+        chosen, first = usual or names[0], list(Training.opening(seen))
         best, views = dict[str, Candidate](), list[Samples]()
-        for name, one in begun.items():
-            training = one.keeping(Training.MOST_KEPT).with_batches(first)
+        for name in names:
+            training = begun[name].keeping(Training.MOST_KEPT).with_batches(first)
             views.append(held_out_together(training.samples.counted))
             if _trivial(views[0]):
                 break
             best[name] = replace(Robust().compared(views[-1], training).best, name=name, softness=0.0)
             chosen = _of_least_risk(list(best.values()), views)
-            if nested and chosen not in list(best)[-2:]:
+            if usual is not None and chosen not in list(best)[-2:]:
                 break
         return chosen
 

@@ -223,7 +223,7 @@ def followed(
 def _contracting(demos: Demos, goal: Array, policy: uc.LocallyLinearPolicy, softness: float) -> uc.Policy:
     """In the same fields."""
     learner = uc.Contracting(RATE / _longest(demos), goal, softness)
-    return uc.LocallyLinearPolicy(policy.fields_.variance, learner=learner).fit_demonstrations(demos)
+    return uc.LocallyLinearPolicy(policy.variance_, learner=learner).fit_demonstrations(demos)
 
 
 def _likeness(paths: Sequence[Array], there: NDArray[np.bool_], strokes: Sequence[Array]) -> dict[str, float | None]:
