@@ -66,6 +66,6 @@ class ParametricPolicy(Policy):
             return Model.to_choose_from(look.states, look.actions, look.embedding)
         features = self.features if self.features is not None else KMeansRBF()
         if not callable(features) and not isinstance(features, Placeable):
-            raise SettingError(f"features: got {features!r}, expected 'auto' or a function such as NormalisedRBF.")
+            raise SettingError(f"features: got {features!r}, expected 'auto' or a function of states.")
         placed = features.place(look.states) if isinstance(features, Placeable) else features
         return {"": Model(placed, Everywhere(), look.embedding)}
