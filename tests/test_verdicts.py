@@ -72,6 +72,10 @@ class TestMarks:
         alike, known = verdicts.of_constraint(alone), verdicts.of_constraint(alone, shown=True)
         assert (alike.mark, alike.said[:40]) == (Mark.DOUBTFUL, "Whether anything was held cannot be told")
         assert known.said.startswith("1 of 4 directions were held")
+        little = verdicts.of_constraint(held(1), held(1), wound=False)
+        assert (little.mark, little.said[:40]) == (Mark.DOUBTFUL, "Whether anything was held cannot be told")
+        assert verdicts.of_constraint(held(1), held(1), wound=True) == sure
+        assert verdicts.of_constraint(held(1), wound=False).mark is Mark.GOOD  # several tell it together
         both = verdicts.of_constraint(alone, alone, shown=True)
         assert ["from several" in one.next for one in (known, both)] == [True, False]
 

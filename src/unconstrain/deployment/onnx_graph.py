@@ -124,10 +124,7 @@ def _blended(graph: _Graph, form: ClosedForm, relative: str, shares: str, to: st
     blend = graph.add("MatMul", shares, maps)
     tiled = graph.affine(relative, np.tile(np.eye(n, n + 1), (1, d)), np.tile(np.eye(n + 1)[n], d), "tiled")
     graph.add(
-        "MatMul",
-        graph.add("Mul", blend, tiled),
-        graph.constant("sum", np.repeat(np.eye(d), n + 1, axis=0)),
-        to=to,
+        "MatMul", graph.add("Mul", blend, tiled), graph.constant("sum", np.repeat(np.eye(d), n + 1, axis=0)), to=to
     )
 
 

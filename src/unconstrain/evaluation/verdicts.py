@@ -249,17 +249,25 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
     return Verdict(mark, said, trust, doubt, then)
 
 
-def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bool | None = None) -> Verdict:
-    """Judge a constraint, or one for each demonstration, by what it missed, and whether positions show it, if known."""
+def of_constraint(
+    learnt: LearntConstraint, *others: LearntConstraint, shown: bool | None = None, wound: bool | None = None
+) -> Verdict:
+    """Judge a constraint, or one for each demonstration, by what it missed.
+
+    ``shown`` is whether positions show it, and ``wound`` whether demonstrations turn more than free ones, if known.
+    """
     every = (learnt, *others)
     choice = max((one.choice_ for one in every), key=lambda each: each.held_out)
     missed, ranks = sum(one.choice_.held_out for one in every) / len(every), {one.rank_ for one in every}
     if max(ranks) == 0:
         said = "No direction was held: nothing constrained these movements, or each direction was seen."
         return Verdict(Mark.DOUBTFUL, said, next="Look whether the demonstrations were held in different ways.")
-    if all(one.choice_.one_way for one in every) and not shown:
-        said = "Whether anything was held cannot be told: each state was passed one way only, as by a free policy."
+    one_way, alone = all(one.choice_.one_way for one in every), others or not choice.several
+    if not shown and (one_way or (alone and wound is False)):
+        little = "free strokes that turn as little keep to a surface of their own, too"
+        why = "each state was passed one way only, as by a free policy" if one_way else little
         then = "Record movements that cross each other, and learn it again; or name the --features."
+        said = f"Whether anything was held cannot be told: {why}."
         return Verdict(Mark.DOUBTFUL, said, doubt=f"That {min(ranks)} of {choice.actions} are held.", next=then)
     mark, word = _graded(1.0 - missed)
     held = f"{min(ranks)} of {choice.actions} directions were held"

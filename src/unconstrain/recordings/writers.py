@@ -38,10 +38,7 @@ LEROBOT: dict[str, Any] = {
 
 
 def write_recordings(
-    recordings: Sequence[Recording],
-    path: str | Path,
-    states: Sequence[str] = (),
-    actions: Sequence[str] = (),
+    recordings: Sequence[Recording], path: str | Path, states: Sequence[str] = (), actions: Sequence[str] = ()
 ) -> None:
     """Write recordings that have the same columns to one file, or to a folder as a LeRobot data set.
 

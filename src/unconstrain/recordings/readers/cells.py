@@ -209,9 +209,7 @@ def _read_csv(arrow: Any, text: bytes, layout: Layout, numbers: Sequence[int], w
         return csv.read_csv(
             arrow.BufferReader(text),
             csv.ReadOptions(
-                use_threads=False,
-                block_size=len(text) + 1,
-                column_names=[str(at) for at in range(len(layout.kinds))],
+                use_threads=False, block_size=len(text) + 1, column_names=[str(at) for at in range(len(layout.kinds))]
             ),
             csv.ParseOptions(delimiter=layout.delimiter, ignore_empty_lines=False),
             csv.ConvertOptions(

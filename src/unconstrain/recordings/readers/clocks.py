@@ -36,8 +36,7 @@ _UNIT_IN_NAME = re.compile(rf"(?:[_. \[(]|(?<=time)|(?<=stamp)|(?<=^t))({_UNIT})
 _TIME = r"(?:t|times?|time[_ ]?stamps?|stamps?|rosbagtimestamp|elapsed|date[_ ]?time|clock|zeit|temps|tiempo|tempo)"
 _WHOSE = r"(?:[a-z]+[_ ])?(?:elapsed|ros|robot|sys(?:tem)?|unix|utc|epoch|wall|sim(?:ulation)?|log|record(?:ing)?)[_ ]?"
 TIME_NAME = re.compile(
-    rf"(?:(?:.*[./])?header[./_]stamp|[%_#]*{_TIME}|{_WHOSE}{_TIME})(?:[_ ]?[\[(]?(?:{_UNIT})[\])]?)?",
-    re.IGNORECASE,
+    rf"(?:(?:.*[./])?header[./_]stamp|[%_#]*{_TIME}|{_WHOSE}{_TIME})(?:[_ ]?[\[(]?(?:{_UNIT})[\])]?)?", re.IGNORECASE
 )
 """A column of such a name holds the time stamps: ``t``, ``%time``, ``Time (s)``, ``timestamp_ms``, ``header.stamp``."""
 

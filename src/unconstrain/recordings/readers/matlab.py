@@ -91,9 +91,4 @@ def _structs(fields: dict[str, Any]) -> Any:
     return [dict(zip(fields, members, strict=True)) for members in zip(*fields.values(), strict=True)]
 
 
-FORMAT = Format(
-    (".mat",),
-    lambda head: head.startswith(b"MATLAB "),
-    read_matlab,
-    expected=EXPECTED,
-)
+FORMAT = Format((".mat",), lambda head: head.startswith(b"MATLAB "), read_matlab, expected=EXPECTED)

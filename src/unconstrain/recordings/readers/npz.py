@@ -90,11 +90,7 @@ class OnDisk:
 
 def _load(path: Path) -> dict[str, Any]:
     # Opened here, since numpy leaves a damaged file open.
-    with (
-        _nothing_unpickled(path),
-        path.open("rb") as stream,
-        np.load(stream, allow_pickle=False) as archive,
-    ):
+    with _nothing_unpickled(path), path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
         held = archive.zip.infolist()
         check_size(sum(one.file_size for one in held) // 8, sum(one.compress_size for one in held))
         contents = {key: archive[key] for key in archive.files}

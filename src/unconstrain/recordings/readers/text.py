@@ -162,10 +162,5 @@ def _recognises(head: bytes) -> bool:
 SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".trc", ".mot", ".sto", ".log", ".asc", ".ssv", ".data", ".out")
 
 FORMAT = Format(
-    SUFFIXES,
-    _recognises,
-    read_text,
-    read_text_blocks,
-    by_content=False,
-    expected="a table as text, in UTF-8",
+    SUFFIXES, _recognises, read_text, read_text_blocks, by_content=False, expected="a table as text, in UTF-8"
 )
