@@ -210,6 +210,12 @@ def of_unit(found: Verdict, times: float) -> Verdict:
     return Verdict(Mark.BAD, said, doubt=found.doubt, next="Convert them to the unit of the policy.")
 
 
+def of_units_apart(found: Verdict) -> Verdict:
+    """Add to a verdict that recordings were not all in one unit."""
+    then = "Convert the recordings that the notes name, or leave them out, and begin again."
+    return _doubted(found, "recordings are not all in one unit, as the notes say")._replace(next=then)
+
+
 def of_forbidden(found: Verdict, share: float) -> Verdict:
     """Add to a score under a constraint that it would not allow some share of the recorded motion, nPOE, if much."""
     said = f"The constraint given forbids {share:.0%} of this motion (nPOE): likely another held it. {found.said}"
