@@ -6,7 +6,7 @@ The thresholds of everything that is judged stand here, each with its reason; pa
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from functools import partial
 from textwrap import wrap
@@ -180,6 +180,17 @@ def of_score(
         if mark is Mark.GOOD
         else "'unconstrain diagnose' says what to record.",
     )
+
+
+def of_worst(found: Verdict, shares: Mapping[str, float]) -> Verdict:
+    """Add to a score which recordings by themselves are explained poorly, by name, and far worse than is usual."""
+    far = min(FAIR, float(np.median([*shares.values()])) - (GOOD - FAIR))
+    poor = sorted((share, f"'{name}'") for name, share in shares.items() if share < far)
+    if not poor:
+        return found
+    more = f", and {', '.join(name for _, name in poor[1:])} little better" if poor[1:] else ""
+    then = f"Look whether these went wrong or were held otherwise ('unconstrain look'). {found.next}"
+    return _doubted(found, f"it {_explains(poor[0][0], f'{poor[0][1]} alone')}{more}")._replace(next=then)
 
 
 def of_told(found: Verdict, told: float | None) -> Verdict:
