@@ -248,7 +248,7 @@ def test_plates_of_other_tilts_have_a_constraint_each_and_a_table(tilted, tmp_pa
     assert "p_plate_0.npz: is there; give another name, or --force" in refused(*order[:-2])
     page = (tmp_path / "p.html").read_text()
     assert page.count("1 of 3, constant") == 3
-    assert "tilt from z" in page
+    assert "angle of normal to z axis" in page
 
 
 def test_one_plate_has_one_constraint_in_the_unit_of_its_file_and_of_no_other(tilted, tmp_path):
@@ -263,6 +263,32 @@ def test_one_plate_has_one_constraint_in_the_unit_of_its_file_and_of_no_other(ti
     mixed = call("constraint", tmp_path / "mixed.csv", "-o", tmp_path / "m.npz")
     assert "no mechanism is named: the columns are in mm, m, rad, expected one unit of length" in mixed.stderr
     assert "Mechanism" not in mixed.stdout
+
+
+@pytest.fixture(scope="module")
+def falling(tmp_path_factory):
+    """Six free strokes that fall towards one goal, each on a plane of its own, which nothing held."""
+    folder = tmp_path_factory.mktemp("falling")
+    rng, step = np.random.default_rng(0), 0.01
+    for number in range(6):
+        path = [rng.uniform(-0.4, 0.4, 3)]
+        for _ in range(300):
+            x, y, z = path[-1]
+            path.append(path[-1] - step * np.array([x, y, np.clip(4.0 * (z - 0.3 * np.hypot(x, y)), -0.6, 0.6)]))
+        states = np.array(path)[::2] + 2e-4 * rng.standard_normal((151, 3))
+        velocities = np.gradient(states, 2 * step, axis=0)
+        write(folder / f"fall_{number}.csv", "t,x,y,z,vx,vy,vz", [2 * step * np.arange(151), states, velocities])
+    return folder
+
+
+@pytest.mark.parametrize("actions", [("--differentiate",), ("--action", "vx,vy,vz")])
+def test_free_strokes_that_are_flat_are_not_called_held(falling, tmp_path, actions):
+    order = ("constraint", falling, "--state", "x,y,z", *actions, "--features", "constant", "-o", tmp_path / "c.npz")
+    said = run(*order)
+    assert said.startswith("! Whether anything was held cannot be told: free strokes that turn as little")
+    assert "1 of 3, constant" in said  # each by itself looks held
+    assert "hold to that mechanism" not in said
+    assert run("info", tmp_path / "c_fall_1.npz").startswith("! Whether anything was held cannot be told")
 
 
 def test_mechanisms_that_differ_are_told_by_name(tilted, tmp_path):

@@ -135,7 +135,7 @@ class TestWhatIsFound:
                     "method": "softened hybrid, 0.1",
                     "candidates": {"direct": 0.3, "softened hybrid, 0.1": 0.1, "softened hybrid, 1": 0.2},
                 },
-                "Estimated squared error, against this: 3 times for direct ('fit -v' says what these are).",
+                "Estimated squared error of other ways over that of this: direct 3 ('fit -v' lists all).",
             ),
             ({"noise_share": 0.5}, "So much noise makes the following unreliable."),
             ({"noise_share": 0.2, "noise": 1.0, "jitter": 0.1}, "Only 0.1 of it changes from sample to sample"),
@@ -190,7 +190,7 @@ class TestCommand:
             "12 demonstrations, 360 samples",
             "Noise: ",
             "Learnt as likelihood: ",
-            "Estimated squared error, against this: ",
+            "Estimated squared error of other ways over that of this: ",
             "demonstrate around (x = ",
         ):
             assert words in said

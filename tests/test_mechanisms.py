@@ -296,6 +296,23 @@ def test_demonstrations_share_a_mechanism_or_have_one_each_as_the_data_say():
     assert found.sentence.startswith("a plane for each of 2 demonstrations: a plane through")
 
 
+def test_what_one_stroke_tells_of_a_mechanism_of_its_own_several_do_not_tell_better():
+    turn = np.linspace(0.0, 2.0, 60)
+    bent, groups = [], np.repeat(np.arange(3), 60)
+    for tilt in (0.0, 0.5, 1.0):
+        flat = np.column_stack([turn, 0.3 * turn**3, np.zeros(60)])
+        turned = [[1, 0, 0], [0, np.cos(tilt), np.sin(tilt)], [0, -np.sin(tilt), np.cos(tilt)]]
+        bent.append(flat @ turned + [0.0, 0.0, tilt])
+    free = identify(np.concatenate(bent) + noise((180, 3), size=1e-3), groups=groups)
+    assert (free.kind, len(free.candidates[0].mechanisms)) == ("plane", 3)
+    assert free.doubt.startswith("free strokes keep to a plane of their own, too, where they turn as little as here")
+    assert identify(bent[0] + noise((60, 3), size=1e-3)).doubt.startswith("free strokes keep to a plane")
+    wiped, groups = demonstrations(3, tilt=0.4)
+    assert identify(wiped, groups=groups).doubt == ""
+    lines = np.concatenate([way * turn[:, None] for way in np.eye(3)]) + noise((180, 3), size=1e-3)
+    assert "looks the same in one stroke" in identify(lines, groups=np.repeat(np.arange(3), 60)).doubt
+
+
 def test_the_order_of_demonstrations_changes_nothing():
     positions, groups = demonstrations(2, tilt=0.0)
     mixed = np.argsort(-groups, kind="stable")

@@ -1,6 +1,7 @@
 """What is not what it seems is said, with its row and what cures it; what is as it seems is left alone."""
 
 import json
+import re
 import tracemalloc
 import warnings
 from dataclasses import replace
@@ -453,6 +454,47 @@ def test_a_fit_that_explains_nothing_says_so(tmp_path):
     ran = call("fit", tmp_path / "*.csv", "--model", "linear", "-o", tmp_path / "p.npz")
     assert ran.code == 0
     assert "Note: explains-nothing: misses " in ran.err
+
+
+def apart(folder, which, size=1.0, clock=1.0):
+    """Six strokes towards one place, some of them in another unit of length or of time."""
+    times = np.linspace(0.0, 3.0, 150)
+    for number, start in enumerate(np.random.default_rng(0).uniform(0.2, 0.4, (6, 2))):
+        size_of, clock_of = (size, clock) if number in which else (1.0, 1.0)
+        states = size_of * start * np.column_stack([np.exp(-times), np.exp(-times) * np.cos(times)])
+        write(folder / f"s_{number}.csv", "t,x,y", np.column_stack([clock_of * times, states]))
+    return folder / "*.csv", "--state", "x,y", "--differentiate"
+
+
+@pytest.mark.parametrize("factor", [10.0, 57.3, 100.0, 1000.0])
+def test_half_of_the_files_in_another_unit_leave_none_for_right(tmp_path, factor):
+    files = apart(tmp_path, (0, 1, 4), factor)
+    said = run("inspect", *files)
+    assert "6 of 6 demonstrations not as it should be: unit-differs" in said
+    assert re.search(r"'s_0', 's_1', 's_4' are \S+ times larger than 's_2', 's_3', 's_5', as in another unit", said)
+    assert "--leave-out" not in said
+    fitted = call("fit", *files, "--model", "affine", "--learner", "direct", "-o", tmp_path / "p.npz")
+    assert fitted.out[0] in "!✖"
+    assert "recordings are not all in one unit" in " ".join(fitted.out.split())
+
+
+def test_fewer_files_in_another_unit_are_named_beside_the_others(tmp_path):
+    said = run("inspect", *apart(tmp_path, (2, 5), 0.1))
+    assert "'s_2', column 'x': is " in said
+    assert "times smaller than 's_0', 's_1', 's_3', 's_4', as in another unit" in said
+    assert "the same of 's_5', 2 in all" in said
+    assert "--leave-out s_2,s_5" in said
+
+
+def test_a_file_in_milliseconds_among_others_is_named_and_no_unit_is_advised(tmp_path):
+    files = apart(tmp_path, (3,), clock=1000.0)
+    said = run("inspect", *files)
+    assert "clock-unit: 's_3': 0.0497 samples a second, and others have 49.7" in said
+    assert "--time-unit" not in said
+    assert "--leave-out s_3" in said
+    assert "if all are so, say the unit" in call("fit", *files, "-o", tmp_path / "p.npz").err
+    said = run("inspect", *apart(tmp_path, range(6), clock=1000.0))
+    assert "such as --time-unit ms" in said
 
 
 def test_demonstrations_can_be_left_out_by_name(wrapped):

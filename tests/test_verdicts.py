@@ -72,8 +72,21 @@ class TestMarks:
         alike, known = verdicts.of_constraint(alone), verdicts.of_constraint(alone, shown=True)
         assert (alike.mark, alike.said[:40]) == (Mark.DOUBTFUL, "Whether anything was held cannot be told")
         assert known.said.startswith("1 of 4 directions were held")
+        little = verdicts.of_constraint(held(1), held(1), wound=False)
+        assert (little.mark, little.said[:40]) == (Mark.DOUBTFUL, "Whether anything was held cannot be told")
+        assert verdicts.of_constraint(held(1), held(1), wound=True) == sure
+        assert verdicts.of_constraint(held(1), wound=False).mark is Mark.GOOD  # several tell it together
         both = verdicts.of_constraint(alone, alone, shown=True)
         assert ["from several" in one.next for one in (known, both)] == [True, False]
+
+    def test_a_bad_recording_is_not_hidden_by_many_good_ones(self):
+        good, usual = verdicts.of_score(0.97, 20), {f"a_{number}": 0.98 for number in range(18)}
+        found = verdicts.of_worst(good, usual | {"bad": 0.2, "worse": -3.0})
+        assert (good.mark, found.mark) == (Mark.GOOD, Mark.DOUBTFUL)
+        assert "But it misses 'worse' alone by more than that motion itself, and 'bad' little better." in found.said
+        assert "But it explains 20% of 'bad' alone." in verdicts.of_worst(good, usual | {"bad": 0.2}).said
+        assert verdicts.of_worst(good, usual | {"fair": 0.75}) == good
+        assert verdicts.of_worst(good, dict.fromkeys("abcd", 0.5)) == good  # none is worse than the others
 
     def test_a_command_that_comes_next_can_be_copied(self):
         command = f"unconstrain fit {'a  b ' * 30}-o policy.npz"
@@ -198,6 +211,16 @@ def test_what_is_missed_by_more_than_all_is_said_in_words_with_a_cause():
         assert "%" not in found.said
     assert "units may be wrong" in verdicts.of_explained(-2.4, 5, learnt=0.5).next
     assert "go where no other does" in verdicts.of_explained(-2.4, 5, learnt=0.95).next
+
+
+def test_score_names_the_recording_that_is_explained_far_worse(folder, tmp_path):
+    table = np.loadtxt(folder / "swing_1.csv", delimiter=",", skiprows=1)
+    against = np.column_stack([table[:, :3], -table[:, 3:]])
+    np.savetxt(tmp_path / "against.csv", against, delimiter=",", header="t,x,y,vx,vy", comments="")
+    others = [folder / f"swing_{number}.csv" for number in range(3)]
+    said = " ".join(call("score", folder / "p.npz", *others, tmp_path / "against.csv").stdout.split())
+    assert "it misses 'against' alone by more than that motion itself" in said
+    assert " alone" not in call("score", folder / "p.npz", *others).stdout
 
 
 def test_a_fit_tells_programs_what_it_tells_people(folder):

@@ -182,7 +182,8 @@ def as_groups(values: Sequence[Hashable] | NDArray[np.generic], length: int) -> 
             f"groups: found nan at row {int(np.isnan(names).argmax())}, expected a name or a number."
         )
     if names.dtype.kind not in "iufbUO":  # bytes, dates and complex numbers are names as they are written
-        return np.array([_written(name) for name in names.tolist()], dtype=np.str_)
+        written = [one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one) for one in names.tolist()]
+        return np.array(written, dtype=np.str_)
     if names.dtype.kind == "O":
         try:
             np.unique(names)
@@ -191,10 +192,6 @@ def as_groups(values: Sequence[Hashable] | NDArray[np.generic], length: int) -> 
                 f"groups: got values that cannot be compared ({error}), expected names or numbers, none missing."
             ) from error
     return names
-
-
-def _written(name: Any) -> str:
-    return name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)
 
 
 def slices(table: Any, rows: int) -> Iterator[slice]:

@@ -15,7 +15,7 @@ import unconstrain as uc
 from ..base.display import bare, listed
 from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
-from .informing import HELD_BY, OF, SHOWN, WHERE, provenance
+from .informing import HELD_BY, OF, SHOWN, WHERE, WOUND, provenance
 from .printing import of_option, option_for_json, print_table, refuse_warnings, say_verdict, say_written
 from .progress import shown
 from .reading import loaded, numbers, options_for_reading, prepared, said_recipe
@@ -92,12 +92,13 @@ def constraint(
     outputs = {name: _of_demonstration(output, name) for name in learnt}
     check_outputs([place for name, place in outputs.items() if name], (*paths, jacobian), force)
     named = mechanism_of(demonstrations, recipe, first) if jacobian is None else None
-    verdict = _judged(learnt, named)
+    wound = uc.constraints.mechanisms.winding(one.actions for one in demonstrations)
+    verdict = _judged(learnt, named, wound)
     if not as_json:
         say_verdict(verdict)
         click.echo(f"Learnt from {said_recipe(recipe, first)}.")
         _say(learnt, "distance from it" if surface else "action", named)
-    notes = provenance(paths, recipe, first, **reading)
+    notes = provenance(paths, recipe, first, **reading) | {WOUND: wound}
     for name, place in outputs.items():
         uc.save(learnt[name], place, notes | _of(name, named, demonstrations))
     written = {f"constraint of {name}" if name else "constraint": place for name, place in outputs.items()}
@@ -118,10 +119,12 @@ def _of(name: str, named: Named | None, demonstrations: Sequence[uc.Demonstratio
     )
 
 
-def _judged(learnt: Mapping[str, uc.LearntConstraint], named: Named | None) -> uc.evaluation.verdicts.Verdict:
+def _judged(
+    learnt: Mapping[str, uc.LearntConstraint], named: Named | None, wound: bool
+) -> uc.evaluation.verdicts.Verdict:
     """What was learnt, and what it is by name where that holds more."""
     shown, rank = None if named is None else named.shown, max(one.rank_ for one in learnt.values())
-    found = uc.evaluation.verdicts.of_constraint(*learnt.values(), shown=shown)
+    found = uc.evaluation.verdicts.of_constraint(*learnt.values(), shown=shown, wound=wound)
     judged = uc.evaluation.verdicts.of_mechanism
     return found if named is None else judged(found, rank, named.found.mechanism, bool(named.shown))
 
@@ -345,9 +348,7 @@ def _say(learnt: Mapping[str, uc.LearntConstraint], what: str, named: Named | No
     else:
         click.echo("Each demonstration has its own: one constraint for all misses more where held out.")
     if named is not None:
-        for sentence in named.sentences:
-            click.echo(sentence)
-        click.echo(FOLLOWED if named.shown else NOT_FOLLOWED)
+        click.echo("\n".join([*named.sentences, FOLLOWED if named.shown else NOT_FOLLOWED]))
     head, rows = table_of(learnt, named)
     if rows:
         print_table(head, rows)
@@ -378,10 +379,9 @@ def table_of(
     }
     names = list(own)
     if named is not None and named.shown is not False and named.each:
-        names, axes = named.names, [one.axis for one in named.found.candidates[0].mechanisms]
-        columns[f"tilt from {bare(named.up)}"] = [
-            f"{math.degrees(math.acos(min(abs(axis[-1]), 1.0))):.1f}°" for axis in axes
-        ]
+        names, held = named.names, named.found.candidates[0].mechanisms
+        what = f"angle of {'normal' if held[0].kind == 'plane' else 'axis'} to {bare(named.up)} axis"
+        columns[what] = [f"{math.degrees(math.acos(min(abs(one.axis[-1]), 1.0))):.1f}°" for one in held]
         columns["mechanism"] = [text for _, text in named.each] if whole else []
     shown = {head: values for head, values in columns.items() if values}
     return ["demonstration", *shown], [list(row) for row in zip(names, *shown.values(), strict=True)]

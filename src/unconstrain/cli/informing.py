@@ -26,8 +26,8 @@ RAN = "from the same starts"
 MARK = "verdict"
 """Note of how ``fit`` judged it."""
 
-OF, HELD_BY, SHOWN, WHERE = "of", "held by", "shown by positions", "least and largest states"
-"""Notes of a constraint: of which demonstrations; numbers of the mechanism; if that is sure; where it was learnt."""
+OF, HELD_BY, SHOWN, WHERE, WOUND = "of", "held by", "shown by positions", "least and largest states", "winding"
+"""Notes of a constraint: of which demonstrations; mechanism; if that is sure; where; if they turn more than free."""
 
 ENDS = 2**16
 """Bytes at either end of a file by which it is known again."""
@@ -82,7 +82,7 @@ def info(file: str, as_json: bool) -> None:
     rest = {
         name: value
         for name, value in notes.items()
-        if name not in ("recipe", "units", "digests", MARK, HELD_BY, SHOWN, WHERE)
+        if name not in ("recipe", "units", "digests", MARK, HELD_BY, SHOWN, WHERE, WOUND)
     }
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held, notes), **rest}
     if as_json:
@@ -132,7 +132,7 @@ def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
 def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:
     """Judge a policy, constraint or guided policy by what it explained where held out, and what ``fit`` wrote down."""
     if isinstance(held, uc.LearntConstraint):
-        found = uc.evaluation.verdicts.of_constraint(held, shown=notes.get(SHOWN))
+        found = uc.evaluation.verdicts.of_constraint(held, shown=notes.get(SHOWN), wound=notes.get(WOUND))
         named = notes.get(HELD_BY) and uc.constraints.mechanisms.restored(notes[HELD_BY])
         return uc.evaluation.verdicts.of_mechanism(found, held.rank_, named, sure=True) if named else found
     policy = innermost(held)

@@ -49,17 +49,13 @@ def score(
     held = held_of(plane, constraint, recipe, states, learnt.n_outputs_, "one for each action")
     if 2 * (support_of(learnt, states) < uc.models.SUPPORTED).sum() > len(states):
         click.echo(f"Note: {policy}: learnt far from most of these states: are they of another task?", err=True)
-
-    def scores(of: uc.Demonstration | Sequence[uc.Demonstration], name: str, samples: int) -> dict[str, Any]:
-        found = {"demonstration": name, "samples": samples, "ninc": uc.ninconsistency(moving, of)}
-        return found if held is None else found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(moving, of, held)}
-
     with shown("scoring"):
-        rows = [scores(demo, demo.name, len(demo)) for demo in demonstrations]
-        whole = scores(demonstrations, "all", sum(map(len, demonstrations)))
+        rows = [_scores(moving, held, [demo], demo.name) for demo in demonstrations]
+        whole = _scores(moving, held, demonstrations, "all")
     known, under = learnt_from(learnt, notes, recordings), None if held is None else 1.0 - whole["ncpe"]
     more = under, None if known is None else len(known), notes.get(TOLD)
     judged = verdicts.of_score(explained(moving, demonstrations), len(demonstrations), *more)
+    judged = verdicts.of_worst(judged, {demo.name: explained(moving, [demo]) for demo in demonstrations})
     with shown("running it from the same starts"):
         found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units)
     verdict = verdicts.of_unit(verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0)), _times(learnt, states))
@@ -68,9 +64,14 @@ def score(
         click.echo(json.dumps({**told, "replayed": found.medians, "verdict": verdict.to_json()}, indent=2))
         return
     say_verdict(verdict)
-    rows.append(whole)
-    head = ["demonstration", "samples", "normalised inconsistency", *([] if held is None else ["nPOE", "nCPE"])]
-    print_table(head, [[str(v) if not isinstance(v, float) else f"{v:.4g}" for v in one.values()] for one in rows])
+    head = ["demonstration", "samples", "normalised inconsistency", "nPOE", "nCPE"][: len(whole)]
+    cells = [[f"{v:.4g}" if isinstance(v, float) else str(v) for v in one.values()] for one in (*rows, whole)]
+    print_table(head, cells)
+
+
+def _scores(moving: Any, held: Any, of: Sequence[uc.Demonstration], name: str) -> dict[str, Any]:
+    found = {"demonstration": name, "samples": sum(map(len, of)), "ninc": uc.ninconsistency(moving, of)}
+    return found if held is None else found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(moving, of, held)}
 
 
 def support_of(policy: uc.Policy, states: Any) -> Any:

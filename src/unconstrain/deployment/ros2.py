@@ -66,7 +66,8 @@ def export_ros2(
         If states are orientations, or those of a pose are not three with three actions.
     """
     package = c_name(Path(os.path.realpath(folder)).name if name is None else name).lower()
-    kind = messages or ("pose" if _are_coordinates(described) else "joints")
+    coordinates = [bare(name)[-1:].lower() for name in described.states] == ["x", "y", "z"]
+    kind = messages or ("pose" if coordinates else "joints")
     _check(form, kind)
     fill = _words(package, form, described, kind)
     with workshop(folder) as made:
@@ -105,11 +106,6 @@ def _words(package: str, form: ClosedForm, described: Description, kind: Message
         "d": str(form.sizes[1]),
         "scale": "1000.0" if millimetres else "1.0",
     }
-
-
-def _are_coordinates(described: Description) -> bool:
-    """Whether the states are called after three coordinates."""
-    return [bare(name)[-1:].lower() for name in described.states] == ["x", "y", "z"]
 
 
 def _check(form: ClosedForm, kind: Messages) -> None:

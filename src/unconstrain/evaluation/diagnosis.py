@@ -469,8 +469,8 @@ def about_choice(method: str, candidates: Mapping[str, float]) -> str:
     for name, risk in sorted(candidates.items(), key=lambda one: -one[1]):
         least[name.partition(", ")[0]] = risk
     own = max(candidates[method], 1e-300)
-    others = [f"{risk / own:.3g} times for {name}" for name, risk in reversed(least.items()) if name != way]
-    return f"{said} Estimated squared error, against this: {', '.join(others)} ('fit -v' says what these are)."
+    others = [f"{name} {risk / own:.3g}" for name, risk in reversed(least.items()) if name != way]
+    return f"{said} Estimated squared error of other ways over that of this: {', '.join(others)} ('fit -v' lists all)."
 
 
 def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> list[str]:

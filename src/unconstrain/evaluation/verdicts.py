@@ -6,7 +6,7 @@ The thresholds of everything that is judged stand here, each with its reason; pa
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from functools import partial
 from textwrap import wrap
@@ -182,6 +182,17 @@ def of_score(
     )
 
 
+def of_worst(found: Verdict, shares: Mapping[str, float]) -> Verdict:
+    """Add to a score which recordings by themselves are explained poorly, by name, and far worse than is usual."""
+    far = min(FAIR, float(np.median([*shares.values()])) - (GOOD - FAIR))
+    poor = sorted((share, f"'{name}'") for name, share in shares.items() if share < far)
+    if not poor:
+        return found
+    more = f", and {', '.join(name for _, name in poor[1:])} little better" if poor[1:] else ""
+    then = f"Look whether these went wrong or were held otherwise ('unconstrain look'). {found.next}"
+    return _doubted(found, f"it {_explains(poor[0][0], f'{poor[0][1]} alone')}{more}")._replace(next=then)
+
+
 def of_told(found: Verdict, told: float | None) -> Verdict:
     """Add to a verdict that recordings tell a policy at too small a share of their states, as :func:`of_explained`."""
     if told is None or told >= PARTLY:
@@ -208,6 +219,12 @@ def of_unit(found: Verdict, times: float) -> Verdict:
         return found
     said = f"Recordings are {size} than what the policy learnt from, as in another unit ({units[0]}). {found.said}"
     return Verdict(Mark.BAD, said, doubt=found.doubt, next="Convert them to the unit of the policy.")
+
+
+def of_units_apart(found: Verdict) -> Verdict:
+    """Add to a verdict that recordings were not all in one unit."""
+    then = "Convert the recordings that the notes name, or leave them out, and begin again."
+    return _doubted(found, "recordings are not all in one unit, as the notes say")._replace(next=then)
 
 
 def of_forbidden(found: Verdict, share: float) -> Verdict:
@@ -249,17 +266,25 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
     return Verdict(mark, said, trust, doubt, then)
 
 
-def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bool | None = None) -> Verdict:
-    """Judge a constraint, or one for each demonstration, by what it missed, and whether positions show it, if known."""
+def of_constraint(
+    learnt: LearntConstraint, *others: LearntConstraint, shown: bool | None = None, wound: bool | None = None
+) -> Verdict:
+    """Judge a constraint, or one for each demonstration, by what it missed.
+
+    ``shown`` is whether positions show it, and ``wound`` whether demonstrations turn more than free ones, if known.
+    """
     every = (learnt, *others)
     choice = max((one.choice_ for one in every), key=lambda each: each.held_out)
     missed, ranks = sum(one.choice_.held_out for one in every) / len(every), {one.rank_ for one in every}
     if max(ranks) == 0:
         said = "No direction was held: nothing constrained these movements, or each direction was seen."
         return Verdict(Mark.DOUBTFUL, said, next="Look whether the demonstrations were held in different ways.")
-    if all(one.choice_.one_way for one in every) and not shown:
-        said = "Whether anything was held cannot be told: each state was passed one way only, as by a free policy."
+    one_way, alone = all(one.choice_.one_way for one in every), others or not choice.several
+    if not shown and (one_way or (alone and wound is False)):
+        little = "free strokes that turn as little keep to a surface of their own, too"
+        why = "each state was passed one way only, as by a free policy" if one_way else little
         then = "Record movements that cross each other, and learn it again; or name the --features."
+        said = f"Whether anything was held cannot be told: {why}."
         return Verdict(Mark.DOUBTFUL, said, doubt=f"That {min(ranks)} of {choice.actions} are held.", next=then)
     mark, word = _graded(1.0 - missed)
     held = f"{min(ranks)} of {choice.actions} directions were held"

@@ -40,9 +40,9 @@ class Descent(Shown):
         """What is guaranteed, in words."""
         goal = ", ".join(f"{each:.4g}" for each in self.potential.goal)
         return (
-            f"From every state, movements arrive: free at ({goal}), and under any flat constraint where V is least on "
-            f"it. V falls with every Euler step of up to {self.dt:.3g} s, by ‖N ∇V‖ times {0.75 * self.pace:.3g} each "
-            "second, or by 3/16 of its square where that is less. A constraint that moves, or an obstacle, may lift V."
+            f"From every state, movements arrive: free at ({goal}), and under any flat constraint where it is nearest "
+            f"to that, as V measures. Every step of up to {self.dt:.3g} s leads nearer, at {0.75 * self.pace:.3g} a "
+            "second or faster, and slower only near the end. A constraint that moves, or an obstacle, may lead away."
         )
 
     def correction(self) -> Correction:

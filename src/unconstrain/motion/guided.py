@@ -144,7 +144,8 @@ class Guided(Exportable, Shown):
         shown = _kept(policy) if demonstrations is None else demonstrations
         demos = [shown] if isinstance(shown, Demonstration) else list(shown)
         wanted = _velocities(policy, stack(demos).states)
-        round_ = orbit is not None or (goal is None and _repeat(demos))
+        move_on = goal is None and 2 * sum(map(_rests, demos)) <= len(demos)
+        round_ = orbit is not None or (move_on and turns(demos) >= _ROUND)
         self.aim_ = _encircled(demos, policy) if round_ else _descent(demos, wanted, goal, dt)
 
     @property
@@ -286,11 +287,6 @@ def _kept(policy: Any) -> list[Demonstration]:
         states, actions = states * scale.states, scale.given(actions)
     ends = np.flatnonzero(np.diff(kept.groups)) + 1
     return [Demonstration(*pair) for pair in zip(np.split(states, ends), np.split(actions, ends), strict=True)]
-
-
-def _repeat(demos: Sequence[Demonstration]) -> bool:
-    """Whether demonstrations go round, and most do not end at rest."""
-    return 2 * sum(map(_rests, demos)) <= len(demos) and turns(demos) >= _ROUND
 
 
 def _rests(demo: Demonstration) -> bool:

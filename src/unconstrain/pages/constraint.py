@@ -112,7 +112,9 @@ def held_directions(parts: Sequence[Part], columns: Sequence[str] | None = None)
     shown = min(states.shape[1], 3)
     reach = float(np.ptp(states[:, :shown], axis=0).max()) / 25
     every = -(-len(states) // MOST_NORMALS)
-    lines = np.concatenate([_strokes_of(one, stack(held)[0][::every], reach) for one, held in parts])[:, :shown]
+    at = [(one, stack(held)[0][::every]) for one, held in parts]
+    rows = [(states, reach * one(states)[:, row]) for one, states in at for row in range(one.rank_)]
+    lines = np.concatenate([_strokes(*each) for each in rows])[:, :shown]
     thinned = -(-len(states) // MOST_POINTS)
     drawn = [*(("training", demo.states[::thinned, :shown]) for demo in demos), (_HELD, lines)]
     panel = (
@@ -123,10 +125,6 @@ def held_directions(parts: Sequence[Part], columns: Sequence[str] | None = None)
     caption = "Grey lines are the demonstrations. Strokes are directions in which they were held at these states."
     words = {_HELD: "held directions", "training": "demonstrations"}
     return html.picture("held", [panel], caption, keys=(_HELD, "training"), labels=words)
-
-
-def _strokes_of(learnt: LearntConstraint, states: Array, reach: float) -> Array:
-    return np.concatenate([_strokes(states, reach * learnt(states)[:, row]) for row in range(learnt.rank_)])
 
 
 def _strokes(points: Array, half: Array) -> Array:

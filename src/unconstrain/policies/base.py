@@ -386,13 +386,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         return self
 
     def _began(
-        self,
-        look: FirstLook | None,
-        learner: Learner,
-        *,
-        more: bool,
-        together: bool = True,
-        seen: Iterable[Batch],
+        self, look: FirstLook | None, learner: Learner, *, more: bool, together: bool = True, seen: Iterable[Batch]
     ) -> Self:
         """Choose all that has to be chosen before the first sample is summed, in one place or in several."""
         if look is None:

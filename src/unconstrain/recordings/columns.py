@@ -39,7 +39,8 @@ def _meant(name: str, columns: Sequence[str], named: Mapping[str, str]) -> tuple
         return tuple(column for column in columns if fnmatchcase(column, name))
     numbered = re.compile(rf"({re.escape(name)}|{_SHORT.get(name, '(?!)')})([_. \[]?\d+\]?|\..+)")
     of_stem = tuple(column for column in columns if numbered.fullmatch(column))
-    return of_stem or _only([column for column in columns if re.search(rf"[._/ ]{re.escape(name)}$", column)])
+    ending = tuple(column for column in columns if re.search(rf"[._/ ]{re.escape(name)}$", column))
+    return of_stem or (ending if len(ending) == 1 else ())
 
 
 def _named(columns: Sequence[str]) -> dict[str, str]:
@@ -48,7 +49,3 @@ def _named(columns: Sequence[str]) -> dict[str, str]:
     count = Counter(plain)
     alone = {name: column for name, column in zip(plain, columns, strict=True) if count[name] == 1}
     return alone | {column: column for column in columns}
-
-
-def _only(names: Sequence[str]) -> tuple[str, ...]:
-    return tuple(names) if len(names) == 1 else ()

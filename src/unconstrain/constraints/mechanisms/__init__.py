@@ -2,3 +2,4 @@
 
 from .identify import identify as identify
 from .kinds import restored as restored
+from .track import winding as winding

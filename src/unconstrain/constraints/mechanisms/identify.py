@@ -17,7 +17,7 @@ from .forces import Witness, witnesses
 from .kinds import FLAT_KINDS, KINDS
 from .mechanism import Mechanism, on_one_side, small_length
 from .tied import TIED_KINDS
-from .track import Track, noise_by_differences
+from .track import Track, noise_by_differences, winding
 
 MOST_CERTAIN = 700.0
 """Logarithm of odds beyond which numbers end."""
@@ -98,12 +98,15 @@ class Identification(Shown):
     witnesses : list of Witness
         What forces say of the directions that the likeliest mechanism holds; empty if none were given.
     demonstrations : int
+    winding : bool
+        Whether they turn more on their way than free ones do.
     """
 
     candidates: tuple[Candidate, ...]
     effective_samples: float
     witnesses: list[Witness]
     demonstrations: int = 1
+    winding: bool = True
 
     @property
     def kind(self) -> str:
@@ -151,14 +154,17 @@ class Identification(Shown):
 
     @property
     def doubt(self) -> str:
-        """What the shape of a single stroke does not tell, in words; empty if there is nothing."""
+        """What a stroke by itself does not tell of its mechanism, in words; empty if there is nothing."""
         best, apart = self.candidates[0], "strokes from other starts would tell whether it is held"
-        if self.demonstrations > 1 or self.witnesses or best.free not in (1, len(self.mechanism.centre) - 1):
+        alone = self.demonstrations == len(best.mechanisms)
+        if not alone or self.witnesses or best.free not in (1, len(self.mechanism.centre) - 1):
             return ""
         if best.free == 1:
             return f"a policy that keeps to this path within a surface looks the same in one stroke; {apart}"
+        if not self.winding:
+            return f"free strokes keep to a {best.kind} of their own, too, where they turn as little as here; {apart}"
         circle = next((one for one in self.candidates if one.kind == "circle"), best)
-        if not circle.noise < NEAR * circle.mechanisms[0].radius or circle.free != 1:
+        if self.demonstrations > 1 or not circle.noise < NEAR * circle.mechanisms[0].radius or circle.free != 1:
             return ""
         radius, strays = (
             small_length(each, self.mechanism.unit) for each in (circle.mechanisms[0].radius, circle.noise)
@@ -224,7 +230,8 @@ def identify(
     said: list[Witness] = []
     if pushed is not None:
         said = witnesses(candidates[0].mechanisms, origin + scale * track.positions, pushed, track.groups)
-    return Identification(candidates, len(order) / time, said, len(track.demonstrations))
+    steps = [np.diff(one.positions, axis=0) for one in track.demonstrations]
+    return Identification(candidates, len(order) / time, said, len(steps), winding(steps))
 
 
 def _said(odds: float) -> str:

@@ -69,7 +69,7 @@ def shown(samples: Samples, policy: Array, variance: float, free: Array) -> Evid
         Probability that each sample was free.
     """
     noise = _noise(samples, variance)
-    time = _time(samples, policy, noise)
+    time = correlation_time(consistency_residuals(samples, policy, noise)[:, None], samples.groups)
     unit, parts = _residual(samples, policy, noise, time), parts_of(samples)
     seen = _seen(samples, parts, noise, time)
     consistent, as_free, free = [], [], _of_free_demonstrations(samples, free)
@@ -165,10 +165,6 @@ def _noise(samples: Samples, variance: float) -> float:
     """Variance of the noise on each coordinate, at least that of the least misfit."""
     found = min(variance, noise_by_differences(samples.actions, samples.groups))
     return max(found, LEAST_MISFIT**2 * samples.energy)
-
-
-def _time(samples: Samples, policy: Array, noise: float) -> float:
-    return correlation_time(consistency_residuals(samples, policy, noise)[:, None], samples.groups)
 
 
 def _residual(samples: Samples, policy: Array, noise: float, time: float) -> Array:

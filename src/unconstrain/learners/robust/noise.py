@@ -60,12 +60,8 @@ def noise_by_differences(actions: Array, groups: NDArray[np.intp]) -> float:
         return np.inf
     differences = sum(weight * actions[i : i + count] for i, weight in enumerate(weights))
     lengths = (np.asarray(differences)[same] ** 2).sum(axis=1)
-    return float(np.median(lengths) / _median_chi2(actions.shape[1]) / (weights**2).sum())
-
-
-def _median_chi2(freedom: int) -> float:
-    """The median of a χ² distribution; ``scipy.stats`` takes long to import."""
-    return 2.0 * float(gammaincinv(0.5 * freedom, 0.5))
+    median = 2.0 * gammaincinv(0.5 * actions.shape[1], 0.5)  # of a χ² distribution; scipy.stats takes long to import
+    return float(np.median(lengths) / median / (weights**2).sum())
 
 
 def noise_of_each(actions: Array, labels: NDArray[np.intp], most: float, known: Array | None = None) -> Array:

@@ -38,9 +38,8 @@ def align(recordings: Sequence[Recording], name: str | None = None) -> Recording
     slowest = max(clocks, key=lambda clock: float(np.median(np.diff(clock))))
     times = slowest[(slowest >= start) & (slowest <= end)]
     if not times.size:
-        raise InvalidDataError(
-            f"{_listed(recordings)}: were not recorded at one time, the first ends before the last begins."
-        )
+        listed = ", ".join(f"'{recording.name}'" for recording in recordings)
+        raise InvalidDataError(f"{listed}: were not recorded at one time, the first ends before the last begins.")
     values = [_onto(times, clock, each.values) for clock, each in zip(clocks, recordings, strict=True)]
     return Recording(
         _columns(recordings),
@@ -83,7 +82,3 @@ def _columns(recordings: Sequence[Recording]) -> tuple[str, ...]:
         for recording in recordings
         for column in recording.columns
     )
-
-
-def _listed(recordings: Sequence[Recording]) -> str:
-    return ", ".join(f"'{recording.name}'" for recording in recordings)

@@ -48,9 +48,5 @@ def _place(name: str, states: tuple[str, ...]) -> int:
 
 def unturned(vectors: Array) -> Array:
     """Rotation vectors (T, 3), radians or degrees, as those of the same rotations closest to the row before."""
-    return continuous_rotations(vectors, _turn(np.linalg.norm(vectors, axis=1)))
-
-
-def _turn(angles: Array) -> float:
-    """One turn in the unit of some angles: degrees where their range is more than a turn in radians."""
-    return TURNS[0] if np.ptp(angles) <= 1.02 * TURNS[0] else TURNS[1]
+    in_degrees = bool(np.ptp(np.linalg.norm(vectors, axis=1)) > 1.02 * TURNS[0])
+    return continuous_rotations(vectors, TURNS[in_degrees])

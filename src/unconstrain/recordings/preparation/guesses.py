@@ -146,15 +146,12 @@ def _counterpart(
     """The family of the velocities of a family: called as it, but for one word."""
     for place, speed in words:
         stem = re.fullmatch(rf"(.*?[._/ ])?{re.escape(place)}", head, re.IGNORECASE)
-        other = None if stem is None else _find(f"{stem[1] or ''}{speed}", families)
+        wanted = "" if stem is None else f"{stem[1] or ''}{speed}".lower()
+        other = next((each for each in families if each.lower() == wanted), None)
         # A velocity has as many entries as what moves; an action may have fewer than an observation.
         if other is not None and (speed.startswith("action") or len(families[other]) == len(families[head])):
             return other
     return None
-
-
-def _find(head: str, families: Mapping[str, tuple[str, ...]]) -> str | None:
-    return next((each for each in families if each.lower() == head.lower()), None)
 
 
 def _places(columns: Sequence[str]) -> Mapping[str, tuple[str, ...]]:

@@ -402,15 +402,12 @@ def _repair(pieces: list[_Piece], recipe: Recipe, name: str) -> tuple[_Piece, li
             for piece, one in zip(pieces, found, strict=True)
         ]
     if recipe.action_is == "delta":
-        pieces = [_per_second(piece) for piece in pieces]
+        pieces = [
+            one._replace(actions=None if one.actions is None else one.actions / _typical(one.times)) for one in pieces
+        ]
     if recipe.rate is not None:
         pieces = [_resampled(piece, recipe.rate) for piece in pieces]
     return _joined(pieces), notes
-
-
-def _per_second(piece: _Piece) -> _Piece:
-    """Changes to the next sample as velocities."""
-    return piece._replace(actions=None if piece.actions is None else piece.actions / _typical(piece.times))
 
 
 def _about_window(recipe: Recipe, needed: int, interval: float) -> list[Remark]:

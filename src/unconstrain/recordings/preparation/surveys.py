@@ -102,7 +102,8 @@ def survey_set(recordings: Iterable[Recording], recipe: Recipe | None = None) ->
 
 def _with(each: Survey, added: tuple[Remark, ...]) -> Survey:
     notes = tuple(remark for remark in added if not remark.warns)
-    warnings = once((*each.warnings, *(remark for remark in added if remark.warns)))
+    told = {remark.code: remark for remark in added if remark.warns}  # others tell more of a clock
+    warnings = once(told.get(remark.code, remark) for remark in (*each.warnings, *told.values()))
     return replace(each, warnings=warnings, notes=each.notes + notes)
 
 

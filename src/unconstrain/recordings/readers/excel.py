@@ -41,11 +41,8 @@ def _sheets(path: Path) -> dict[str, list[str]]:
     """The rows of each sheet, as lines of text."""
     calamine = require_extra("python_calamine", "formats")
     book = calamine.load_workbook(io.BytesIO(path.read_bytes()))
-    return {title: [_line(row) for row in book.get_sheet_by_name(title).to_python()] for title in book.sheet_names}
-
-
-def _line(row: list[Any]) -> str:
-    return DELIMITER.join(_cell(cell) for cell in row)
+    tables = {title: book.get_sheet_by_name(title).to_python() for title in book.sheet_names}
+    return {title: [DELIMITER.join(map(_cell, row)) for row in rows] for title, rows in tables.items()}
 
 
 def _cell(cell: Any) -> str:

@@ -65,7 +65,8 @@ def _branch(node: Any, name: str, reading: Reading, masks: Mapping[str, list[str
     """A group with what is in it, as far as it may become columns."""
     members: dict[str, Any] = {}
     for title, child in visit.members(node).items():
-        if AFTER.fullmatch(title) or _is_picture(child):
+        picture = getattr(child, "ndim", 0) > 1 and child.dtype == np.uint8
+        if picture or AFTER.fullmatch(title):
             continue
         if hasattr(child, "keys"):
             below = _branch(child, child.name.strip("/"), reading, masks, visit)
@@ -78,10 +79,6 @@ def _branch(node: Any, name: str, reading: Reading, masks: Mapping[str, list[str
     # There the states are those of the simulator, not what the actions belong to.
     simulated = _DEMONSTRATION.search(node.name) is not None and find_clock(list(members)) is None
     return Branch(members, name, _attributes(node), tuple(masks.get(name.rpartition("/")[2], ())), not simulated)
-
-
-def _is_picture(child: Any) -> bool:
-    return getattr(child, "ndim", 0) > 1 and child.dtype == np.uint8
 
 
 def _in_one(members: Mapping[str, Any]) -> dict[str, Any]:

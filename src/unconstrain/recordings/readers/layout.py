@@ -177,7 +177,9 @@ def find_layout(lines: Sequence[str]) -> Layout | None:
 def find_block(rows: Rows, lines: Sequence[str], delimiter: str, decimal: str) -> tuple[float, Layout] | None:
     """The heaviest block of rows of one kind, and its weight; None if no number is there or none needs a comma."""
     runs = _runs(rows, decimal)
-    if not runs or (decimal == "," and (len(runs[0].kinds) < 2 or not _uses_comma(rows, runs[0]))):
+    if not runs or (
+        decimal == "," and (len(runs[0].kinds) < 2 or not any("," in cell for cell in rows[runs[0].first] or ()))
+    ):
         return None
     run, weight = max(((run, _weight(run, rows, decimal)) for run in runs), key=lambda pair: pair[1])
     first = _true_start(rows, run, decimal)
@@ -263,10 +265,6 @@ def read_list(cell: str) -> list[float] | None:
     """The numbers in a cell that holds a list; None if it holds anything else."""
     values = [number(part) for part in cell.strip("[]() ").replace(",", " ").split()]
     return None if None in values or not values else [value for value in values if value is not None]
-
-
-def _uses_comma(rows: Rows, run: _Run) -> bool:
-    return any("," in cell for cell in rows[run.first] or ())
 
 
 def _weight(run: _Run, rows: Rows, decimal: str) -> float:

@@ -154,7 +154,9 @@ def find_roles(names: Sequence[str], reading: Reading, path: Path) -> Roles:
             none = f" Give another, or group={NO_GROUP!r} where each file is one." if role == "group" else ""
             cure = meant([name], names) or none
             raise ReadError(f"{path}: no column {name!r} for {role}; it has {listed(names)}.{cure}")
-    group = reading.group or next((name for name in names if _names_group(name) and name != reading.time), None)
+    group = reading.group or next(
+        (name for name in names if name.lower() in GROUP_NAMES and name != reading.time), None
+    )
     group = group if group in names else None
     others = [name for name in names if name != group]
     clock = find_clock(others) if reading.time is None else _told_clock(others, reading.time)
@@ -341,10 +343,6 @@ def named_by(names: Sequence[str] | None, held: Sequence[str], path: Path) -> tu
             f"{path}: got {len(names)} names of columns ({listed(names)}), expected {len(held)}, one for each."
         )
     return tuple(names)
-
-
-def _names_group(name: str) -> bool:
-    return name.lower() in GROUP_NAMES
 
 
 def _told_clock(names: Sequence[str], time: str) -> ClockColumns:

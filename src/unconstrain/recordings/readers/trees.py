@@ -100,7 +100,8 @@ def tables_of(branch: Branch, path: Path, reading: Reading, rows: int | None = N
 
 def described(members: Mapping[str, Any]) -> str:
     """What is in a mapping, in a few words."""
-    return listed([f"{name} {_shape(member)}".strip() for name, member in members.items()]) or "nothing"
+    shapes = {name: getattr(one, "shape", type(one).__name__) for name, one in members.items()}
+    return listed([f"{name} {shape}" for name, shape in shapes.items()]) or "nothing"
 
 
 def _tables(branch: Branch, path: Path, rows: int | None, time: str | None) -> Iterator[Table]:
@@ -351,7 +352,3 @@ def _words(part: Any, name: str, path: Path) -> list[str]:
 
 def _under(branch: Branch, name: str) -> str:
     return "/".join(filter(None, (branch.name, name if name != UNNAMED else "")))
-
-
-def _shape(member: Any) -> str:
-    return str(tuple(member.shape)) if hasattr(member, "shape") else type(member).__name__

@@ -150,12 +150,9 @@ def _bursts(signal: Array) -> Iterator[tuple[int, int]]:
             yield start + 1, stop
     single = [start for start, stop in runs if stop - start == 1]
     for away, back in pairwise(single):
-        if back - away <= min(LONGEST_GLITCH, len(signal) // 5) and _returns(steps, away, back):
+        returns = abs(steps[away] + steps[back]) < 0.3 * abs(steps[away])
+        if returns and back - away <= min(LONGEST_GLITCH, len(signal) // 5):
             yield away + 1, back + 1
-
-
-def _returns(steps: Array, away: int, back: int) -> bool:
-    return bool(abs(steps[away] + steps[back]) < 0.3 * abs(steps[away]))
 
 
 def _far(sizes: Array) -> NDArray[np.bool_]:

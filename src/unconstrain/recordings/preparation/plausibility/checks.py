@@ -57,7 +57,8 @@ def clock_unit(subject: Subject) -> Remark | None:
         return None
     unit = next((unit for unit, seconds in UNITS.items() if seconds / max(rates) < 1.0 / SLOWEST), "ns")
     cure = f"such as time_unit={unit!r}" if max(rates) <= SLOWEST else "time_unit=, or the right column with time="
-    return Remark("clock-unit", f"{rates[0]:.3g} samples a second; say the unit of the time stamps, {cure}.")
+    said = f"{rates[0]:.3g} samples a second; if all are so, say the unit of the time stamps, {cure}."
+    return Remark("clock-unit", said)
 
 
 def clock_gap(subject: Subject) -> Remark | None:

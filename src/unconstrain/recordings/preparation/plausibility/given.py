@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...demonstration import Demonstration, Recording
-from ...remarks import Remark
 from ..recipes import Recipe
 from .checks import all_zero, reversed_in_time, targets
 from .sets import compare, outline
@@ -24,7 +23,8 @@ def doubts_about(demonstrations: Sequence[Demonstration]) -> dict[str, str]:
     subjects = [_subject(demo, f"{number}") for number, demo in enumerate(some)]
     first: dict[str, str] = {}
     for subject, beside in zip(subjects, compare([outline(one) for one in subjects]), strict=True):
-        for remark in (*_alone(subject), *beside):
+        alone = [check(subject) for check in (targets, reversed_in_time, all_zero)]
+        for remark in (*filter(None, alone), *beside):
             first.setdefault(remark.code, remark.about(subject.recording.title))
     return first
 
@@ -33,10 +33,6 @@ def _is_of_usual_size(demo: Demonstration) -> bool:
     """Whether squares of its numbers are more than nothing."""
     sizes = np.abs(np.hstack([demo.states, demo.actions]))
     return bool(sizes[sizes > 0].min(initial=1.0) > 1e-100)
-
-
-def _alone(subject: Subject) -> list[Remark]:
-    return [remark for check in (targets, reversed_in_time, all_zero) if (remark := check(subject)) is not None]
 
 
 def _subject(demo: Demonstration, number: str) -> Subject:

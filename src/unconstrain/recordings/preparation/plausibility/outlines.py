@@ -12,9 +12,11 @@ class Outline(NamedTuple):
     """A demonstration in a few numbers.
 
     ``extent`` and ``size`` (n,) of its states, which of them are ``noisy`` (n,), and some ``places`` with the ``steps``
-    made there (k, n).
+    made there (k, n); its ``title``, and the seconds between samples, NaN where not known.
     """
 
+    title: str
+    interval: float
     names: tuple[str, ...]
     extent: Array
     size: Array

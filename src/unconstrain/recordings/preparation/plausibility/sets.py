@@ -7,8 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ....base.arrays import Array
+from ....base.display import listed
 from ...remarks import Remark
 from ...signals.stillness import is_noise, noise_share
+from .checks import FASTEST, SLOWEST
 from .directions import turned_round
 from .outlines import Outline
 from .subject import Subject
@@ -26,8 +28,15 @@ UNLIKE = 25.0
 """Columns whose sizes differ by this factor are not in comparable units."""
 
 OTHER_UNIT, LEAST = 30.0, 8.0
-"""A demonstration larger or smaller than the others by the first factor in the median column, and by the second in all,
-is in other units."""
+"""Demonstrations larger or smaller than the others by the first factor in the median column, and by the second in all,
+are in other units."""
+
+TENFOLD, ABOUT = 10.0, 1.5
+"""So are several that are in the middle larger or smaller by the first factor, to within the second, and by half
+of it in all columns; of one alone that may be chance."""
+
+MOST_NAMED = 4
+"""Others that are named in a remark."""
 
 STILL = 0.01
 """A demonstration that covers less than this share of what the others cover is at rest."""
@@ -51,7 +60,10 @@ def outline(subject: Subject) -> Outline | None:
     states = subject.clean
     span = max(1, len(states) // POINTS)
     at = np.arange(0, len(states) - span, span)
+    intervals = np.diff(np.empty(0) if subject.stamps is None else subject.stamps)
     return Outline(
+        subject.recording.title,
+        float(np.median(intervals)) if intervals.size else np.nan,
         subject.recipe.states or (),
         np.ptp(states, axis=0),
         np.maximum(states.max(axis=0), -states.min(axis=0)),
@@ -74,7 +86,7 @@ def compare(outlines: Sequence[Outline | None]) -> list[tuple[Remark, ...]]:
     if known:
         several = [one for _, one in known]
         remarks[known[0][0]] += [*mixed_units(several), *different_places(several)]
-        for check in (unit_differs, smaller_than_others, reversed_among_others):
+        for check in (clock_differs, unit_differs, smaller_than_others, reversed_among_others):
             for place, remark in check(several):
                 remarks[known[place][0]].append(remark)
     return [tuple(each) for each in remarks]
@@ -135,40 +147,69 @@ def different_places(outlines: Sequence[Outline]) -> list[Remark]:
     return [Remark("places", f"demonstrations are farther apart than each is wide; {cure}.")]
 
 
+def clock_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
+    """Demonstrations with too few or too many samples a second for a movement, where others have as many as usual."""
+    rates = 1.0 / np.array([one.interval or np.nan for one in outlines])
+    odd = (rates <= SLOWEST) | (rates >= FASTEST)
+    usual = float(np.median(rates[~odd & np.isfinite(rates)])) if (~odd & np.isfinite(rates)).any() else np.nan
+    message = (
+        f"samples a second, and others have {usual:.3g}: the stamps are in another unit than theirs; convert them, "
+    )
+    message += "or leave it out with leave_out=."
+    found = np.flatnonzero(odd & np.isfinite(usual)).tolist()
+    return [(place, Remark("clock-unit", f"{rates[place]:.3g} {message}")) for place in found]
+
+
 def unit_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
-    """Demonstrations that are larger or smaller than the others by the factor of a unit, in place and in extent."""
+    """Demonstrations that are larger or smaller than more others by the factor of a unit, in place and in extent.
+
+    Where these are as many, all are named.
+    """
     if len(outlines) < FEWEST:
         return []
-    found = []
-    for place, factors in enumerate(_ratios(outlines)):
-        logs = np.log(factors)
-        if np.median(np.abs(logs)) > np.log(OTHER_UNIT) and np.abs(logs).min() > np.log(LEAST) and _one_sign(logs):
-            factor = float(np.exp(np.abs(logs).mean()))
-            message = (
-                f"is {factor:.3g} times {'larger' if logs[0] > 0 else 'smaller'} than the others, as in another unit; "
-                "convert it, or leave it out with leave_out=."
-            )
-            found.append((place, Remark("unit-differs", message, outlines[place].names[0])))
-    return found
+    few, most = _two_groups(outlines)
+    logs = np.array([_beside(outlines[place], [outlines[other] for other in most]) for place in few])
+    if not _are_of_a_unit(logs):
+        return []
+    factor, size = float(np.exp(np.nanmedian(np.abs(logs)))), "larger" if np.nanmedian(logs) > 0 else "smaller"
+    named = [listed([outlines[place].title for place in places], MOST_NAMED) for places in (few, most)]
+    than = f"{factor:.3g} times {size} than {named[1]}, as in another unit"
+    if len(few) == len(most):
+        said, places = f"{named[0]} are {than}, and as many: convert those that are wrong.", sorted([*few, *most])
+    else:
+        said, places = f"is {than}; convert it, or leave it out with leave_out=.", few
+    rest = unit_differs([outlines[place] for place in most]) if len(few) < len(most) else []
+    found = [(place, Remark("unit-differs", said, outlines[place].names[0])) for place in places]
+    return found + [(most[place], remark) for place, remark in rest]
 
 
-def _one_sign(values: Array) -> bool:
-    return bool((values > 0).all() or (values < 0).all())
+def _two_groups(outlines: Sequence[Outline]) -> list[list[int]]:
+    """Demonstrations on either side of the widest gap between their sizes, the fewer first, or the larger."""
+    sizes = np.array([np.median(np.sqrt(one.extent * one.size)) for one in outlines])
+    logs = np.log(np.where(sizes > 0, sizes, np.median(sizes) or 1.0))
+    order = np.argsort(logs, kind="stable")
+    at = int(np.diff(logs[order]).argmax()) + 1
+    return sorted([sorted(order[at:].tolist()), sorted(order[:at].tolist())], key=len)
 
 
-def _ratios(outlines: Sequence[Outline]) -> Array:
-    """Extent and size of each demonstration beside the median one, whichever is closer to 1, shape (D, n)."""
-    extents = _beside_median(np.array([one.extent for one in outlines]))
-    sizes = _beside_median(np.array([one.size for one in outlines]))
-    agree = (extents > 1) == (sizes > 1)
-    closer = np.where(np.abs(np.log(extents)) < np.abs(np.log(sizes)), extents, sizes)
-    return np.where(agree, closer, 1.0)
+def _beside(one: Outline, others: Sequence[Outline]) -> Array:
+    """Logarithms (n,) of extent or size over those of others, the smaller, 0 if they disagree, NaN where all rest."""
+    usual = [np.median([getattr(other, name) for other in others], axis=0) for name in ("extent", "size")]
+    known = (one.extent > 0) & (usual[0] > 0)
+    tables = zip((one.extent, one.size), usual, strict=True)
+    extents, sizes = (np.log(np.divide(own, its, out=np.ones_like(own), where=known)) for own, its in tables)
+    smaller = np.where(np.abs(extents) < np.abs(sizes), extents, sizes)
+    return np.where(known, np.where(extents * sizes > 0, smaller, 0.0), np.nan)
 
 
-def _beside_median(values: Array) -> Array:
-    usual = np.median(values, axis=0)
-    known = (usual > 0) & (values > 0)
-    return np.divide(values, usual, out=np.ones_like(values), where=known)
+def _are_of_a_unit(logs: Array) -> bool:
+    """Whether some demonstrations, beside others (K, n), are of another size as by a unit."""
+    if np.isnan(logs).all(axis=1).any() or not (np.nanmin(logs) > 0 or np.nanmax(logs) < 0):
+        return False
+    middle, least = np.nanmedian(np.abs(logs), axis=1), np.nanmin(np.abs(logs))
+    if len(logs) > 1 and abs(np.median(middle) - np.log(TENFOLD)) < np.log(ABOUT) and least > np.log(TENFOLD / 2):
+        return True
+    return bool(middle.min() > np.log(OTHER_UNIT) and least > np.log(LEAST))
 
 
 def smaller_than_others(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:

@@ -42,11 +42,6 @@ FLIPS = (
 )
 
 
-def _fresh(times: Array) -> NDArray[np.bool_]:
-    """Which stamps are not those of the row before."""
-    return np.concatenate([[True], np.diff(times) != 0])[: len(times)]
-
-
 @dataclass(frozen=True, eq=False)
 class Subject:
     """One recording as its recipe means it.
@@ -76,7 +71,7 @@ class Subject:
         if self.times is not None:
             finite &= np.isfinite(self.times)
         rows = np.flatnonzero(finite)
-        return rows if self.times is None else rows[_fresh(self.times[rows])]
+        return rows if self.times is None else rows[np.append(True, np.diff(self.times[rows]) != 0)[: len(rows)]]
 
     @cached_property
     def stamps(self) -> Array | None:
