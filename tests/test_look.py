@@ -164,10 +164,10 @@ def test_what_no_recording_tells_is_what_python_says(browser, tmp_path, policy):
     way = np.array([0.6, 0.0, 0.8])
     left = np.broadcast_to(np.eye(3) - np.outer(way, way), (len(states), 3, 3))
     for page in opened(browser, path):
-        for normal, projections in ((None, None), (way.tolist(), left)):
-            script = "return arguments[0].map((state) => untold.at(state, arguments[1]))"
-            found = page.execute_script(script, states.tolist(), normal)
-            expected = uc.evaluation.diagnosis.untold_at(policy, states, 1.0, projections)
+        for normal, projections, typical in ((None, None, 1.0), (way.tolist(), left, 0.5), (None, None, 1e-3)):
+            script = "return arguments[0].map((state) => untold.at(state, arguments[1], arguments[2]))"
+            found = page.execute_script(script, states.tolist(), normal, typical)
+            expected = uc.evaluation.diagnosis.untold_at(policy, states, typical, projections)
             assert_allclose(found, expected, rtol=1e-3)
             assert any(expected)
 

@@ -380,7 +380,7 @@
     const way = roll.plane ? normal() : null, weights = roll.times.map(lasting);
     const squares = roll.track.map((state) => learnt.policy(state).reduce((sum, each) => sum + each * each, 0));
     const mean = squares.reduce((sum, one, i) => sum + weights[i] * one, 0) / weights.reduce((sum, one) => sum + one, 0);
-    return roll.track.map((state) => (mean > 0 ? untold.at(state, way) / Math.sqrt(mean) : 0));
+    return roll.track.map((state) => (mean > 0 ? untold.at(state, way, Math.sqrt(mean)) : 0));
   }
 
   /** How long a roll-out stays at a state, the last as long as the one before. */

@@ -40,13 +40,13 @@ const untold = told && (() => {
     return { open, noise: Math.hypot(...rough.map((one) => Math.hypot(one, misfit))) };
   }
 
-  /** A standard deviation in all directions but one, in units of the action; zero where noise is more. */
-  function at(state, normal) {
+  /** A standard deviation in all directions but one, as a share of a typical action; zero where noise is more, but less than that. */
+  function at(state, normal, typical) {
     const found = spread(state);
     let variance = each.reduce((sum, a) => sum + found.open[a][a], 0);
     if (normal) for (const a of each) for (const b of each) variance -= normal[a] * found.open[a][b] * normal[b];
     const open = Math.sqrt(Math.max(variance, 0));
-    return open < found.noise ? 0 : open;
+    return open < found.noise && found.noise < typical ? 0 : open / typical;
   }
 
   return { at, small };
