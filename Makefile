@@ -64,6 +64,7 @@ $(BIN)/pip:
 	@echo "Creating the virtual environment $(VENV)"
 	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \
 		echo "Python could not create a virtual environment. On Debian: apt-get install python3-venv" >&2; exit 1; }
+	@$(PIP) --upgrade pip || true  # one of 2023 takes 50 s longer to find which versions go together
 
 $(USER_STAMP): pyproject.toml | $(BIN)/pip
 	@echo "Installing unconstrain, its plots and the physics engine into $(VENV)"

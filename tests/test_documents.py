@@ -65,7 +65,7 @@ def written(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(tmp_path_factory.mktemp("documents"))
         Path("wipes").mkdir()
-        turn = np.linspace(0, 12, 1200)
+        turn = np.linspace(0, 12, 600)
         for k in range(3):
             path = np.column_stack([turn, np.cos(turn), np.sin(turn), 0.1 * k * np.sin(turn + k)])
             header = "t,x,y,z"
