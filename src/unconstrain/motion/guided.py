@@ -34,8 +34,8 @@ _TOGETHER = 0.1
 
 
 _ROUND, _HALF, _LITTLE = 0.9, 0.5, 0.1
-"""Demonstrations of a cycle turn by so much of it, in their mean; parts of one (wiping in pieces: 0.2) by less than half
-and without rest at their ends; by so little nothing does."""
+"""Demonstrations of a cycle turn by so much of it, in their mean; parts of one (wiping in pieces: 0.2) by less than
+half, and without rest at their ends; by so little nothing does."""
 
 _SEVERAL = 3
 """So many that end at rest in as many places show no goal, whichever of them a policy rests at."""

@@ -246,7 +246,7 @@ def _branches(branch: Branch) -> Iterator[Branch]:
             yield member
         elif isinstance(member, Mapping):
             yield Branch(member, _under(branch, name), branch.attributes, branch.labels, branch.is_short)
-        elif _is_sequence(member):
+        elif isinstance(member, Sequence) and not isinstance(member, str | bytes):
             for number, each in enumerate(member, start=1):
                 inside = each if isinstance(each, Mapping) else {name: each}
                 yield Branch(inside, f"{_under(branch, name)}_{number}", branch.attributes, branch.labels)
@@ -334,10 +334,6 @@ def _rate(attributes: Mapping[str, Any]) -> float | None:
 
 def _is_array(member: Any) -> bool:
     return getattr(member, "ndim", 0) in (1, 2, 3) and member.dtype.kind in "fiubSU" and member.size > 1
-
-
-def _is_sequence(member: Any) -> bool:
-    return isinstance(member, Sequence) and not isinstance(member, str | bytes)
 
 
 def _words(part: Any, name: str, path: Path) -> list[str]:
