@@ -333,6 +333,26 @@ CROSSING = [stroke((-1, 0), (1, 0), 0, "by"), stroke((0, -1), (0, 0), 40, "held"
 TO_A_GOAL = [stroke(start, (0, 0), 40, "to") for start in ((1, 0), (0, 1), (-1, 0), (0, -1))]
 
 
+@pytest.mark.parametrize("model", [uc.ParametricPolicy(uc.Affine()), uc.LocallyLinearPolicy()], ids=["affine", "local"])
+def test_regions_that_all_recordings_tell_are_not_doubted_for_being_shown_by_few(model):
+    demos, truth = [], np.array([[-1.0, -0.8, 0.0], [0.6, -1.4, 0.1], [0.0, 0.2, -1.1]])
+    rng = np.random.default_rng(0)
+    for _ in range(12):
+        start, plane = rng.uniform(-0.35, 0.35, 3), uc.constraints.Plane(rng.normal(size=3))
+        path = uc.rollout(lambda x: x @ truth.T, start, 125, 0.02, plane)
+        demos.append(replace(path, actions=path.actions + 1e-3 * rng.standard_normal((125, 3)), truth=None))
+    found, states = diagnose(policy := model.fit_demonstrations(demos), demos), uc.stack(demos).states
+    wanted = states @ truth.T
+    off = np.linalg.norm(policy(states) - wanted, axis=1) / np.sqrt((wanted**2).sum(axis=1).mean())
+    assert np.median(off) < 0.03  # the truth is known to a few hundredths
+    doubted = sum(region.together < verdicts.PARTLY for region in found.regions)
+    assert doubted < 0.3 * sum(len(region.shown_by) < 3 for region in found.regions)
+    said = verdicts.of_diagnosis(found)
+    assert said.doubt.startswith(f"{doubted} of {len(found.regions)} regions" if doubted else "States that nobody")
+    few = sum(region.together >= verdicts.PARTLY > region.determined for region in found.regions)
+    assert (f"{few} of {len(found.regions)} regions by one or two demonstrations alone" in said.trust) == (few > 0)
+
+
 @pytest.mark.parametrize(
     ("demos", "policy", "doubt", "advised"),
     [

@@ -326,6 +326,31 @@ def test_what_cannot_be_guided_to_is_said_by_the_option(commands, to, status, sa
     assert said in commands(*learn, "--guided", to, "-o", "HERE/none.npz", status=status)
 
 
+@pytest.mark.parametrize(
+    ("to", "until", "said"),
+    [
+        ("cycle", 100, "--guided: demonstrations make 0.0"),
+        ("auto", 100, "--guided: demonstrations end at rest, no two of them in one place; give it with --guided"),
+        ("auto", 14, "--guided: no demonstration ends at rest"),
+        ("0,0,0", 100, "--guided: got 3 values, expected 2"),
+    ],
+)
+def test_what_no_policy_can_be_guided_to_is_said_before_it_is_learnt(monkeypatch, tmp_path, to, until, said):
+    def learnt(*_):
+        raise AssertionError("was learnt first")
+
+    monkeypatch.setattr(uc.ParametricPolicy, "fit_batches", learnt)
+    times, way = np.linspace(0.0, 3.0, 100), np.array([1.0, 0.5])
+    for number in range(4):
+        states = np.array([0.0, 3.0 * number]) + way * (1.0 - np.exp(-2.0 * times))[:, None]
+        table = np.column_stack([times, states])[:until]
+        np.savetxt(tmp_path / f"s_{number}.csv", table, delimiter=",", header="t,x,y", comments="")
+    reading = "--state", "x,y", "--differentiate", "--model", "affine"
+    output = "-o", str(tmp_path / "p.npz")
+    ran = CliRunner().invoke(main, ["fit", str(tmp_path / "*.csv"), *reading, "--guided", to, *output])
+    assert (ran.exit_code, said in ran.output) == (2, True), ran.output
+
+
 def test_a_goal_is_where_the_policy_rests_most_though_planes_stop_others_near_it():
     planes = [Plane(each) for each in np.random.default_rng(6).normal(size=(4, 3))]
     starts = GOAL + 0.4 * np.random.default_rng(7).normal(size=(6, 3))

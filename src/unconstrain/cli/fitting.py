@@ -117,12 +117,18 @@ def guided(policy: uc.Policy, to: str | tuple[float, ...] | None, stream: uc.Str
     if to is None:
         return policy
     with of_option("--guided"):
-        goal, orbit = (None if isinstance(to, str) else to), ("shown" if to == "cycle" else None)
-        return uc.Guided(policy, goal, orbit, demonstrations=stream.beginning())
+        return uc.Guided(policy, *_aim(to), demonstrations=stream.beginning())
 
 
-def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None) -> None:
-    """Fit here, or on the cluster of a scheduler."""
+def _aim(to: str | tuple[float, ...]) -> tuple[Any, Literal["shown"] | None]:
+    return None if isinstance(to, str) else to, "shown" if to == "cycle" else None
+
+
+def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None, to: str | tuple[float, ...] | None) -> None:
+    """Fit here, or on the cluster of a scheduler; first see whether there is anything to guide it to."""
+    if to is not None:
+        with of_option("--guided"):
+            uc.Guided.goes_round(stream.beginning(), *_aim(to))
     if scheduler is None:
         policy.fit_batches(stream)
         return

@@ -87,8 +87,8 @@ class Region:
         Of the receptive field, in units of the state.
     samples : int
         Number of samples whose nearest field this is.
-    determined : float
-        Share of these samples at which the policy is determined.
+    determined, together : float
+        Share of these samples at which the policy is determined by whichever demonstrations are but two, and by all.
     spread : float
         Root-mean-square undetermined standard deviation over them, as a share of the typical action.
     state : tuple of float
@@ -106,6 +106,7 @@ class Region:
     centre: tuple[float, ...]
     samples: int
     determined: float
+    together: float
     spread: float
     state: tuple[float, ...]
     demonstration: str
@@ -247,6 +248,7 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
     known = untold_at(policy, states, typical) <= SMALL
     models, d, _ = solution.weights.shape
     free = solution.free if len(solution.free) == len(states) else None
+    together = belief.together if free is not None and len(belief.together) == len(states) else known
     return Diagnosis(
         method=solution.method,
         candidates={name: one.risk for name, one in belief.candidates.items()},
@@ -260,7 +262,7 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
         told_together=max(float(known.mean()), 0.0 if free is None else belief.told_together),
         free_share=solution.free_share,
         undecided_share=belief.undecided_share,
-        regions=_regions(policy, demos, undetermined, known, typical),
+        regions=_regions(policy, demos, undetermined, known, typical, known | together),
         movements=_movements(demos, undetermined, known, free),
         suspects=() if free is None else tuple(places_of(belief.suspects, zip(names_of(demos), demos, strict=True))),
         planes=len(planes_of(demos)),
@@ -328,7 +330,7 @@ def _typical(actions: Array, solution: Solution) -> float:
 
 
 def _regions(
-    policy: Policy, demos: list[Demonstration], undetermined: Array, known: NDArray[np.bool_], typical: float
+    policy: Policy, demos: list[Demonstration], undetermined: Array, known: Any, typical: float, together: Any
 ) -> tuple[Region, ...]:
     states, actions, groups = stack(demos)
     embedding = policy.training_.model.embedding
@@ -346,6 +348,7 @@ def _regions(
             _numbers(centre),
             len(rows),
             float(known[rows].mean()),
+            float(together[rows].mean()),
             float(np.sqrt((undetermined[rows] ** 2).mean())),
             _numbers(states[row]),
             names[groups[row]],

@@ -237,10 +237,11 @@ def of_forbidden(found: Verdict, share: float) -> Verdict:
 def of_diagnosis(found: Diagnosis) -> Verdict:
     """Judge whether recordings tell the unconstrained policy."""
     share, count = found.states_determined, len(found.movements)
-    alone = [region for region in found.regions if len(region.shown_by) < ENOUGH]
-    doubt = f"{len(alone)} of {len(found.regions)} regions, where fewer than {ENOUGH} demonstrations moved along what "
-    doubt += "is least known: free, or always held the same way, cannot be told there." if alone else ""
-    doubt = doubt if alone else "States that nobody came near."
+    open_ = [region for region in found.regions if region.together < PARTLY]
+    few = [region for region in found.regions if region.together >= PARTLY > region.determined]
+    doubt = f"{len(open_)} of {len(found.regions)} regions, where all recordings leave a direction open: free, or "
+    doubt = f"{doubt}always held the same way, cannot be told there." if open_ else "States that nobody came near."
+    hangs = f" {len(few)} of {len(found.regions)} regions by one or two demonstrations alone." if few else ""
     if count < ENOUGH:
         said = f"No verdict: {_count(count)}; whether they were free cannot be told from fewer than {ENOUGH}."
         return Verdict(Mark.DOUBTFUL, said, doubt=doubt, next=MORE)
@@ -259,6 +260,7 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
         mark = Mark.BAD if mark is Mark.BAD else Mark.DOUBTFUL
         said = f"{said[:-1]}, though noise is {found.noise_share:.0%} of a typical action."
     trust = "" if mark is Mark.BAD else f"The policy at these states, to about {found.noise_share:.0%} of noise."
+    trust = f"{trust}{hangs}".strip()
     if mark is not Mark.GOOD:
         doubt += " 'fit' and 'score' may still explain much: they judge a policy along the motion, this judges "
         doubt += "recordings across it."

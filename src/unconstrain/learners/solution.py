@@ -89,6 +89,8 @@ class Belief(Shown):
         Samples that look wrong and were left out, by their places among those given.
     told_together : float
         Share of samples at which all actions along themselves determine the policy, those of one or two demonstrations.
+    together : ndarray of bool, shape (N,)
+        Which samples these are; empty where not known.
     """
 
     noise: float
@@ -102,6 +104,7 @@ class Belief(Shown):
     undecided_share: float = 0.0
     suspects: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     told_together: float = 0.0
+    together: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
 
     def uncertainty(self, model: Model, states: Array) -> Uncertainty:
         """Posterior standard deviations of the prediction at N states.

@@ -33,8 +33,12 @@ _TOGETHER = 0.1
 """Demonstrations end in one place within this share of their extent."""
 
 
-_ROUND = 0.9
-"""Demonstrations of a cycle turn by so much of it, in their mean."""
+_ROUND, _HALF, _LITTLE = 0.9, 0.5, 0.1
+"""Demonstrations of a cycle turn by so much of it, in their mean; parts of one (wiping in pieces: 0.2) by less than
+half, and without rest at their ends; by so little nothing does."""
+
+_SEVERAL = 3
+"""So many that end at rest in as many places show no goal, whichever of them a policy rests at."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,10 +147,30 @@ class Guided(Exportable, Shown):
             return
         shown = _kept(policy) if demonstrations is None else demonstrations
         demos = [shown] if isinstance(shown, Demonstration) else list(shown)
-        wanted = _velocities(policy, stack(demos).states)
-        move_on = goal is None and 2 * sum(map(_rests, demos)) <= len(demos)
-        round_ = orbit is not None or (move_on and turns(demos) >= _ROUND)
-        self.aim_ = _encircled(demos, policy) if round_ else _descent(demos, wanted, goal, dt)
+        wanted, around = _velocities(policy, stack(demos).states), self.goes_round(demos, goal, orbit)
+        self.aim_ = _encircled(demos, policy) if around else _descent(demos, wanted, goal, dt)
+
+    @staticmethod
+    def goes_round(demos: Sequence[Demonstration], goal: ArrayLike | None = None, orbit: str | None = None) -> bool:
+        """Whether demonstrations show a cycle rather than a goal; a SettingError if they show neither to any policy."""
+        if goal is not None:
+            as_vector(goal, "goal", demos[0].states.shape[1])
+            return False
+        rests, around = list(map(_rests, demos)), turns(demos)
+        if orbit is not None and around < (_HALF if 2 * sum(rests) > len(demos) else _LITTLE):
+            raise SettingError(f"orbit: demonstrations make {around:.2f} turns in the mean, and no cycle is near them.")
+        if orbit is not None or (2 * sum(rests) <= len(demos) and around >= _ROUND):
+            return True
+        if not any(rests):
+            raise SettingError(
+                "goal: no demonstration ends at rest, and they do not go round either, so that none is found. Pass "
+                "goal=, or orbit='shown' for a cycle."
+            )
+        ends = np.array([demo.states[-1] for demo, still in zip(demos, rests, strict=True) if still])
+        apart = np.linalg.norm(ends[:, None] - ends, axis=2)[np.triu_indices(len(ends), 1)]
+        if len(ends) >= _SEVERAL and apart.min() > _TOGETHER * np.linalg.norm(np.ptp(stack(demos).states, axis=0)):
+            raise SettingError("goal: demonstrations end at rest, no two of them in one place; give it with goal=.")
+        return False
 
     @property
     def potential_(self) -> Potential:
@@ -301,11 +325,6 @@ def _found(demos: Sequence[Demonstration], wanted: Array) -> Array:
     rests = np.array([_rests(demo) for demo in demos])
     slow = rests & (left <= max(_STILL, 2.0 * float(left[rests].min(initial=1.0)))) & (left <= _AT_REST)
     ends = stack(demos).states[last[slow if slow.any() else rests]]
-    if not len(ends):
-        raise SettingError(
-            "goal: no demonstration ends at rest, and they do not go round either, so that none is found. Pass goal=, "
-            "or orbit='shown' for a cycle."
-        )
     extent = np.linalg.norm(np.ptp(stack(demos).states, axis=0))
     goal = np.mean(ends, axis=0)
     apart = max(float(np.linalg.norm(end - goal)) for end in ends)

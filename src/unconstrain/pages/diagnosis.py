@@ -121,7 +121,7 @@ def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> ht
             f"{one.along:.1%}",
             f"{one.spread:.1%}",
             f"{one.determined:.0%}",
-            _shown_by(one.shown_by),
+            {0: "none", 1: f"only {''.join(one.shown_by)}"}.get(len(one.shown_by), str(len(one.shown_by))),
             str(one.samples),
         ]
         for number, one in enumerate(shown, 1)
@@ -131,11 +131,6 @@ def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> ht
     header += ["spread\nalong it", "spread in\nthe region", "states\ndetermined", "moved\nalong it by", "samples"]
     note = html.words("diagnosis_next", shown=len(shown), every=len(found.regions))
     return html.table(header, rows, left=4, note=note)
-
-
-def _shown_by(names: Sequence[str]) -> str:
-    """How many demonstrations moved along a direction; of one, what it says cannot be told from what held it."""
-    return {0: "none", 1: f"only {''.join(names)}"}.get(len(names), str(len(names)))
 
 
 def _freedom(found: Diagnosis) -> html.Markup:

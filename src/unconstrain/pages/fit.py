@@ -12,6 +12,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.display import counted_off, innermost, listening
 from ..base.errors import InvalidDataError, SettingError
+from ..constraints import Plane
 from ..evaluation import diagnosis, ncpe, ninconsistency, nupe, verdicts
 from ..learners import named
 from ..motion import Guided, rollout
@@ -188,7 +189,7 @@ def _reproduced(policy: Policy | Guided, demos: list[Demonstration], names: Sequ
     normal = np.cos(tilt) * axes[:, 0] + np.sin(tilt) * axes[:, -1]
     step = float(np.median(np.diff(demo.times)))
     runs = {}
-    for key, held in (("roll-out, free", None), ("roll-out, new plane", lambda states, _: _rows(normal, states))):
+    for key, held in (("roll-out, free", None), ("roll-out, new plane", Plane(normal))):
         try:
             runs[key] = rollout(policy, demo.states[0], len(demo), step, held, least_support=0.0)
         except InvalidDataError:  # it runs away
@@ -197,10 +198,6 @@ def _reproduced(policy: Policy | Guided, demos: list[Demonstration], names: Sequ
     keys = ("observed", *runs)
     caption = html.words("fit_rollout", name=demo.name, seconds=f"{step * len(demo):.3g}", tilt=f"{TILT:g}", runs=runs)
     return [html.section("A new surface", html.picture("rollout", [picture], caption, keys=keys))]
-
-
-def _rows(normal: Array, states: Array) -> Array:
-    return np.broadcast_to(normal, (len(states), 1, len(normal)))
 
 
 def _field(policy: Policy | Guided, demos: list[Demonstration], names: Sequence[str]) -> object:

@@ -63,7 +63,8 @@ class Kept:
         """Both, this one first, as those of different demonstrations."""
         stride = max(self.stride, other.stride)
         mine, theirs = self._thinned(stride), other._thinned(stride)
-        both = replace(mine, batches=(*mine.batches, *theirs.batches), seen=_summed(self.seen, other.seen))
+        seen = {name: self.seen.get(name, 0) + other.seen.get(name, 0) for name in (*self.seen, *other.seen)}
+        both = replace(mine, batches=(*mine.batches, *theirs.batches), seen=seen)
         return both if both.most is None or both.size <= both.most else both._thinned(2 * stride)
 
     def _thinned(self, stride: int) -> Kept:
@@ -104,7 +105,3 @@ def _names(groups: Groups | None, count: int) -> tuple[list[Hashable], NDArray[n
         return [None], np.zeros(1, dtype=np.intp), np.zeros(count, dtype=np.intp)
     names, firsts, places = np.unique(np.asarray(groups), return_index=True, return_inverse=True)
     return names.tolist(), firsts, places
-
-
-def _summed(one: Mapping[Hashable, int], other: Mapping[Hashable, int]) -> dict[Hashable, int]:
-    return {name: one.get(name, 0) + other.get(name, 0) for name in (*one, *other)}

@@ -215,13 +215,14 @@ def _as_free_as_known(belief: Belief, everything: Samples, model: Model, togethe
     hidden = everything.groups.max() == 0 or hides_sphere(belief.noise**2, everything)
     of_all = replace(belief, undetermined=together).uncertainty(model, everything.states).undetermined
     little, told = (one < LITTLE_OPEN * np.sqrt(everything.energy) for one in (open_, np.linalg.norm(of_all, axis=1)))
-    known = ((open_ < noise) | little) & (not hidden)
+    known, told = ((open_ < noise) | little) & (not hidden), told & (everything.groups.max() >= LEFT_OUT)
     return replace(
         belief,
         free=np.where(known, belief.free, 0.5 * belief.free)[everything.places],
         free_share=float(counts @ (belief.free * known)),
         undecided_share=float(counts @ (belief.free * ~known)),
-        told_together=float(counts @ told) * bool(everything.groups.max() >= LEFT_OUT),
+        told_together=float(counts @ told),
+        together=told[everything.places],
     )
 
 

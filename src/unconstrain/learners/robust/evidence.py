@@ -68,7 +68,8 @@ def shown(samples: Samples, policy: Array, variance: float, free: Array) -> Evid
     free : ndarray, shape (N,)
         Probability that each sample was free.
     """
-    noise = _noise(samples, variance)
+    least = min(variance, noise_by_differences(samples.actions, samples.groups))
+    noise = max(least, LEAST_MISFIT**2 * samples.energy)  # variance on each coordinate
     time = correlation_time(consistency_residuals(samples, policy, noise)[:, None], samples.groups)
     unit, parts = _residual(samples, policy, noise, time), parts_of(samples)
     seen = _seen(samples, parts, noise, time)
@@ -159,12 +160,6 @@ def _seen(samples: Samples, parts: NDArray[np.intp], noise: float, time: float) 
     least = noise * (1.0 + EIGENVALUE_STANDARD_ERRORS * np.sqrt(2.0 * time * np.maximum(samples.sizes, 1.0)))
     bases = (surely(np.stack(squares)[:, model], float(at)) for model, at in enumerate(least))
     return np.stack([basis @ basis.T for basis in bases])
-
-
-def _noise(samples: Samples, variance: float) -> float:
-    """Variance of the noise on each coordinate, at least that of the least misfit."""
-    found = min(variance, noise_by_differences(samples.actions, samples.groups))
-    return max(found, LEAST_MISFIT**2 * samples.energy)
 
 
 def _residual(samples: Samples, policy: Array, noise: float, time: float) -> Array:

@@ -108,7 +108,7 @@ def _with(each: Survey, added: tuple[Remark, ...]) -> Survey:
 
 
 def _survey(subject: Subject, asked: Recipe) -> Survey:
-    recording = subject.recording
+    recording, acts = subject.recording, subject.recipe.actions
     times = stamps(recording, asked)
     known = np.empty(0) if times is None else times[np.isfinite(times)]
     gaps, remarks = find_gaps(known - known[:1], asked.max_gap_s), examine(subject)
@@ -125,7 +125,7 @@ def _survey(subject: Subject, asked: Recipe) -> Survey:
         gaps=gaps,
         non_increasing=() if times is None else tuple((np.flatnonzero(~(np.diff(times) > 0)) + 1).tolist()),
         missing={name: count for name, count in zip(recording.columns, bad_cells.tolist(), strict=True) if count},
-        zero_actions=_zero_actions(subject),
+        zero_actions=None if acts is None else int((recording.select(acts) == 0).all(axis=1).sum()),
         warnings=tuple(remark for remark in remarks if remark.warns),
         notes=tuple(remark for remark in remarks if not remark.warns),
         file=recording.file,
@@ -153,8 +153,3 @@ def _steady_intervals(times: Array, gaps: tuple[Gap, ...]) -> Array:
     intervals = np.diff(times)
     shortest_gap = min((gap.length for gap in gaps), default=np.inf)
     return intervals[(intervals > 0) & (intervals < shortest_gap)]
-
-
-def _zero_actions(subject: Subject) -> int | None:
-    actions = subject.recipe.actions
-    return None if actions is None else int((subject.recording.select(actions) == 0).all(axis=1).sum())

@@ -132,13 +132,10 @@ def expand(paths: PathLike | Iterable[PathLike]) -> list[Path]:
         If there is none.
     """
     listed = [Path(path) for path in ([paths] if isinstance(paths, (str, os.PathLike)) else paths)]
-    matched = [match for path in listed for match in (_matches(path) if not path.exists() else []) or [path]]
+    # A pattern may be absolute, which Path.glob refuses.
+    there = [[] if path.exists() else sorted(glob(str(path), recursive=True)) for path in listed]  # noqa: PTH207
+    matched = [Path(match) for path, found in zip(listed, there, strict=True) for match in found or [str(path)]]
     files = [file for path in matched for file in (files_in(path) if path.is_dir() else [path])]
     if not files:
         raise SettingError("got no file to read, expected at least one path.")
     return list(dict.fromkeys(files))
-
-
-def _matches(pattern: Path) -> list[Path]:
-    # A pattern may be absolute, which Path.glob refuses.
-    return [Path(match) for match in sorted(glob(str(pattern), recursive=True))]  # noqa: PTH207

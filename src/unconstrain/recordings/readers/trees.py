@@ -246,7 +246,7 @@ def _branches(branch: Branch) -> Iterator[Branch]:
             yield member
         elif isinstance(member, Mapping):
             yield Branch(member, _under(branch, name), branch.attributes, branch.labels, branch.is_short)
-        elif _is_sequence(member):
+        elif isinstance(member, Sequence) and not isinstance(member, str | bytes):
             for number, each in enumerate(member, start=1):
                 inside = each if isinstance(each, Mapping) else {name: each}
                 yield Branch(inside, f"{_under(branch, name)}_{number}", branch.attributes, branch.labels)
@@ -319,7 +319,8 @@ def _episodes(arrays: Mapping[str, Any]) -> dict[str, Any]:
 
 def _attributes(members: Mapping[str, Any]) -> dict[str, Any]:
     """Single numbers and words."""
-    single = {name: member.reshape(()).item() for name, member in members.items() if _is_single(member)}
+    arrays = {name: one for name, one in members.items() if isinstance(one, np.ndarray) and one.dtype.kind in "fiubU"}
+    single = {name: one.reshape(()).item() for name, one in arrays.items() if one.size == 1}
     return single | {name: member for name, member in members.items() if isinstance(member, str | int | float | bool)}
 
 
@@ -333,14 +334,6 @@ def _rate(attributes: Mapping[str, Any]) -> float | None:
 
 def _is_array(member: Any) -> bool:
     return getattr(member, "ndim", 0) in (1, 2, 3) and member.dtype.kind in "fiubSU" and member.size > 1
-
-
-def _is_single(member: Any) -> bool:
-    return getattr(member, "size", 0) == 1 and member.dtype.kind in "fiubU" and isinstance(member, np.ndarray)
-
-
-def _is_sequence(member: Any) -> bool:
-    return isinstance(member, Sequence) and not isinstance(member, str | bytes)
 
 
 def _words(part: Any, name: str, path: Path) -> list[str]:
