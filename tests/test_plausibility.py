@@ -227,6 +227,38 @@ def test_reaches_that_creep_under_noise_do_not_pause():
     assert not [found for _ in range(40) if (found := pauses(reach + 0.03 * rng.standard_normal(reach.shape)))]
 
 
+def begun_late(seconds, noise=2e-4, rate=50.0):
+    """A reach of three seconds, of least jerk, after standing still for some seconds."""
+    share = np.linspace(0.0, 1.0, int(3 * rate))[:, None]
+    reach = (10 * share**3 - 15 * share**4 + 6 * share**5) * [0.4, 0.2]
+    states = np.vstack([np.zeros((int(seconds * rate), 2)), reach])
+    return uc.Recording(
+        ("x", "y"),
+        states + noise * np.random.default_rng(0).standard_normal(states.shape),
+        np.arange(len(states)) / rate,
+        "late",
+    )
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3])
+def test_standing_still_before_the_start_is_told_in_seconds_with_what_trims_it(noise):
+    recipe = uc.Recipe(("x", "y"), differentiate="savgol")
+    [told] = [one for one in survey(begun_late(2.0, noise), recipe).notes if one.code == "rest"]
+    found = re.match(r"stands still for \d+ of 250 rows \((\S+) s\) before it starts, learnt as rest", told.message)
+    assert 1.9 < float(found[1]) < 2.5
+    assert "still=" in told.message
+    assert not survey(begun_late(0.0, noise), recipe).notes
+    assert not survey(begun_late(2.0, noise), replace(recipe, still=0.02)).notes
+
+
+def test_how_long_a_pause_lasts_is_told_in_seconds():
+    late = begun_late(0.0)
+    values = np.vstack([late.values[:75], np.repeat(late.values[75:76], 60, axis=0), late.values[75:]])
+    paused = uc.Recording(("x", "y"), values, np.arange(len(values)) / 50.0, "paused")
+    [told] = survey(paused, uc.Recipe(("x", "y"), differentiate="savgol")).warnings
+    assert re.match(r"stands still for \d+ of 210 rows \(1\.[12]\d* s\) in the middle; they are left out", told.message)
+
+
 def test_a_pause_is_found_where_the_movement_after_it_creeps():
     for number, held in enumerate(swings(5)[1]):  # behind two of these planes hardly anything moves after the pause
         [(start, stop)] = pauses(held.values)

@@ -22,7 +22,7 @@ import json
 import os
 import warnings
 import zipfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -193,9 +193,9 @@ def load(path: str | os.PathLike[str], kind: type[Any] = Policy) -> Any:
             raise ModelFileError(f"{path}: holds a {_WORDS.get(held, held.__name__)}, expected a {wanted}.{use}")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # states have no names here
-            _check_finite(
-                each for known, tried in _TRIED.items() if isinstance(policy, known) for each in tried(policy)
-            )
+            said = [each for known, tried in _TRIED.items() if isinstance(policy, known) for each in tried(policy)]
+            if not all(np.isfinite(each).all() for each in said):
+                raise ValueError("what it says is not finite")
     return policy
 
 
@@ -217,11 +217,6 @@ def _tried_constraint(constraint: LearntConstraint) -> list[Any]:
         return []
     place = np.ones((1, constraint.choice_.columns))
     return [constraint.projection(place).reshape(1, constraint.choice_.actions, constraint.choice_.actions)]
-
-
-def _check_finite(found: Iterable[Any]) -> None:
-    if not all(np.isfinite(each).all() for each in found):
-        raise ValueError("what it says is not finite")
 
 
 _TRIED: dict[type, Callable[[Any], list[Any]]] = {

@@ -308,7 +308,7 @@ class Named(NamedTuple):
 def mechanism_of(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe, first: uc.Recording) -> Named | None:
     """Which mechanism may have held positions; None where these are none, or too little was recorded."""
     names = recipe.states or ()
-    if not _are_positions(recipe):
+    if recipe.actions is not None or len(names) not in (2, 3) or recipe.space != uc.spaces.Euclidean(len(names)):
         return None
     positions, actions, groups = uc.stack(demonstrations)
     speeds = (actions**2).sum(axis=1) ** 0.5
@@ -334,12 +334,6 @@ def _unit_of(units: Sequence[str]) -> str:
             f"the columns are in {listed(units)}, expected one unit of length: these are no positions."
         )
     return unit
-
-
-def _are_positions(recipe: uc.Recipe) -> bool:
-    """Whether two or three states may be positions: their velocity is what is learnt from."""
-    count = len(recipe.states or ())
-    return recipe.actions is None and count in (2, 3) and recipe.space == uc.spaces.Euclidean(count)
 
 
 def _say(learnt: Mapping[str, uc.LearntConstraint], what: str, named: Named | None) -> None:

@@ -31,10 +31,6 @@ def _of_the_system(error: OSError) -> str:
     return f"{os.fsdecode(error.filename)}: {error.strerror}." if error.filename and error.strerror else str(error)
 
 
-def _interrupted(error: KeyboardInterrupt) -> str:
-    return f"interrupted. {error if error.args else _NOTHING}"
-
-
 def _of_memory(error: MemoryError) -> str:
     detail = f" ({error})" if str(error) else ""
     return (
@@ -56,7 +52,7 @@ def _fault(error: Exception) -> str:
 
 _ENDINGS: tuple[tuple[type[BaseException], Callable[[Any], str], int], ...] = (
     (UnconstrainError, str, REFUSED),
-    (KeyboardInterrupt, _interrupted, INTERRUPTED),
+    (KeyboardInterrupt, lambda error: f"interrupted. {error if error.args else _NOTHING}", INTERRUPTED),
     (MemoryError, _of_memory, REFUSED),
     (RecursionError, lambda _: "something that was read is nested too deeply.", REFUSED),
     (OSError, _of_the_system, REFUSED),

@@ -149,11 +149,11 @@ def _seen(paths: Sequence[str | Path], reading: dict[str, Any]) -> Seen:
 def _page(seen: Seen, surveys: Sequence[Any], verdict: uc.evaluation.verdicts.Verdict) -> str:
     from ..pages.look import look_page, marks_of
 
-    found = zip(seen.recordings, surveys, seen.demonstrations, strict=True)
+    found, more = zip(seen.recordings, surveys, seen.demonstrations, strict=True), len(seen.paths) - 1
     return look_page(
         seen.demonstrations,
         seen.recipe.states or (),
-        _title(seen.paths),
+        f"A look at {Path(seen.paths[0]).name}{f' and {more} more' if more else ''}",
         units=seen.recordings[0].units,
         marks=[[one._replace(message=as_typed(one.message)) for one in marks_of(*each)] for each in found],
         command=_to_fit(seen.paths, seen.recipe, seen.roles),
@@ -228,12 +228,6 @@ def _show(scene: Any, rrd: str | None, live: bool, robot: str | None, port: int 
         click.echo(f"rerun: {rrd}")
     if live:
         serve(scene, robot, lambda address: click.echo(f"live: {address} (Ctrl-C ends it)"), port)
-
-
-def _title(paths: Sequence[str | Path]) -> str:
-    """What is looked at."""
-    more = len(paths) - 1
-    return f"A look at {Path(paths[0]).name}{f' and {more} more' if more else ''}"
 
 
 def _model(path: str | Path) -> Any:

@@ -71,7 +71,9 @@ def _candidate(name: str, samples: Samples, kinds: Kinds, jacobians: Array, nois
     """
     projections = kinds.projections(jacobians, samples.groups)
     ranks, known = np.trace(projections, axis1=1, axis2=2), (kinds.labels != UNKNOWN)[samples.groups]
-    size, free = np.full(len(samples), _size_of_policy(samples[known], ranks[known])), np.zeros_like(known)
+    held, d = samples[known], samples.actions.shape[1]  # of ‖π‖² constraints leave the share of their rank
+    size = np.full(len(samples), held.energy * d / max(held.mean(ranks[known]), 1.0))
+    free = np.zeros_like(known)
     folds = [samples.folds == fold for fold in range(int(samples.folds.max()) + 1)]
     for _ in range(ROUNDS_OF_KINDS):
         used = known | free
@@ -82,12 +84,6 @@ def _candidate(name: str, samples: Samples, kinds: Kinds, jacobians: Array, nois
         if (free == before).all():
             break
     return replace(found, softness=KNOWING)
-
-
-def _size_of_policy(samples: Samples, ranks: Array) -> float:
-    """Mean of ‖π‖², of which constraints leave the share of their rank."""
-    d = samples.actions.shape[1]
-    return samples.energy * d / max(samples.mean(ranks), 1.0)
 
 
 def _error(samples: Samples, used: NDArray[np.bool_], projections: Array, size: Array, noise: float) -> Quadratic:

@@ -35,15 +35,12 @@ def continuous(states: Array, recipe: Recipe) -> Array:
         return states
     smooth, known = states.copy(), recipe.states or ()
     for names, repair in groups:
-        columns = [_place(name, known) for name in names]
+        if strange := [name for name in names if name not in known]:
+            expected = f"expected one of the states {', '.join(known)}; add it to them."
+            raise SettingError(f"got {strange[0]!r} as an angle, {expected}")
+        columns = [known.index(name) for name in names]
         smooth[:, columns] = repair(smooth[:, columns])
     return smooth
-
-
-def _place(name: str, states: tuple[str, ...]) -> int:
-    if name not in states:
-        raise SettingError(f"got {name!r} as an angle, expected one of the states {', '.join(states)}; add it to them.")
-    return states.index(name)
 
 
 def unturned(vectors: Array) -> Array:

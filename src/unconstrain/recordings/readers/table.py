@@ -159,7 +159,10 @@ def find_roles(names: Sequence[str], reading: Reading, path: Path) -> Roles:
     )
     group = group if group in names else None
     others = [name for name in names if name != group]
-    clock = find_clock(others) if reading.time is None else _told_clock(others, reading.time)
+    clock = find_clock(others)
+    if reading.time is not None:
+        pair = find_pair([reading.time, *others])
+        clock = pair if pair is not None and pair.whole == reading.time else ClockColumns(reading.time)
     index = next((name for name in others if INDEX_NAME.fullmatch(name)), None)
     return Roles(group, clock, index)
 
@@ -343,11 +346,6 @@ def named_by(names: Sequence[str] | None, held: Sequence[str], path: Path) -> tu
             f"{path}: got {len(names)} names of columns ({listed(names)}), expected {len(held)}, one for each."
         )
     return tuple(names)
-
-
-def _told_clock(names: Sequence[str], time: str) -> ClockColumns:
-    pair = find_pair([time, *names])
-    return pair if pair is not None and pair.whole == time else ClockColumns(time)
 
 
 def _labels(table: Table, roles: Roles) -> tuple[str, int]:

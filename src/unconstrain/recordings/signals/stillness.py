@@ -19,6 +19,9 @@ LEFT = 0.05
 NOISE = 4.5
 """What moves by less than this many standard deviations of the noise stands still."""
 
+SET_OFF = 0.005
+"""Whoever sets off smoothly (least jerk) has made this share of the way after a twelfth of the time."""
+
 SHORTEST = 10
 """Samples that a pause has at least."""
 
@@ -65,6 +68,20 @@ def pauses(values: Array) -> list[tuple[int, int]]:
         return []
     shortest = int(max(SHORTEST, SHORTEST_SHARE * len(values)))
     return _slow(moving, shortest) or _motionless(moving, max(shortest, 2 * SHORTEST))
+
+
+def rest_before(values: Array) -> int:
+    """Rows (T, n) at the start in which nothing but noise moves, 0 where these are few or all, or noise is large."""
+    shortest, rows = int(max(2 * SHORTEST, SHORTEST_SHARE * len(values))), len(values)
+    if rows < 2 * shortest:
+        return 0
+    for column in np.flatnonzero(noise_share(values) < 0.3):  # one by one: a table beside it would be as large
+        one = values[:, [column]]
+        extent, near = float(np.ptp(one)), NOISE * float(_noise(one)[0])
+        off = np.abs(one[:, 0] - np.median(one[:shortest])) > max(near, SET_OFF * extent)
+        stays = near <= 2 * LEFT * extent and _stays(one[:shortest], np.array([max(near, SET_OFF * extent)]))
+        rows = min(rows, int((off[:-1] & off[1:]).argmax()) or rows) if stays else 0
+    return rows if shortest <= rows < len(values) else 0
 
 
 def _slow(values: Array, shortest: int) -> list[tuple[int, int]]:

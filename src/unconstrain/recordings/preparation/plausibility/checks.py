@@ -9,7 +9,7 @@ import numpy as np
 
 from ....base.arrays import Array
 from ...remarks import Remark
-from ...signals.stillness import is_noise, noise_share, pauses
+from ...signals.stillness import is_noise, noise_share, pauses, rest_before
 from ..meaning import are_backwards, are_targets
 from .subject import GAP_INTERVALS, LEAST_ROWS, Subject
 
@@ -218,8 +218,16 @@ def pause(subject: Subject) -> Remark | None:
         return None
     rows = sum(stop - start for start, stop in found)
     done = "left out (pauses='keep')" if subject.recipe.pauses == "drop" else "kept (pauses='drop')"
-    message = f"stands still for {rows} of {len(subject.rows)} rows in the middle; they are {done}."
+    message = f"stands still for {subject.lasting(rows)} in the middle; they are {done}."
     return Remark("pause", message, row=subject.row(found[0][0]))
+
+
+def rest(subject: Subject) -> Remark | None:
+    """Standing still before the start."""
+    if subject.recipe.still or not subject.moves or not (rows := rest_before(subject.clean)):
+        return None
+    said = f"stands still for {subject.lasting(rows)} before it starts, learnt as rest there; still= trims it."
+    return Remark("rest", said)
 
 
 def at_rest(subject: Subject) -> Remark | None:
@@ -260,6 +268,7 @@ CHECKS = (
     seam,
     targets,
     pause,
+    rest,
     at_rest,
     all_zero,
 )

@@ -102,16 +102,12 @@ def too_few(demonstrations: int) -> tuple[Remark, ...]:
 
 def doubts(demonstrations: int, missed: float) -> tuple[Remark, ...]:
     """Remarks on what was learnt from some demonstrations, by the share of their motion that it misses."""
-    return (*too_few(demonstrations), *_explains_nothing(missed))
-
-
-def _explains_nothing(missed: float) -> tuple[Remark, ...]:
-    """The remark on a policy that misses most of the motion that it learnt from, as a share; none where it does not."""
     message = (
         f"misses {min(missed, 1):.0%} of the motion that it learnt from; the actions may be no function of the state, "
         "as where a movement goes out and back or stands still. Look at the warnings of a survey, and at states=."
     )
-    return (Remark("explains-nothing", message),) if missed > MOST_MISSED else ()
+    nothing = (Remark("explains-nothing", message),) if missed > MOST_MISSED else ()
+    return (*too_few(demonstrations), *nothing)
 
 
 def mixed_units(outlines: Sequence[Outline]) -> list[Remark]:

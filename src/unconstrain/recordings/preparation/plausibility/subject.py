@@ -161,6 +161,11 @@ class Subject:
         intervals = np.diff(self.stamps)
         return [row for row in found if intervals[row - 1] <= GAP_INTERVALS * float(np.median(intervals))]
 
+    def lasting(self, rows: int) -> str:
+        """So many rows of all, in seconds, too, where these are known."""
+        seconds = "" if self.stamps is None else f" ({rows * float(np.median(np.diff(self.stamps))):.3g} s)"
+        return f"{rows} of {len(self.rows)} rows{seconds}"
+
     def row(self, index: int) -> int:
         """The row of the recording behind a row of :attr:`states`."""
         return int(self.rows[index])
