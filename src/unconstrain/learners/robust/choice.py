@@ -66,6 +66,7 @@ from .candidate import Candidate
 from .constants import (
     BEYOND_CHANCE,
     COMPARED_STATES,
+    FAR_MORE_CONSISTENT,
     LEAST_DEMONSTRATIONS,
     LEAST_MISFIT,
     MORE_CONSISTENT,
@@ -137,6 +138,12 @@ class Comparison:
         gaps = [_gaps(losses) for losses in (self._losses, self._corrected_losses)]
         kept = np.any([gap[1:, 0] <= REFUTED * error[1:, 0] for gap, error in gaps], axis=0)
         return [self._candidates[1 + k] for k in np.flatnonzero(kept).tolist()]
+
+    def refutes(self, one: str, other: str) -> bool:
+        """Whether a candidate is far more consistent than another where held out, and beyond chance."""
+        names = [each.name for each in self._candidates]
+        at, (gap, error), loss = (names.index(other), names.index(one)), _gaps(self._losses), self._losses.sum(axis=1)
+        return bool(gap[at] > REFUTED * error[at] and loss[at[0]] > FAR_MORE_CONSISTENT * loss[at[1]])
 
     @cached_property
     def risks(self) -> Array:

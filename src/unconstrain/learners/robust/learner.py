@@ -2,7 +2,7 @@
 
 import warnings
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal, Self
 
@@ -336,30 +336,33 @@ class Robust(_Maximising):
             What to learn from; about the first 50,000 samples of it are looked at.
         usual : str, optional
             Given where each model is finer than the one before: those after two that are worse are not tried. It is
-            taken where nothing can be held out.
+            taken where nothing can be held out, and before coarser ones that do not refute it: what they miss may be
+            the same for all, which no variance shows.
         """
         names = list(begun)
         if usual is not None and self.jacobian is not None:
             names = names[: names.index(usual) + 1]
         chosen, first = usual or names[0], list(Training.opening(seen))
-        best, views = dict[str, Candidate](), list[Samples]()
+        best, views = dict[str, Candidate](), dict[str, Samples]()
         for name in names:
             training = begun[name].keeping(Training.MOST_KEPT).with_batches(first)
-            views.append(held_out_together(training.samples.counted))
-            if _trivial(views[0]):
+            views[name] = held_out_together(training.samples.counted)
+            if _trivial(views[name]):
                 break
-            best[name] = replace(Robust().compared(views[-1], training).best, name=name, softness=0.0)
-            chosen = _of_least_risk(list(best.values()), views)
+            best[name] = replace(Robust().compared(views[name], training).best, name=name, softness=0.0)
+            if name == usual:
+                best = {one: best[one] for one in best if one == name or _compared(best, views).refutes(one, name)}
+            chosen = _compared(best, views).best.name
             if usual is not None and chosen not in list(best)[-2:]:
                 break
         return chosen
 
 
-def _of_least_risk(best: Sequence[Candidate], views: Sequence[Samples]) -> str:
-    """The name of the candidate of least risk, of those that were learnt each from its own view of the samples."""
-    any_ = views[0]
+def _compared(best: Mapping[str, Candidate], views: Mapping[str, Samples]) -> Comparison:
+    """Candidates by name, each learnt from its own view of the samples."""
+    each, any_ = [views[name] for name in best], next(iter(views.values()))
     noise = noise_of_each(any_.actions, any_.groups, _most_noise(any_), any_.noise)
-    return Comparison(best, np.minimum(noise, min(one.variance for one in best)), views).best.name
+    return Comparison(list(best.values()), np.minimum(noise, min(one.variance for one in best.values())), each)
 
 
 def _thinned(training: Training) -> tuple[str, ...]:
