@@ -324,6 +324,7 @@ RUNS = {
         "make bench BENCH='--full --only streaming --out results/full/bench.json'", "full/bench.json", bench
     ),
     "default_fit": Run("python benchmarks/default_fit.py --rows results/default_fit.json", "default_fit.json", bench),
+    "widths": Run("python benchmarks/widths.py --rows results/widths.json", "widths.json", bench),
     "limit_cycle": Run(
         "unconstrain reproduce regimes --only 'limit cycle, half' --trials 100 --out results/cycle",
         "cycle/regimes.json",
