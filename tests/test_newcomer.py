@@ -306,13 +306,15 @@ def test_a_movement_where_the_policy_is_not_determined_is_not_supported(folder, 
         write(tmp_path / f"{k}.csv", HEAD, stroke(0))
     run("fit", tmp_path, "-o", tmp_path.parent / "one_line.npz")
     start = ("--start", f"{x},{y}", "--steps", 5, "-o", tmp_path / "path.csv", "--force")
-    for plane, sign in (((along[1], -along[0]), "✔"), (along, "!")):
+    for plane, open_ in (((along[1], -along[0]), False), (along, True)):
         ran = call("rollout", tmp_path.parent / "one_line.npz", *start, "--plane", f"{plane[0]},{plane[1]}")
         assert ran.code == 0
-        assert ran.out.startswith(f"{sign} Near demonstrations")
-        assert ("they do not tell the policy" in text(ran)) == (sign == "!")
+        assert ran.out.startswith("! Near demonstrations")
+        assert ("they do not tell the policy" in text(ran)) == open_
+        assert "as 'fit' said, the policy explains 100% of held-out motion: good along the motion, but" in text(ran)
     one_line = tmp_path.parent / "one_line.npz"  # what all recordings together tell, as fit notes it, is no doubt
-    uc.save(uc.load(one_line), one_line, uc.storage.load_notes(one_line) | {informing.TOLD: 1.0})
+    noted = {informing.TOLD: 1.0, informing.MARK: "good"}
+    uc.save(uc.load(one_line), one_line, uc.storage.load_notes(one_line) | noted)
     assert run("rollout", one_line, *start, "--plane", f"{along[0]},{along[1]}").startswith("✔ Near demonstrations")
 
 

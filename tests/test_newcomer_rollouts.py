@@ -361,6 +361,14 @@ def test_a_fit_itself_says_how_its_policy_moves(folder, tmp_path):
     assert again["mark"] == "doubtful"
     assert "good. But run from the same starts: size 0.5 times." in again["said"]
     assert again["doubt"].startswith("Its movement over time.")
+    start, moved = oval(3)[0, 1:], ("--steps", 5, "-o", tmp_path / "out.csv", "--force")
+    start = "--start", ",".join(f"{one:.3f}" for one in start)
+    assert run("rollout", tmp_path / "q.npz", *start, *moved).startswith("! Near demonstrations for all 0.08 s: suppor")
+    said = " ".join(run("rollout", tmp_path / "q.npz", *start, *moved).split())
+    assert "But as 'fit' said, the policy's movement over time is in doubt: size 0.5 times. Next: Look" in said
+    for notes in ({}, doubted | {"verdict": "good"}):  # nobody has doubted it
+        uc.save(uc.load(folder / "same.npz"), tmp_path / "r.npz", notes)
+        assert run("rollout", tmp_path / "r.npz", *start, *moved).startswith("✔ Near demonstrations for all")
     run("export", tmp_path / "p.npz", "-o", tmp_path / "p.c")
     assert found["ran"] in " ".join((tmp_path / "p.h").read_text("utf-8").replace(" * ", " ").split())
 

@@ -135,18 +135,33 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
         found = uc.evaluation.verdicts.of_constraint(held, shown=notes.get(SHOWN), wound=notes.get(WOUND))
         named = notes.get(HELD_BY) and uc.constraints.mechanisms.restored(notes[HELD_BY])
         return uc.evaluation.verdicts.of_mechanism(found, held.rank_, named, sure=True) if named else found
-    policy = innermost(held)
-    if not hasattr(policy, "solution_"):
+    if not hasattr(innermost(held), "solution_"):
         mark = uc.evaluation.verdicts.Mark.BAD
         return uc.evaluation.verdicts.Verdict(mark, "Not fitted: it cannot predict.", next="unconstrain fit")
-    told = len(policy.training_.split.fold_of) or uc.evaluation.diagnosis.ENOUGH
-    shown = notes[TOLD] if isinstance(notes.get(TOLD), float) else None
-    found = uc.evaluation.verdicts.of_explained(policy.held_out_score(), told, shown)
+    found = _explained(held, notes)
     strays = found.mark is uc.evaluation.verdicts.Mark.GOOD and notes.get(MARK) == "doubtful"
     run, doubt = ("But run", f"Its movement over time. {found.doubt}") if strays else ("Run", found.doubt)
     ran = f" {run} from the same starts: {notes[RAN]}." if isinstance(notes.get(RAN), str) else ""
     mark = uc.evaluation.verdicts.Mark.DOUBTFUL if strays else found.mark
     return found._replace(mark=mark, said=found.said + ran, doubt=doubt)
+
+
+def _explained(held: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:
+    """How much a policy explains where held out, and whether recordings tell it."""
+    policy = innermost(held)
+    count = len(policy.training_.split.fold_of) or uc.evaluation.diagnosis.ENOUGH
+    shown = notes[TOLD] if isinstance(notes.get(TOLD), float) else None
+    return uc.evaluation.verdicts.of_explained(policy.held_out_score(), count, shown)
+
+
+def doubted(policy: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> str:
+    """What ``fit`` doubted of a policy, as the rest of a sentence; empty where it did not, or nobody noted it."""
+    if notes.get(MARK) not in ("doubtful", "bad"):
+        return ""
+    found, ran = _explained(policy, notes), notes.get(RAN)
+    if found.mark is not uc.evaluation.verdicts.Mark.GOOD:
+        return found.said[0].lower() + found.said[1:].rstrip(".")
+    return f"the policy's movement over time is in doubt{f': {ran}' if isinstance(ran, str) else ''}"
 
 
 def _said(value: Any) -> str:

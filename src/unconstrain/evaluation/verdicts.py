@@ -200,6 +200,12 @@ def of_told(found: Verdict, told: float | None) -> Verdict:
     return _doubted(found, "across the motion recordings tell the policy too little")
 
 
+def of_fit(found: Verdict, doubted: str) -> Verdict:
+    """Add to a verdict on a movement what ``fit`` doubted of its policy, the rest of a sentence, if anything."""
+    then = found.next or "Look at the policy beside its demonstrations ('unconstrain look')."
+    return _doubted(found, f"as 'fit' said, {doubted}")._replace(next=then) if doubted else found
+
+
 def _doubted(found: Verdict, how: str) -> Verdict:
     """Go on in a sentence that leaves a verdict no better than doubtful."""
     return found._replace(
