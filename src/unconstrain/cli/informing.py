@@ -13,7 +13,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import innermost
+from ..base.display import innermost, percent
 from .printing import models_of, print_table, say_verdict
 from .reading import loaded, reading_of
 
@@ -90,6 +90,8 @@ def info(file: str, as_json: bool) -> None:
         return
     say_verdict(verdict_of(held, notes))
     told |= {"holds": "a learnt constraint"} if isinstance(held, uc.LearntConstraint) else {}
+    if (share := told.pop(TOLD, None)) is not None:
+        told["told by all recordings"] = f"{percent(share)} of the recorded states"
     print_table(["", ""], [[name, _said(value)] for name, value in told.items() if value not in (None, [], {}, "")])
 
 
