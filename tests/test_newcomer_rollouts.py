@@ -158,6 +158,19 @@ def test_a_score_says_that_what_was_learnt_is_too_slow(folder):
     assert found["verdict"]["mark"] != "good"
 
 
+@pytest.mark.parametrize(
+    ("model", "advice"),
+    [("local", "another --model: 'auto' tries"), ("affine", "a --model that bends: 'local', or"), ("auto", None)],
+)
+def test_another_model_is_advised_unless_it_was_tried(folder, tmp_path, model, advice):
+    files = [folder / f"slow_{k}.csv" for k in range(10, 14)]
+    how = "--state", "x,y,z", "--differentiate", "--learner", "hybrid", "--model", model
+    run("fit", *files, *how, "-o", tmp_path / "p.npz")
+    said = " ".join(run("score", tmp_path / "p.npz", *sorted(folder.glob("held_*.csv"))).split())
+    assert "More demonstrations may come nearer. " in said
+    assert (f"So may {advice}" in said) if advice else ("So may" not in said and "--model" not in said)
+
+
 def test_a_roll_out_on_a_plane_says_that_the_plane_passes_through_the_start(folder, tmp_path):
     how = ("--start", "60,10,0", "--steps", 20, "-o", tmp_path / "path.csv", "--force")
     assert "passes through the start" in " ".join(run("rollout", folder / "same.npz", *how, "--plane", "0,0,1").split())

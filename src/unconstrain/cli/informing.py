@@ -121,7 +121,7 @@ def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "demonstrations": len(policy.training_.split.fold_of) or None,  # None where nobody told them apart
         "learnt from": sorted(str(name).partition("/")[2] or str(name) for name in policy.training_.split.fold_of),
-        "learner": type(policy.learner).__name__ if not isinstance(policy.learner, str) else policy.learner,
+        "learner": type(uc.learners.named(policy.learner)).__name__,
         "learnt as": solution.method,
         "learnt as, in words": uc.evaluation.diagnosis.in_words(solution.method) or None,
         "model": models_of(policy),
@@ -143,6 +143,7 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
     found = _explained(held, notes)
     strays = found.mark is uc.evaluation.verdicts.Mark.GOOD and notes.get(MARK) == "doubtful"
     run, doubt = ("But run", f"Its movement over time. {found.doubt}") if strays else ("Run", found.doubt)
+    doubt += "" if MARK in notes else " Its movement over time: not run from its starts yet; 'unconstrain score' does."
     ran = f" {run} from the same starts: {notes[RAN]}." if isinstance(notes.get(RAN), str) else ""
     mark = uc.evaluation.verdicts.Mark.DOUBTFUL if strays else found.mark
     return found._replace(mark=mark, said=found.said + ran, doubt=doubt)

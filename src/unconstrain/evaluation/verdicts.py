@@ -353,8 +353,8 @@ def of_support(support: Array, times: Array | None, unknown: Array | None = None
     middle, worst = float(np.median(unknown[open_])), seconds[int(np.where(open_, unknown, 0.0).argmax())]
     said = f"{none} Near some" if away.any() else "Near demonstrations"
     said += f", but {_part(open_, seconds)}, fewer than {ENOUGH} tell the policy in every direction: "
-    off = f"about {percent(middle)} of" if middle < 1 else "as much as"
-    said += f"there it may be off by {off} its typical action, most at {worst:.2f} s."
+    much = f"about {percent(middle)} of" if middle < 1 else "as much as"
+    said += f"there it may be off by {much} its typical action, most at {worst:.2f} s."
     doubt = f"Directions that fewer than {ENOUGH} demonstrations tell there."
     return Verdict(mark, said, trust, doubt, "'unconstrain diagnose' says what to record.")
 
@@ -412,8 +412,7 @@ def of_divergence(found: Verdict) -> Verdict:
 def _strays(found: Verdict, how: str, what: str) -> Verdict:
     return _doubted(found, how)._replace(
         doubt=f"Its {what} over time. {found.doubt}".rstrip(),
-        next="Look at it ('unconstrain look'). More demonstrations may come nearer, or another --model: 'auto' tries "
-        "several.",
+        next="Look at it ('unconstrain look'). More demonstrations may come nearer.",
     )
 
 
