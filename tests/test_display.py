@@ -8,6 +8,7 @@ from sklearn import config_context
 
 import unconstrain as uc
 from samples import draw, samples_of
+from unconstrain.base.display import percent
 from unconstrain.learners import Belief, Judged
 from unconstrain.risks import FoldedMoments, standard_risk
 
@@ -105,3 +106,10 @@ def test_a_policy_shows_its_settings_without_their_arrays():
     assert " ".join(repr(policy).split()) == (
         "ParametricPolicy(features=NormalisedRBF(25 centres in 2 dimensions, variance=0.25), learner='robust')"
     )
+
+
+def test_a_share_is_all_or_none_of_something_only_where_it_is():
+    shares = [0.0, 1e-12, 0.004, 0.006, 0.124, 0.994, 0.996, 1.0 - 1e-12, 1.0, 1.004, -0.004, -0.3]
+    said = ["0%", "0%", "<1%", "1%", "12%", "99%", ">99%", "100%", "100%", ">99%", "<1%", "-30%"]
+    assert [percent(share) for share in shares] == said
+    assert percent(float("nan")) == "nan%"

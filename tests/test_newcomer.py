@@ -306,13 +306,15 @@ def test_a_movement_where_the_policy_is_not_determined_is_not_supported(folder, 
         write(tmp_path / f"{k}.csv", HEAD, stroke(0))
     run("fit", tmp_path, "-o", tmp_path.parent / "one_line.npz")
     start = ("--start", f"{x},{y}", "--steps", 5, "-o", tmp_path / "path.csv", "--force")
-    for plane, sign in (((along[1], -along[0]), "✔"), (along, "!")):
+    for plane, open_ in (((along[1], -along[0]), False), (along, True)):
         ran = call("rollout", tmp_path.parent / "one_line.npz", *start, "--plane", f"{plane[0]},{plane[1]}")
         assert ran.code == 0
-        assert ran.out.startswith(f"{sign} Near demonstrations")
-        assert ("they do not tell the policy" in text(ran)) == (sign == "!")
+        assert ran.out.startswith("! Near demonstrations")
+        assert ("fewer than 3 tell the policy" in text(ran)) == open_
+        assert "as 'fit' said, the policy explains 100% of held-out motion: good along the motion, but" in text(ran)
     one_line = tmp_path.parent / "one_line.npz"  # what all recordings together tell, as fit notes it, is no doubt
-    uc.save(uc.load(one_line), one_line, uc.storage.load_notes(one_line) | {informing.TOLD: 1.0})
+    noted = {informing.TOLD: 1.0, informing.MARK: "good"}
+    uc.save(uc.load(one_line), one_line, uc.storage.load_notes(one_line) | noted)
     assert run("rollout", one_line, *start, "--plane", f"{along[0]},{along[1]}").startswith("✔ Near demonstrations")
 
 
@@ -585,13 +587,13 @@ def test_regions_of_a_diagnosis_are_one_number_each(folder):
     whole = json.loads(run("diagnose", folder, "--json", *report))
     told = whole["regions"]
     assert whole["verdict"]["next"].partition("'")[0] in html.unescape(report[1].read_text("utf-8"))
-    alone, open_ = sum(len(one["shown_by"]) < 3 for one in told), sum(one["determined"] < 1 for one in told)
-    doubted = sum(one["together"] < 0.7 for one in told)
-    assert f"Do not trust: {doubted} of {len(told)} regions, where all recordings leave a direction open" in said
-    where = (
-        f"of the states, in {open_} of {len(told)} regions; in {alone} regions fewer than 3 demonstrations moved along"
-    )
-    assert where in said
+    alone, doubted = sum(len(one["shown_by"]) < 3 for one in told), sum(one["together"] < 0.7 for one in told)
+    open_ = f"{doubted} of {len(told)} regions, where all recordings leave a direction open"
+    assert f"Do not trust: {open_ if doubted else 'States that nobody came near.'}" in said
+    left = f"{1 - whole['told_together']:.0%} of the states, {doubted} of {len(told)} regions"
+    assert (f"Not determined: {left}. Told by" in said) == (left != f"0% of the states, 0 of {len(told)} regions")
+    assert "Told by one or two demonstrations alone: " in said
+    assert f"regions; in {alone} regions fewer than 3 demonstrations moved along" in said
     assert "shown by: demonstrations that moved along 'leave free' in this region." in said
 
 

@@ -158,6 +158,19 @@ def test_a_score_says_that_what_was_learnt_is_too_slow(folder):
     assert found["verdict"]["mark"] != "good"
 
 
+@pytest.mark.parametrize(
+    ("model", "advice"),
+    [("local", "another --model: 'auto' tries"), ("affine", "a --model that bends: 'local', or"), ("auto", None)],
+)
+def test_another_model_is_advised_unless_it_was_tried(folder, tmp_path, model, advice):
+    files = [folder / f"slow_{k}.csv" for k in range(10, 14)]
+    how = "--state", "x,y,z", "--differentiate", "--learner", "hybrid", "--model", model
+    run("fit", *files, *how, "-o", tmp_path / "p.npz")
+    said = " ".join(run("score", tmp_path / "p.npz", *sorted(folder.glob("held_*.csv"))).split())
+    assert "More demonstrations may come nearer. " in said
+    assert (f"So may {advice}" in said) if advice else ("So may" not in said and "--model" not in said)
+
+
 def test_a_roll_out_on_a_plane_says_that_the_plane_passes_through_the_start(folder, tmp_path):
     how = ("--start", "60,10,0", "--steps", 20, "-o", tmp_path / "path.csv", "--force")
     assert "passes through the start" in " ".join(run("rollout", folder / "same.npz", *how, "--plane", "0,0,1").split())
@@ -361,6 +374,14 @@ def test_a_fit_itself_says_how_its_policy_moves(folder, tmp_path):
     assert again["mark"] == "doubtful"
     assert "good. But run from the same starts: size 0.5 times." in again["said"]
     assert again["doubt"].startswith("Its movement over time.")
+    start, moved = oval(3)[0, 1:], ("--steps", 5, "-o", tmp_path / "out.csv", "--force")
+    start = "--start", ",".join(f"{one:.3f}" for one in start)
+    assert run("rollout", tmp_path / "q.npz", *start, *moved).startswith("! Near demonstrations for all 0.08 s: suppor")
+    said = " ".join(run("rollout", tmp_path / "q.npz", *start, *moved).split())
+    assert "But as 'fit' said, the policy's movement over time is in doubt: size 0.5 times. Next: Look" in said
+    for notes in ({}, doubted | {"verdict": "good"}):  # nobody has doubted it
+        uc.save(uc.load(folder / "same.npz"), tmp_path / "r.npz", notes)
+        assert run("rollout", tmp_path / "r.npz", *start, *moved).startswith("✔ Near demonstrations for all")
     run("export", tmp_path / "p.npz", "-o", tmp_path / "p.c")
     assert found["ran"] in " ".join((tmp_path / "p.h").read_text("utf-8").replace(" * ", " ").split())
 

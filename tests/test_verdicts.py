@@ -142,6 +142,8 @@ class TestSupport:
         states, actions = (np.column_stack([a(turn), b(turn)]) for a, b in ((np.cos, np.sin), (np.sin, np.cos)))
         policy = uc.LocallyLinearPolicy(learner="direct").fit(states, actions * [-1.0, 1.0])
         uc.save(policy, tmp_path / "p.npz", {"determined share of states": 1.0})
+        said = " ".join(call("info", tmp_path / "p.npz").stdout.split())
+        assert "not run from its starts yet; 'unconstrain score' does" in said
         for start, sign in (("1,0", "✔ Near demonstrations for all"), ("0.1,0", "! No demonstration passes near for")):
             ran = call("rollout", tmp_path / "p.npz", "--start", start, "--steps", 20)
             assert ran.stderr.startswith(sign)

@@ -55,6 +55,12 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
+def percent(share: float) -> str:
+    """A share such as ``"12%"``; ``"<1%"`` and ``">99%"`` where rounding would say none or all of what is not."""
+    rounded, exact = f"{share:.0%}", not 1e-9 < share % 1.0 < 1.0 - 1e-9  # sums of weights are all to rounding
+    return rounded if exact else {"0%": "<1%", "-0%": "<1%", "100%": ">99%"}.get(rounded, rounded)
+
+
 def shortened(name: str, most: int = 40) -> str:
     """A name in quotes, its middle left out where it is long."""
     return repr(name if len(name) <= most else f"{name[: most // 2]}…{name[-most // 2 + 1 :]}")

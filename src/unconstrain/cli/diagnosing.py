@@ -11,7 +11,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import counted
+from ..base.display import counted, percent
 from ..base.files import write
 from .fitting import options_for_model, policy_of
 from .printing import explained, in_one_unit, option_for_json, print_table, refuse_warnings, say, say_scale, say_verdict
@@ -81,20 +81,21 @@ def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequenc
         click.echo(line)
     shown = found.regions[:most]
     click.echo(f"\nThe {len(shown)} regions of largest undetermined spread, of {len(found.regions)}, largest first:")
-    head = ["demonstrate around", "in", "samples", "determined", "spread", "leave free", "shown by"]
+    head = ["demonstrate around", "in", "samples", "told", "by three", "spread", "leave free", "shown by"]
     rows = [
-        [named(one.state, states), one.demonstration, str(one.samples), f"{one.determined:.0%}", f"{one.along:.1%}",
-         named(one.direction, actions), str(len(one.shown_by))]
+        [named(one.state, states), one.demonstration, str(one.samples), percent(one.together), percent(one.determined),
+         f"{one.along:.1%}", named(one.direction, actions), str(len(one.shown_by))]
         for one in shown
     ]  # fmt: skip
     print_table(head, rows)
-    click.echo("determined: share of the samples there at which three demonstrations or more tell the policy.")
-    click.echo("spread: how far it may be off at this one state, along 'leave free', as a share of a typical action.")
+    click.echo("told: share of the samples there at which all demonstrations together tell the policy.")
+    click.echo("by three: the same whichever two are left out, so that it hangs on no one or two.")
+    click.echo("spread: how far it may be off at this state without these two, along 'leave free'; 100% is typical.")
     click.echo("shown by: demonstrations that moved along 'leave free' in this region.")
     free = sorted(found.movements, key=lambda one: -(one.free or 0.0))
     click.echo("\nMean probability that a sample was free, of the freest and the most constrained demonstrations:")
     ends = free if len(free) <= MOST_ROWS else [*free[: MOST_ROWS // 2], *free[-MOST_ROWS // 2 :]]
     print_table(
-        ["demonstration", "samples", "free", "determined"],
-        [[one.name, str(one.samples), f"{one.free or 0.0:.0%}", f"{one.determined:.0%}"] for one in ends],
+        ["demonstration", "samples", "free", "by three"],
+        [[one.name, str(one.samples), percent(one.free or 0.0), percent(one.determined)] for one in ends],
     )

@@ -13,7 +13,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import innermost
+from ..base.display import innermost, percent
 from .printing import models_of, print_table, say_verdict
 from .reading import loaded, reading_of
 
@@ -90,6 +90,8 @@ def info(file: str, as_json: bool) -> None:
         return
     say_verdict(verdict_of(held, notes))
     told |= {"holds": "a learnt constraint"} if isinstance(held, uc.LearntConstraint) else {}
+    if (share := told.pop(TOLD, None)) is not None:
+        told["told by all recordings"] = f"{percent(share)} of the recorded states"
     print_table(["", ""], [[name, _said(value)] for name, value in told.items() if value not in (None, [], {}, "")])
 
 
@@ -119,7 +121,7 @@ def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "demonstrations": len(policy.training_.split.fold_of) or None,  # None where nobody told them apart
         "learnt from": sorted(str(name).partition("/")[2] or str(name) for name in policy.training_.split.fold_of),
-        "learner": type(policy.learner).__name__ if not isinstance(policy.learner, str) else policy.learner,
+        "learner": type(uc.learners.named(policy.learner)).__name__,
         "learnt as": solution.method,
         "learnt as, in words": uc.evaluation.diagnosis.in_words(solution.method) or None,
         "model": models_of(policy),
@@ -135,18 +137,34 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
         found = uc.evaluation.verdicts.of_constraint(held, shown=notes.get(SHOWN), wound=notes.get(WOUND))
         named = notes.get(HELD_BY) and uc.constraints.mechanisms.restored(notes[HELD_BY])
         return uc.evaluation.verdicts.of_mechanism(found, held.rank_, named, sure=True) if named else found
-    policy = innermost(held)
-    if not hasattr(policy, "solution_"):
+    if not hasattr(innermost(held), "solution_"):
         mark = uc.evaluation.verdicts.Mark.BAD
         return uc.evaluation.verdicts.Verdict(mark, "Not fitted: it cannot predict.", next="unconstrain fit")
-    told = len(policy.training_.split.fold_of) or uc.evaluation.diagnosis.ENOUGH
-    shown = notes[TOLD] if isinstance(notes.get(TOLD), float) else None
-    found = uc.evaluation.verdicts.of_explained(policy.held_out_score(), told, shown)
+    found = _explained(held, notes)
     strays = found.mark is uc.evaluation.verdicts.Mark.GOOD and notes.get(MARK) == "doubtful"
     run, doubt = ("But run", f"Its movement over time. {found.doubt}") if strays else ("Run", found.doubt)
+    doubt += "" if MARK in notes else " Its movement over time: not run from its starts yet; 'unconstrain score' does."
     ran = f" {run} from the same starts: {notes[RAN]}." if isinstance(notes.get(RAN), str) else ""
     mark = uc.evaluation.verdicts.Mark.DOUBTFUL if strays else found.mark
     return found._replace(mark=mark, said=found.said + ran, doubt=doubt)
+
+
+def _explained(held: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:
+    """How much a policy explains where held out, and whether recordings tell it."""
+    policy = innermost(held)
+    count = len(policy.training_.split.fold_of) or uc.evaluation.diagnosis.ENOUGH
+    shown = notes[TOLD] if isinstance(notes.get(TOLD), float) else None
+    return uc.evaluation.verdicts.of_explained(policy.held_out_score(), count, shown)
+
+
+def doubted(policy: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> str:
+    """What ``fit`` doubted of a policy, as the rest of a sentence; empty where it did not, or nobody noted it."""
+    if notes.get(MARK) not in ("doubtful", "bad"):
+        return ""
+    found, ran = _explained(policy, notes), notes.get(RAN)
+    if found.mark is not uc.evaluation.verdicts.Mark.GOOD:
+        return found.said[0].lower() + found.said[1:].rstrip(".")
+    return f"the policy's movement over time is in doubt{f': {ran}' if isinstance(ran, str) else ''}"
 
 
 def _said(value: Any) -> str:

@@ -175,7 +175,7 @@ def _about(seen: Seen) -> Iterator[str]:
             yield f"policy: learnt from {len(known) or 'none'} of these {counted(count, 'demonstration')}{named}."
         told = seen.notes.get(TOLD)
         open_ = "where recordings tell it is not known" if told is None else uc.evaluation.verdicts.of_untold(1 - told)
-        yield f"policy: {open_} ('unconstrain diagnose' says where)."
+        yield f"policy: {open_} ('unconstrain diagnose' says more)."
     if seen.constraint is not None and len(seen.held) < count:
         of = listed(seen.notes[OF], 4)
         drawn = "drawn there alone" if seen.held else "not drawn, as it is of none of these"

@@ -16,7 +16,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import bare, counted, innermost, listed
+from ..base.display import bare, counted, innermost, listed, percent
 from ..base.errors import InvalidDataError, SettingError
 from .endings import REFUSED, ending
 from .reading import next_command, said_recipe
@@ -261,7 +261,7 @@ def _say_determined(solution: uc.Solution, learner: str) -> None:
     if learner == "hybrid" and solution.determined_share < 1:
         rest = "; along the others the policy is as close to the recorded actions as can be."
     click.echo(
-        f"The inconsistency determined {solution.determined_share:.0%} of {solution.directions} weight directions"
+        f"The inconsistency determined {percent(solution.determined_share)} of {solution.directions} weight directions"
         + (" of each model" if len(solution.weights) > 1 else "")
         + rest
     )
@@ -296,10 +296,10 @@ def _said_of_samples(solution: uc.Solution, actions: Sequence[str]) -> str:
     units = {name[len(bare(name)) :].strip(" ()[]") for name in actions}
     where = f"{max(units)} on each action" if len(units) == 1 and max(units) else "on each action, in its unit"
     risks, share = {name: one.risk for name, one in solution.candidates.items()}, solution.believed.undecided_share
-    undecided = f" ({share:.0%} free or always held in the same way, which looks alike)" if share >= 0.01 else ""
+    undecided = f" ({percent(share)} free or always held in the same way, which looks alike)" if share >= 0.01 else ""
     return (
         f"{uc.evaluation.diagnosis.about_choice(solution.method, risks)} Noise and misfit are about "
-        f"{solution.noise:.3g} {where}, and {solution.free_share:.0%} of the samples were free, or "
+        f"{solution.noise:.3g} {where}, and {percent(solution.free_share)} of the samples were free, or "
         f"held by less than that{undecided}."
     )
 

@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,7 +18,7 @@ from ..base.display import counted, innermost
 from ..base.errors import DivergedError, InvalidDataError, SettingError, SupportEndsWarning
 from ..base.files import write
 from .constraining import held_of, options_for_held
-from .informing import TOLD
+from .informing import TOLD, doubted
 from .printing import of_option, option_for_json, say_verdict, say_written, show_warning
 from .reading import fitted_policy, numbers
 from .scoring import support_of
@@ -90,7 +90,7 @@ def rollout(
     path, why, trouble = _as_far_as_it_goes(moving, list(start), constraint=held, task=task, obstacles=round_, **how)
     named = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))
     kept = "the plane" if plane is not None else getattr(held, "title", "")
-    verdict = _supported(learnt, path, why, round_, kept, notes.get(TOLD))
+    verdict = _supported(moving, path, why, round_, kept, notes)
     accelerations = named.actions or tuple(f"a{name}" for name in (named.states or ())[:places])
     columns = ["t", *(named.states or ()), *(accelerations if how["order"] == 2 else named.directions)]
     if output != "-":
@@ -148,15 +148,15 @@ def _as_far_as_it_goes(policy: uc.Policy, start: list[float], **how: Any) -> tup
 
 
 def _supported(
-    policy: uc.Policy, path: Any, why: str, obstacles: Sequence[Any], held: str, told: float | None
+    moving: uc.Policy | uc.Guided, path: Any, why: str, obstacles: Sequence[Any], held: str, notes: Mapping[str, Any]
 ) -> uc.evaluation.verdicts.Verdict:
-    """How near data is along a movement, and whether it tells the policy, if not everywhere; and what ``held`` it."""
-    verdicts = uc.evaluation.verdicts
-    untold = None if (told or 0.0) >= verdicts.MOSTLY else uc.evaluation.diagnosis.untold(policy, path)
+    """How near data is along a movement, whether it tells the policy, what ``held`` it, and what ``fit`` doubted."""
+    verdicts, policy, told = uc.evaluation.verdicts, innermost(moving), notes.get(TOLD) or 0.0
+    untold = None if told >= verdicts.MOSTLY else uc.evaluation.diagnosis.untold(policy, path)
     found = verdicts.of_support(support_of(policy, path.states), path.times, untold)
     found = verdicts.of_early_end(found, why) if why else found
     passes = f" {held[:1].upper()}{held[1:]} passes through the start." if held else ""
-    found = found._replace(said=f"{found.said}{passes}")
+    found = verdicts.of_fit(found._replace(said=f"{found.said}{passes}"), doubted(moving, notes))
     if not obstacles:
         return found
     nearest = min((float(one(path.states)[0].min()), number) for number, one in enumerate(obstacles, start=1))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array, check_learnt
-from ..base.display import counted
+from ..base.display import counted, percent
 from ..base.errors import InvalidDataError
 from .evidence import Evidence, Kept
 from .forms import Form, Lifted
@@ -129,11 +129,11 @@ class Choice:
                 "noise, or nobody wanted to move along it."
             )
         if max(self.held_out, self.proportional) > DOUBTFUL:
-            faster = f", {self.proportional:.0%} where movements are fast" if self.proportional > DOUBTFUL else ""
+            faster = f", {percent(self.proportional)} where movements are fast" if self.proportional > DOUBTFUL else ""
             differs = ", or differs between demonstrations" if self.several else ""
             said.append(
-                f"Along the held directions moves {self.held_out:.0%} of a mean square action{faster}: noise, or the "
-                f"constraint is not quite of this form{differs}."
+                f"Along the held directions moves {percent(self.held_out)} of a mean square action{faster}: noise, or "
+                f"the constraint is not quite of this form{differs}."
             )
         return tuple(said)
 
@@ -269,12 +269,13 @@ def _check(best: _Trial, samples: int) -> None:
         )
     if share >= LOOSE:
         raise InvalidDataError(
-            f"no direction is held: along the best one that is a function of the state, {share:.0%} of a mean square "
-            "action moves where held out. The data is free, or constraints differ between demonstrations: fit each."
+            f"no direction is held: along the best one that is a function of the state, {percent(share)} of a mean "
+            "square action moves where held out. The data is free, or constraints differ between demonstrations: fit "
+            "each."
         )
     if rate >= PROPORTIONAL:
         raise InvalidDataError(
-            f"no function of the state holds this data: where held out, along the best directions moves {rate:.0%} of "
-            "the square of the free motion, and not noise alone. Constraints may differ between demonstrations: fit "
-            "each by itself, or name other features."
+            f"no function of the state holds this data: where held out, along the best directions moves "
+            f"{percent(rate)} of the square of the free motion, and not noise alone. Constraints may differ between "
+            "demonstrations: fit each by itself, or name other features."
         )

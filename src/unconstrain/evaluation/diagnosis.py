@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array, on_host
+from ..base.display import percent
 from ..base.errors import InvalidDataError, MissingBeliefError
 from ..base.files import stem
 from ..learners import Solution, robust
@@ -23,6 +24,7 @@ from .shown import named as named
 from .shown import names_of, planes_of
 from .verdicts import ENOUGH as ENOUGH
 from .verdicts import SMALL as SMALL
+from .verdicts import regions_left
 
 if TYPE_CHECKING:
     from ..policies import Policy
@@ -480,13 +482,16 @@ def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[st
     worst = found.regions[0]
     advice = (
         f"demonstrate around {named(worst.state, states)} with motion along {named(worst.direction, actions)} left "
-        f"free (standard deviation there: {worst.along:.0%} of a typical action; see '{worst.demonstration}')."
+        f"free (standard deviation there: {percent(worst.along)} of a typical action; see '{worst.demonstration}')."
     )
-    if not (count := sum(one.determined < 1.0 for one in found.regions)):
+    if all(one.determined == 1.0 for one in found.regions):
         return [f"Every recorded state is determined. If you record more: {advice}"]
-    where = f"Not determined at {1 - found.states_determined:.0%} of the states, in {count} of {len(found.regions)} "
-    where += f"regions; in {sum(len(one.shown_by) < ENOUGH for one in found.regions)} regions fewer than {ENOUGH} "
-    where += f"demonstrations moved along what is least known. {_least_shown(worst, states, actions)}"
+    told, every, (open_, few) = found.told_together, len(found.regions), regions_left(found)
+    left, hangs = percent(max(1.0 - told, 0.0)), percent(max(told - found.states_determined, 0.0))
+    where = "" if (left, open_) == ("0%", 0) else f"Not determined: {left} of the states, {open_} of {every} regions. "
+    where += f"Told by one or two demonstrations alone: {hangs} of the states, {few} of {every} regions; in "
+    where += f"{sum(len(one.shown_by) < ENOUGH for one in found.regions)} regions fewer than {ENOUGH} demonstrations "
+    where += f"moved along what is least known. {_least_shown(worst, states, actions)}"
     return [where, f"What would help most: {advice}"]
 
 
@@ -502,10 +507,10 @@ def _least_shown(region: Region, states: Sequence[str], actions: Sequence[str]) 
 
 
 def _about_freedom(found: Diagnosis) -> str:
-    said = f"Free, or held by less than the noise: about {found.free_share:.0%} of the samples"
+    said = f"Free, or held by less than the noise: {percent(found.free_share)} of the samples"
     if found.undecided_share >= LITTLE:
         said += (
-            f"; {found.undecided_share:.0%} were free or always held in the same way, which looks alike. "
+            f"; {percent(found.undecided_share)} were free or always held in the same way, which looks alike. "
             "Demonstrations held in another way would tell"
         )
     if found.free is None:

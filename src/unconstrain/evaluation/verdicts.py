@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
+from ..base.display import percent
 from ..models import SUPPORTED
 
 if TYPE_CHECKING:
@@ -107,12 +108,14 @@ def _graded(share: float, good: float = GOOD, fair: float = FAIR, told: float | 
 
 
 def _explains(share: float, what: str = "held-out motion") -> str:
-    return f"explains {share:.0%} of {what}" if share >= -1 else f"misses {what} by more than that motion itself"
+    return f"explains {percent(share)} of {what}" if share >= -1 else f"misses {what} by more than that motion itself"
 
 
 def of_untold(share: float) -> str:
-    """Say at which share of the recorded states the policy is not determined."""
-    return f"at {max(share, 0.0):.0%} of the recorded states no recording tells the policy in some direction"
+    """Say at which share of the recorded states all recordings together leave the policy open."""
+    if (said := percent(max(share, 0.0))) == "0%":
+        return "all recordings together tell the policy at every recorded state"
+    return f"at {said} of the recorded states no recording tells the policy in some direction"
 
 
 def of_explained(
@@ -133,7 +136,7 @@ def of_explained(
         few = f"{seen}no verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
         return Verdict(Mark.DOUBTFUL, few[0].upper() + few[1:], doubt=across, next=MORE)
     mark, word = _graded(share, told=determined)
-    missed = f"where the policy predicts, it misses about {np.sqrt(max(1 - share, 0)):.0%} of a typical action"
+    missed = f"where the policy predicts, it misses {percent(np.sqrt(max(1 - share, 0)))} of a typical action"
     advice = {
         "fair": "'unconstrain diagnose' says where it fails: by noise, which a wider --window takes out, or as "
         "demonstrations have little in common.",
@@ -141,7 +144,7 @@ def of_explained(
         "too little in common.",
     }.get(word, "Score it on recordings that were held in other ways.")
     if mark is Mark.BAD and learnt >= GOOD:
-        advice = f"It explains {learnt:.0%} of what it learnt from: demonstrations that are held out go where no other "
+        advice = f"It explains {percent(learnt)} of what it learnt from: demonstrations held out go where no other "
         advice += "does, or it is too flexible. Demonstrate between them, or try another --model."
     trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
     said = f"The policy {_explains(share)}: {word}."
@@ -158,7 +161,7 @@ def of_score(
     """
     mark, word = _graded(share, told=told) if under is None else _graded(min(share, under))
     few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
-    least = "nothing" if under is not None and under < -1 else f"{under or 0:.0%}"
+    least = "nothing" if under is not None and under < -1 else percent(under or 0)
     known = "" if under is None else f", and {least} under the constraint given (1 − nCPE)"
     counted = (
         "Movement under other constraints. Noise, and motion faster or slower than learnt, count as missed in nCPE."
@@ -200,6 +203,12 @@ def of_told(found: Verdict, told: float | None) -> Verdict:
     return _doubted(found, "across the motion recordings tell the policy too little")
 
 
+def of_fit(found: Verdict, doubted: str) -> Verdict:
+    """Add to a verdict on a movement what ``fit`` doubted of its policy, the rest of a sentence, if anything."""
+    then = found.next or "Look at the policy beside its demonstrations ('unconstrain look')."
+    return _doubted(found, f"as 'fit' said, {doubted}")._replace(next=then) if doubted else found
+
+
 def _doubted(found: Verdict, how: str) -> Verdict:
     """Go on in a sentence that leaves a verdict no better than doubtful."""
     return found._replace(
@@ -229,37 +238,42 @@ def of_units_apart(found: Verdict) -> Verdict:
 
 def of_forbidden(found: Verdict, share: float) -> Verdict:
     """Add to a score under a constraint that it would not allow some share of the recorded motion, nPOE, if much."""
-    said = f"The constraint given forbids {share:.0%} of this motion (nPOE): likely another held it. {found.said}"
+    said = f"The constraint given forbids {percent(share)} of this motion (nPOE): likely another held it. {found.said}"
     then = "Score without it, or give what held them ('unconstrain constraint' learns that)."
     return found if share <= FORBIDDEN else found._replace(mark=_no_better(found.mark), said=said, next=then)
 
 
+def regions_left(found: Diagnosis) -> tuple[int, int]:
+    """Of how many regions all recordings leave most open, and how many more hang on one or two demonstrations."""
+    open_ = sum(region.together < PARTLY for region in found.regions)
+    return open_, sum(region.together >= PARTLY > region.determined for region in found.regions)
+
+
 def of_diagnosis(found: Diagnosis) -> Verdict:
     """Judge whether recordings tell the unconstrained policy."""
-    share, count = found.states_determined, len(found.movements)
-    open_ = [region for region in found.regions if region.together < PARTLY]
-    few = [region for region in found.regions if region.together >= PARTLY > region.determined]
-    doubt = f"{len(open_)} of {len(found.regions)} regions, where all recordings leave a direction open: free, or "
+    share, count, (open_, few) = found.states_determined, len(found.movements), regions_left(found)
+    doubt = f"{open_} of {len(found.regions)} regions, where all recordings leave a direction open: free, or "
     doubt = f"{doubt}always held the same way, cannot be told there." if open_ else "States that nobody came near."
-    hangs = f" {len(few)} of {len(found.regions)} regions by one or two demonstrations alone." if few else ""
+    hangs = f" {few} of {len(found.regions)} regions by one or two demonstrations alone." if few else ""
     if count < ENOUGH:
         said = f"No verdict: {_count(count)}; whether they were free cannot be told from fewer than {ENOUGH}."
         return Verdict(Mark.DOUBTFUL, said, doubt=doubt, next=MORE)
     mark, word = _graded(share, MOSTLY, PARTLY)
     words = {"good": "enough", "fair": "enough in most places", "poor": "not enough"}
-    said = f"Recordings: at {share:.0%} of their states three demonstrations or more tell the policy: {words[word]}."
+    said = f"Recordings: at {percent(share)} of their states three demonstrations or more tell the policy: "
+    said += f"{words[word]}."
     if mark is Mark.BAD and found.told_together >= PARTLY:
         mark = Mark.DOUBTFUL
-        said = f"Recordings: all together tell the policy at {found.told_together:.0%} of their states, "
-        said += f"but at {share:.0%} whichever two are left out: it may hang on one or two."
+        said = f"Recordings: all together tell the policy at {percent(found.told_together)} of their states, "
+        said += f"but at {percent(share)} whichever two are left out: it may hang on one or two."
     elif found.planes == 1:
         said = f"{said[:-1]}, as all lie on one plane or on parallel ones."
     elif mark is Mark.BAD and found.planes:
         mark, said = Mark.DOUBTFUL, f"{said[:-1]} to be sure, though each lies on a plane of its own."
     if found.noise_share > 3 * SMALL:
         mark = Mark.BAD if mark is Mark.BAD else Mark.DOUBTFUL
-        said = f"{said[:-1]}, though noise is {found.noise_share:.0%} of a typical action."
-    trust = "" if mark is Mark.BAD else f"The policy at these states, to about {found.noise_share:.0%} of noise."
+        said = f"{said[:-1]}, though noise is {percent(found.noise_share)} of a typical action."
+    trust = "" if mark is Mark.BAD else f"The policy at these states, to {percent(found.noise_share)} of noise."
     trust = f"{trust}{hangs}".strip()
     if mark is not Mark.GOOD:
         doubt += " 'fit' and 'score' may still explain much: they judge a policy along the motion, this judges "
@@ -295,7 +309,7 @@ def of_constraint(
         held = f"At most {held}"
         apart += f" (in some up to {max(ranks)} look so, as does a direction in which nobody moved)"
     undecided = " Positions do not decide it." if shown is False else ""
-    said = f"{held}{apart}; {missed:.0%} of held-out motion is along them: {word}.{undecided}"
+    said = f"{held}{apart}; {percent(missed)} of held-out motion is along them: {word}.{undecided}"
     then = "Use it with 'unconstrain rollout --constraint' or 'score --constraint'."
     if (choice.doubts or len(ranks) > 1 or undecided) and mark is Mark.GOOD:
         mark = Mark.DOUBTFUL
@@ -338,14 +352,15 @@ def of_support(support: Array, times: Array | None, unknown: Array | None = None
         return Verdict(mark, none, trust, "Where none passes, and after it.", "Start nearer, or demonstrate there.")
     middle, worst = float(np.median(unknown[open_])), seconds[int(np.where(open_, unknown, 0.0).argmax())]
     said = f"{none} Near some" if away.any() else "Near demonstrations"
-    said += f", but {_part(open_, seconds)}, they do not tell the policy in every direction: there it may be off by "
-    said += f"{f'about {middle:.0%} of' if middle < 1 else 'as much as'} its typical action, most at {worst:.2f} s."
-    doubt = "Directions that are not determined there."
+    said += f", but {_part(open_, seconds)}, fewer than {ENOUGH} tell the policy in every direction: "
+    much = f"about {percent(middle)} of" if middle < 1 else "as much as"
+    said += f"there it may be off by {much} its typical action, most at {worst:.2f} s."
+    doubt = f"Directions that fewer than {ENOUGH} demonstrations tell there."
     return Verdict(mark, said, trust, doubt, "'unconstrain diagnose' says what to record.")
 
 
 def _part(where: NDArray[np.bool_], seconds: Array) -> str:
-    return f"{where.mean():.0%} of the time, first at {seconds[int(where.argmax())]:.2f} s"
+    return f"{percent(where.mean())} of the time, first at {seconds[int(where.argmax())]:.2f} s"
 
 
 def of_replays(found: Verdict, extents: Array, paces: Array, apart: str, lasts: Sequence[float] = ()) -> Verdict:
@@ -397,8 +412,7 @@ def of_divergence(found: Verdict) -> Verdict:
 def _strays(found: Verdict, how: str, what: str) -> Verdict:
     return _doubted(found, how)._replace(
         doubt=f"Its {what} over time. {found.doubt}".rstrip(),
-        next="Look at it ('unconstrain look'). More demonstrations may come nearer, or another --model: 'auto' tries "
-        "several.",
+        next="Look at it ('unconstrain look'). More demonstrations may come nearer.",
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array, check_learnt
-from ..base.display import Shown, counted
+from ..base.display import Shown, counted, percent
 from ..base.errors import MissingBeliefError
 
 if TYPE_CHECKING:
@@ -138,9 +138,9 @@ class Belief(Shown):
 
     def _summary(self) -> tuple[str, ...]:
         noise = f"noise={self.noise:.3g}", f"misfit={self.misfit:.3g}"
-        free = f"{self.free_share:.0%} of {counted(len(self.free), 'sample')} free"
-        unknown = (f"{self.undecided_share:.0%} free or always held alike",) if self.undecided_share >= 0.01 else ()
-        return *noise, free, *unknown
+        free = f"{percent(self.free_share)} of {counted(len(self.free), 'sample')} free"
+        unknown = f"{percent(self.undecided_share)} free or always held alike"
+        return *noise, free, *[unknown][: self.undecided_share >= 0.01]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -267,7 +267,7 @@ class Solution(Shown):
 
     def _summary(self) -> tuple[str, ...]:
         directions = counted(self.directions * len(self.determined), "direction")
-        every = f"{self.determined_share:.0%} of {directions} determined"
+        every = f"{percent(self.determined_share)} of {directions} determined"
         noise = () if self.belief is None else (f"noise={self.noise:.3g}",)
         return self.method or "no method named", counted(len(self.weights), "model"), every, *noise
 

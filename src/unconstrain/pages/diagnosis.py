@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.display import percent
 from ..base.errors import InvalidDataError
 from ..evaluation import Diagnosis, diagnose, diagnosis, verdicts
 from ..recordings import Demonstration, stack
@@ -75,10 +76,11 @@ def _tiles(found: Diagnosis, demos: list[Demonstration]) -> html.Markup:
         [
             (str(len(demos)), f"demonstrations, {len(found.undetermined)} samples"),
             (f"{found.noise_share:.1%}", "noise, of a typical action"),
-            (f"{found.states_determined:.0%}", "of the recorded states determined"),
-            (f"{found.directions_determined:.0%}", f"of {found.directions} weight directions determined"),
-            (f"{found.free_share:.0%}", "of the samples free"),
-            (f"{found.undecided_share:.0%}", "of the samples free or always held in the same way"),
+            (percent(found.told_together), "of the recorded states told by all together"),
+            (percent(found.states_determined), "by three demonstrations or more"),
+            (percent(found.directions_determined), f"of {found.directions} weight directions determined"),
+            (percent(found.free_share), "of the samples free"),
+            (percent(found.undecided_share), "of the samples free or always held in the same way"),
         ]
     )
 
@@ -120,7 +122,8 @@ def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> ht
             one.demonstration,
             f"{one.along:.1%}",
             f"{one.spread:.1%}",
-            f"{one.determined:.0%}",
+            percent(one.together),
+            percent(one.determined),
             {0: "none", 1: f"only {''.join(one.shown_by)}"}.get(len(one.shown_by), str(len(one.shown_by))),
             str(one.samples),
         ]
@@ -128,7 +131,8 @@ def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> ht
     ]
     around, along = (", ".join(names) for names in (states, actions))
     header = ["", f"demonstrate around\n({around})", f"with motion left free along\n({along})", "recorded in"]
-    header += ["spread\nalong it", "spread in\nthe region", "states\ndetermined", "moved\nalong it by", "samples"]
+    header += ["spread\nalong it", "spread in\nthe region", "told\nby all", "by three\nor more"]
+    header += ["moved\nalong it by", "samples"]
     note = html.words("diagnosis_next", shown=len(shown), every=len(found.regions))
     return html.table(header, rows, left=4, note=note)
 

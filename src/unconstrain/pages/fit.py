@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.display import counted_off, innermost, listening
+from ..base.display import counted_off, innermost, listening, percent
 from ..base.errors import InvalidDataError, SettingError
 from ..constraints import Plane
 from ..evaluation import diagnosis, ncpe, ninconsistency, nupe, verdicts
@@ -125,7 +125,7 @@ def _summary(policy: Policy, demos: list[Demonstration]) -> html.Markup:
             (str(len(demos)), "demonstrations"),
             (f"{sum(map(len, demos)):,}".replace(",", " "), "samples"),
             (shape, "local models × features" if models > 1 else "features"),
-            (f"{solution.determined_share:.0%}", f"of {models * d * p} weight directions determined"),
+            (percent(solution.determined_share), f"of {models * d * p} weight directions determined"),
             (html.number(_or_nan(ninconsistency, policy, demos)), "normalised inconsistency"),
         ]
     )

@@ -232,9 +232,11 @@ def _described(policy: Policy | Guided, columns: int) -> dict[str, Any]:
 
 
 def _told(policy: Policy) -> str:
-    """JavaScript object with what no recording tells of a policy's weights, and the features they are over; or null."""
+    """JavaScript object with what is not told of a policy's weights, and their features; true if all is; or null."""
     belief, centring = policy.solution_.belief, policy.training_.model.centring
     models, d, p = policy.solution_.weights.shape
+    if belief is not None and belief.told_together >= verdicts.MOSTLY:
+        return "true"
     if belief is None or policy.scale_ is not None or belief.undetermined.size > MOST_NUMBERS:
         return "null"
     of_features = copy(policy)

@@ -27,6 +27,11 @@ MOST, STEPS = 20, 1000
 
 GUIDE = "'unconstrain fit --guided auto' keeps it to the goal or the cycle that was shown, from anywhere."
 
+MODELS = {"auto": "", "Affine": "So may a --model that bends: 'local', or 'auto', which tries several."}
+"""What else may cure a policy of some features, by what they are called; of others :data:`ANOTHER`."""
+
+ANOTHER = "So may another --model: 'auto' tries several."
+
 ROUNDS = 1.5
 """Rounds, at least, of which the last is compared with the first."""
 
@@ -91,8 +96,12 @@ def replayed(
 
 def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Policy | Guided) -> verdicts.Verdict:
     """With what cures a policy that strays, unless it was tried."""
-    strays = judged.next != before.next
-    return judged._replace(next=f"{judged.next} {GUIDE}") if strays and innermost(policy) is policy else judged
+    if judged.next == before.next:
+        return judged
+    features = getattr(innermost(policy), "features", None)
+    model = MODELS.get(features if isinstance(features, str) else type(features).__name__, ANOTHER)
+    guide = GUIDE if innermost(policy) is policy else ""
+    return judged._replace(next=" ".join(filter(None, (judged.next, model, guide))))
 
 
 def replays(

@@ -462,7 +462,7 @@
   /** The same as the verdict of `unconstrain rollout`. */
   function howKnown() {
     const lasts = roll.times.map(lasting), sum = (values) => values.reduce((total, one) => total + one, 0);
-    const percent = (share) => `${Math.round(100 * share)} %`;
+    const percent = (share) => `${share > 0 && share < 0.005 ? "<1" : share < 1 && share >= 0.995 ? ">99" : Math.round(100 * share)} %`;
     const part = (is) => {
       const first = roll.track.findIndex((_, i) => is(i)), share = sum(lasts.filter((_, i) => is(i))) / sum(lasts);
       return first < 0 ? "" : `${percent(share)} of the time, first at ${number(roll.times[first])} s`;
@@ -473,7 +473,7 @@
     if (!open) return said || "All of it is near the data, and recordings tell the policy.";
     const every = roll.untold.filter((_, i) => isOpen(i)).sort((one, other) => one - other);
     const off = every[Math.floor(every.length / 2)];
-    return `${said ? `${said} Near some, ` : "Near demonstrations, but "}${open}, where it is grey, they do not tell the ` +
+    return `${said ? `${said} Near some, ` : "Near demonstrations, but "}${open}, where it is grey, fewer than 3 tell the ` +
       `policy in every direction: there it may be off by ${off < 1 ? `about ${percent(off)} of` : "as much as"} its typical action.`;
   }
 
