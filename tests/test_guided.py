@@ -14,7 +14,7 @@ from unconstrain.base.errors import InvalidDataError, ModelFileError, SettingErr
 from unconstrain.cli import main
 from unconstrain.constraints.known import Plane, SwitchingLine
 from unconstrain.motion.potential import descended, excess, steepest
-from unconstrain.paper.datasets.handwriting import load_handwriting
+from unconstrain.paper.datasets.handwriting import SHAPES, load_handwriting
 
 GOAL = np.array([0.3, -0.2, 0.1])
 STARTS = np.random.default_rng(3).uniform(-2, 2, (40, 3))
@@ -357,6 +357,32 @@ def test_a_goal_is_where_the_policy_rests_most_though_planes_stop_others_near_it
     held = [uc.rollout(spiral, start, 400, 0.05, plane) for start, plane in zip(starts[2:], planes, strict=True)]
     free = [uc.rollout(spiral, start, 400, 0.05) for start in starts[:2]]
     assert_allclose(uc.Guided(spiral, demonstrations=[*held, *free]).goal_, GOAL, atol=1e-3)
+
+
+def around(states):
+    """Goes round the unit circle, and falls onto it quickly."""
+    radius = np.linalg.norm(states, axis=1, keepdims=True)
+    return np.column_stack([-states[:, 1], states[:, 0]]) + 3.0 * (1.0 - radius) * states
+
+
+def test_strokes_that_slow_down_but_end_in_motion_and_apart_show_no_goal():
+    halves = uc.rollout(around, [[3.0, 0.0], [0.0, 1.2], [-0.9, 0.1], [0.1, -1.0]], 150, 0.02)
+    speed = np.linalg.norm(halves[0].actions, axis=1)
+    assert speed[-1] < 0.1 * speed.max()  # it began fast
+    said = r"goal: no demonstration ends at rest, nor where another does, and they make 0\.\d\d turns in the mean"
+    with pytest.raises(SettingError, match=said):
+        uc.Guided.goes_round(halves)
+    slowing = np.append(np.ones(110), np.zeros(40))[:, None]
+    stopped = uc.Demonstration(halves[0].states, slowing * halves[0].actions)
+    assert not uc.Guided.goes_round([stopped, *halves[1:]])
+
+
+@needs_data
+def test_all_that_was_written_shows_a_goal(monkeypatch):
+    from recorded import DATA
+
+    monkeypatch.setenv("UNCONSTRAIN_DATA", str(DATA))
+    assert not any(uc.Guided.goes_round(load_handwriting(shape)) for shape in SHAPES)
 
 
 def test_where_no_cycle_is_found_the_strokes_are_named_and_not_the_rows(monkeypatch):

@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import Any, Literal, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import Array, as_matrix, as_vector, check_at_least
 from ..base.display import Shown
@@ -24,7 +24,9 @@ from .orbit import Orbit, encircled, turns
 from .potential import PACE, Potential, descended
 
 _AT_REST = 0.3
-"""A demonstration ends at rest, or nearly, below this share of its fastest motion."""
+"""A demonstration ends at rest, or nearly, below this share of its fastest motion if all end in one place, as any of
+thirty shapes of handwriting does; else if its last tenth is below this share of its usual speed: half rounds end at 0.5
+of it or faster though one began at four times that, movements to a goal that plates held off it at 0.2 at most."""
 
 _STILL = 0.02
 """A policy rests where it wants less than this share of its fastest motion, or twice as much as where it rests most."""
@@ -156,15 +158,17 @@ class Guided(Exportable, Shown):
         if goal is not None:
             as_vector(goal, "goal", demos[0].states.shape[1])
             return False
-        rests, around = list(map(_rests, demos)), turns(demos)
+        rests, around = _resting(demos), turns(demos)
         if orbit is not None and around < (_HALF if 2 * sum(rests) > len(demos) else _LITTLE):
             raise SettingError(f"orbit: demonstrations make {around:.2f} turns in the mean, and no cycle is near them.")
         if orbit is not None or (2 * sum(rests) <= len(demos) and around >= _ROUND):
             return True
         if not any(rests):
+            where = "" if _apart(demos) <= _TOGETHER else ", nor where another does"
             raise SettingError(
-                "goal: no demonstration ends at rest, and they do not go round either, so that none is found. Pass "
-                "goal=, or orbit='shown' for a cycle."
+                f"goal: no demonstration ends at rest{where}, and they make {around:.2f} turns in the mean: neither a "
+                "goal nor a full round was shown. Record movements to their end, or all around; or pass goal=, or "
+                "orbit='shown' for a cycle."
             )
         ends = np.array([demo.states[-1] for demo, still in zip(demos, rests, strict=True) if still])
         apart = np.linalg.norm(ends[:, None] - ends, axis=2)[np.triu_indices(len(ends), 1)]
@@ -313,25 +317,38 @@ def _kept(policy: Any) -> list[Demonstration]:
     return [Demonstration(*pair) for pair in zip(np.split(states, ends), np.split(actions, ends), strict=True)]
 
 
-def _rests(demo: Demonstration) -> bool:
-    speed = np.linalg.norm(demo.actions, axis=1)
-    return bool(speed[-1] <= _AT_REST * speed.max())
+def _apart(demos: Sequence[Demonstration], places: Array | None = None) -> float:
+    """How far places, by default their ends, are from their mean, at most, as a share of demonstrations' extent."""
+    places = np.array([demo.states[-1] for demo in demos]) if places is None else places
+    far = np.linalg.norm(places - places.mean(axis=0), axis=1).max()
+    return float(far / (np.linalg.norm(np.ptp(stack(demos).states, axis=0)) or 1.0))
+
+
+def _resting(demos: Sequence[Demonstration]) -> NDArray[np.bool_]:
+    """Which demonstrations end at rest, (K,)."""
+    speeds = [np.linalg.norm(demo.actions, axis=1) for demo in demos]
+    if len(demos) > 1 and _apart(demos) <= _TOGETHER:
+        return np.array([speed[-1] <= _AT_REST * speed.max() for speed in speeds])
+    return np.array([np.median(one[-max(3, len(one) // 10) :]) <= _AT_REST * _usual(np.sort(one)) for one in speeds])
+
+
+def _usual(speeds: Array) -> float:
+    """Of sorted speeds that beyond which half of the way was made: neither a rest nor a fast start changes it much."""
+    return float(speeds[np.searchsorted(speeds.cumsum(), speeds.sum() / 2.0)])
 
 
 def _found(demos: Sequence[Demonstration], wanted: Array) -> Array:
     """Where demonstrations end at rest, (n,); those that end where the policy rests, too, if any do, were not held."""
     last = np.cumsum([len(demo) for demo in demos]) - 1
     left = np.linalg.norm(wanted[last], axis=1) / max(float(np.linalg.norm(wanted, axis=1).max()), 1e-300)
-    rests = np.array([_rests(demo) for demo in demos])
+    rests = _resting(demos)
     slow = rests & (left <= max(_STILL, 2.0 * float(left[rests].min(initial=1.0)))) & (left <= _AT_REST)
     ends = stack(demos).states[last[slow if slow.any() else rests]]
-    extent = np.linalg.norm(np.ptp(stack(demos).states, axis=0))
-    goal = np.mean(ends, axis=0)
-    apart = max(float(np.linalg.norm(end - goal)) for end in ends)
-    if apart > _TOGETHER * extent:
+    apart = _apart(demos, ends)
+    if apart > _TOGETHER:
         raise InvalidDataError(
-            f"goal: demonstrations end at rest in places up to {apart:.3g} from their mean, {apart / extent:.0%} of "
-            "their extent; expected one place; give it with goal=."
+            f"goal: demonstrations end at rest in places up to {apart:.0%} of their extent from the mean of these; "
+            "expected one place; give it with goal=."
         )
     if not slow.any():
         warnings.warn(
@@ -340,7 +357,7 @@ def _found(demos: Sequence[Demonstration], wanted: Array) -> Array:
             UserWarning,
             stacklevel=3,
         )
-    return np.asarray(goal)
+    return np.asarray(np.mean(ends, axis=0))
 
 
 STORED = (Descent, Guided, Moved, Orbit, Potential)
