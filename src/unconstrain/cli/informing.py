@@ -121,7 +121,7 @@ def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "demonstrations": len(policy.training_.split.fold_of) or None,  # None where nobody told them apart
         "learnt from": sorted(str(name).partition("/")[2] or str(name) for name in policy.training_.split.fold_of),
-        "learner": type(uc.learners.named(policy.learner)).__name__,
+        "learner": one if isinstance(one := policy.learner, str) else type(uc.learners.named(one)).__name__,
         "learnt as": solution.method,
         "learnt as, in words": uc.evaluation.diagnosis.in_words(solution.method) or None,
         "model": models_of(policy),
