@@ -178,7 +178,7 @@ class TestInfo:
 
     def test_a_policy_of_python_says_what_it_can(self, tmp_path):
         uc.save(uc.ParametricPolicy(uc.Affine(), "direct").fit([[0.0], [1.0]], [[0.0], [2.0]]), tmp_path / "p.npz")
-        assert self.told(tmp_path / "p.npz")["learner"] == "direct"
+        assert self.told(tmp_path / "p.npz")["learner"] == "Direct"
         uc.save(uc.ParametricPolicy(), tmp_path / "q.npz")
         assert call("info", tmp_path / "q.npz").stdout.startswith("✖ Not fitted: it cannot predict.")
 
