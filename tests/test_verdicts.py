@@ -205,6 +205,18 @@ def test_recordings_in_another_unit_are_called_so(folder, tmp_path, times, said)
     assert said in found["said"]
 
 
+def test_a_guided_policy_is_judged_by_what_guiding_leaves():
+    good, spoilt = (verdicts.of_explained(0.96, 5, learnt=0.99, lost=lost) for lost in (0.02, 0.1))
+    assert good.said == (
+        "The guided policy explains 94% of held-out motion (96% unguided, less 2% that guiding takes of what it learnt "
+        "from): good."
+    )
+    assert (good.mark, spoilt.mark) == (Mark.GOOD, Mark.DOUBTFUL)
+    assert "--guided" not in good.next
+    assert spoilt.next.startswith("Fit without --guided")
+    assert verdicts.of_explained(0.96, 2, lost=0.1).said.startswith("The guided policy explains 86% of held-out")
+
+
 def test_what_is_missed_by_more_than_all_is_said_in_words_with_a_cause():
     for found in (verdicts.of_explained(-2.4, 5), verdicts.of_score(-2.4, 5), verdicts.of_score(-9.0, 5, -9.0)):
         assert "misses held-out motion by more than that motion itself" in found.said
