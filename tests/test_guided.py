@@ -1,5 +1,6 @@
 """A policy that arrives, free and under any constraint."""
 
+import json
 import re
 
 import numpy as np
@@ -13,6 +14,7 @@ from recorded import needs_data
 from unconstrain.base.errors import InvalidDataError, ModelFileError, SettingError
 from unconstrain.cli import main
 from unconstrain.constraints.known import Plane, SwitchingLine
+from unconstrain.evaluation.verdicts import GOOD as WELL
 from unconstrain.motion.potential import descended, excess, steepest
 from unconstrain.paper.datasets.handwriting import SHAPES, load_handwriting
 
@@ -363,6 +365,37 @@ def around(states):
     """Goes round the unit circle, and falls onto it quickly."""
     radius = np.linalg.norm(states, axis=1, keepdims=True)
     return np.column_stack([-states[:, 1], states[:, 0]]) + 3.0 * (1.0 - radius) * states
+
+
+@pytest.mark.parametrize(
+    ("starts", "least", "most", "mark"),
+    [
+        ([[1.0, 0.0], [1.2, 0.0], [0.9, 0.0]], 0.0, 0.1, "good"),
+        ([[3.0, 0.0], [0.0, 1.2], [-0.9, 0.1], [0.1, -1.0]], 0.3, 9.0, "bad"),  # one comes from far, and fast
+    ],
+)
+def test_fit_and_info_judge_the_policy_as_it_is_guided(tmp_path, starts, least, most, mark):
+    for number, run in enumerate(uc.rollout(around, starts, 150, 0.02)):
+        table = np.column_stack([run.times, run.states, run.actions])
+        np.savetxt(tmp_path / f"{number}.csv", table, delimiter=",", header="t,x,y,vx,vy", comments="")
+
+    def told(*args):
+        ran = CliRunner().invoke(main, [*args, "--json"])
+        assert ran.exit_code == 0, ran.output
+        return json.loads(ran.stdout)
+
+    output = str(tmp_path / "p.npz")
+    learn = "fit", str(tmp_path / "*.csv"), "--variance", "0.1", "--learner", "direct", "--force", "-o", output
+    alone, found = told(*learn), told(*learn, "--guided", "cycle")
+    assert alone["held_out"] > WELL
+    assert least <= found["lost"] <= most
+    assert_allclose(alone["training"] - found["training"], found["lost"], atol=0.01)
+    assert_allclose(alone["held_out"] - found["held_out"], found["lost"])
+    known = told("info", output)
+    assert_allclose(known["explained held out"], found["held_out"], atol=1e-4)
+    for one in (found, known):
+        assert one["verdict"]["mark"] == mark
+        assert one["verdict"]["said"].startswith("The guided policy ")
 
 
 def test_strokes_that_slow_down_but_end_in_motion_and_apart_show_no_goal():

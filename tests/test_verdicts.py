@@ -178,7 +178,7 @@ class TestInfo:
 
     def test_a_policy_of_python_says_what_it_can(self, tmp_path):
         uc.save(uc.ParametricPolicy(uc.Affine(), "direct").fit([[0.0], [1.0]], [[0.0], [2.0]]), tmp_path / "p.npz")
-        assert self.told(tmp_path / "p.npz")["learner"] == "Direct"
+        assert self.told(tmp_path / "p.npz")["learner"] == "direct"
         uc.save(uc.ParametricPolicy(), tmp_path / "q.npz")
         assert call("info", tmp_path / "q.npz").stdout.startswith("✖ Not fitted: it cannot predict.")
 
@@ -205,6 +205,18 @@ def test_recordings_in_another_unit_are_called_so(folder, tmp_path, times, said)
     found = json.loads(call("score", folder / "p.npz", tmp_path / "a.csv", "--json").stdout)["verdict"]
     assert found["said"].startswith("Recordings are ") == bool(said)
     assert said in found["said"]
+
+
+def test_a_guided_policy_is_judged_by_what_guiding_leaves():
+    good, spoilt = (verdicts.of_explained(0.96, 5, learnt=0.99, lost=lost) for lost in (0.02, 0.1))
+    assert good.said == (
+        "The guided policy explains 94% of held-out motion (96% unguided, less 2% that guiding takes of what it learnt "
+        "from): good."
+    )
+    assert (good.mark, spoilt.mark) == (Mark.GOOD, Mark.DOUBTFUL)
+    assert "--guided" not in good.next
+    assert spoilt.next.startswith("Fit without --guided")
+    assert verdicts.of_explained(0.96, 2, lost=0.1).said.startswith("The guided policy explains 86% of held-out")
 
 
 def test_what_is_missed_by_more_than_all_is_said_in_words_with_a_cause():

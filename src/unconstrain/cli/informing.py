@@ -20,6 +20,9 @@ from .reading import loaded, reading_of
 TOLD = "determined share of states"
 """Note of the share of the recorded states at which recordings tell the policy in every direction."""
 
+LOST = "explained less by guiding"
+"""Note of the share of what a policy learnt from that it explains less as it is guided."""
+
 RAN = "from the same starts"
 """Note of size and pace of the policy's own movements over those of the demonstrations."""
 
@@ -109,12 +112,12 @@ def _columns(notes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
-    """What was learnt, and how; a guided policy is told by the one in it."""
+    """What was learnt, and how; a guided policy is told by the one in it, less what guiding takes."""
     if isinstance(held, uc.LearntConstraint):
         count = max(held.rank_, uc.constraints.mechanisms.restored(notes[HELD_BY]).rank if notes.get(HELD_BY) else 0)
         told = f"{count} of {held.choice_.actions} directions"
         return {"held": told, "features": held.choice_.name, "noise": held.noise_}
-    policy = innermost(held)
+    policy, lost = innermost(held), notes.get(LOST) or 0.0
     solution = getattr(policy, "solution_", None)
     if solution is None:
         return {"fitted": False}
@@ -125,7 +128,7 @@ def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
         "learnt as": solution.method,
         "learnt as, in words": uc.evaluation.diagnosis.in_words(solution.method) or None,
         "model": models_of(policy),
-        "explained held out": None if (share := policy.held_out_score()) != share else round(share, 4),
+        "explained held out": None if (share := policy.held_out_score() - lost) != share else round(share, 4),
         "noise": None if solution.belief is None else solution.noise,
         "guided": held.aim_.promise if isinstance(held, uc.Guided) else None,
     }
@@ -154,7 +157,7 @@ def _explained(held: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> uc.eval
     policy = innermost(held)
     count = len(policy.training_.split.fold_of) or uc.evaluation.diagnosis.ENOUGH
     shown = notes[TOLD] if isinstance(notes.get(TOLD), float) else None
-    return uc.evaluation.verdicts.of_explained(policy.held_out_score(), count, shown)
+    return uc.evaluation.verdicts.of_explained(policy.held_out_score(), count, shown, lost=notes.get(LOST))
 
 
 def doubted(policy: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> str:

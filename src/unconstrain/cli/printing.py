@@ -159,6 +159,7 @@ class Judged(NamedTuple):
     samples: int
     training: float
     held_out: float
+    lost: float | None = None
 
     def to_json(self) -> dict[str, Any]:
         """With None for what is not known."""
@@ -174,21 +175,21 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     from ..pages.fit import replayed
 
     policy = innermost(moving)
-    held_out = policy.held_out_score()
+    demos = stream.beginning() if scheduler is None or moving is not policy else []
+    alone, lost = policy.held_out_score(), uc.evaluation.diagnosis.lost_by_guiding(moving, demos)
+    held_out = alone - (lost or 0.0)
     if scheduler is not None:
         count = len(stream.paths)
-        return Judged(
-            uc.evaluation.verdicts.of_explained(held_out, count, told), None, "", count, 0, float("nan"), held_out
-        )
-    demos = stream.beginning()
+        found = uc.evaluation.verdicts.of_explained(alone, count, told, lost=lost)
+        return Judged(found, None, "", count, 0, float("nan"), held_out, lost)
     usual = float((uc.stack(demos).actions ** 2).sum(axis=1).mean() ** 0.5)
-    count, samples, missed = _walked(policy, stream, usual)
+    count, samples, missed = _walked(moving, stream, usual)
     open_ = told is not None and told < uc.evaluation.verdicts.MOSTLY
     there = _least_known(policy, demos, stream.recipe) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
-    found = uc.evaluation.verdicts.of_explained(held_out, count, told, there, 1.0 - missed)
+    found = uc.evaluation.verdicts.of_explained(alone, count, told, there, 1.0 - missed, lost)
     ran = replayed(found, moving, demos, stream.recipe, None, stream.first.units, free=False)
     verdict = uc.evaluation.diagnosis.about_recordings(ran.verdict, demos, stream.recipe, moving)
-    return Judged(in_one_unit(verdict), ran.medians, ran.in_words, count, samples, 1.0 - missed, held_out)
+    return Judged(in_one_unit(verdict), ran.medians, ran.in_words, count, samples, 1.0 - missed, held_out, lost)
 
 
 def in_one_unit(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.Verdict:
@@ -253,7 +254,7 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
         told = [[name, f"{risk:.4g}", uc.evaluation.diagnosis.in_words(name)] for risk, name in rows]
         print_table(["candidate", "estimated squared error", "what it is"], told)
     if known:
-        say(uc.preparation.doubts(judged.demonstrations, 1.0 - judged.training))
+        say(uc.preparation.doubts(judged.demonstrations, 1.0 - judged.training - (judged.lost or 0.0)))
 
 
 def _say_determined(solution: uc.Solution, learner: str) -> None:
@@ -310,7 +311,7 @@ def explained(policy: Any, demonstrations: Sequence[uc.Demonstration]) -> float:
     return 1.0 - missed / motion if motion > 0 else 0.0
 
 
-def _walked(policy: uc.Policy, stream: uc.Stream, usual: float) -> tuple[int, int, float]:
+def _walked(policy: uc.Policy | uc.Guided, stream: uc.Stream, usual: float) -> tuple[int, int, float]:
     """Numbers of demonstrations and samples, and the unexplained share of their motion, without sample weights."""
     names, samples, unexplained, energy = set(), 0, 0.0, 0.0
     for name, demonstration in stream.named_demonstrations():

@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array, on_host
-from ..base.display import percent
+from ..base.display import innermost, percent
 from ..base.errors import InvalidDataError, MissingBeliefError
 from ..base.files import stem
 from ..learners import Solution, robust
 from ..models import Scale, choose_variance, cover
 from ..recordings import Demonstration, stack
+from .metrics import along_motion
 from .shown import FLAT as FLAT
 from .shown import about_recordings as about_recordings
 from .shown import flat as flat
@@ -312,6 +313,15 @@ def states_told(policy: Policy) -> float | None:
     states, actions = map(on_host, kept.whole[:2])
     typical = float(np.sqrt((actions**2).sum(axis=1).mean()))
     return max(float((untold_at(policy.in_own_units(), states, typical) <= SMALL).mean()), belief.told_together)
+
+
+def lost_by_guiding(moving: Any, demonstrations: Sequence[Demonstration]) -> float | None:
+    """Share of the motion of demonstrations that a policy explains less as it is guided; None where it is not."""
+    policy = innermost(moving)
+    if policy is moving:
+        return None
+    (guided, motion), (alone, _) = (along_motion(one, demonstrations) for one in (moving, policy))
+    return max(guided - alone, 0.0) / motion if motion > 0 else 0.0
 
 
 def _typical(actions: Array, solution: Solution) -> float:

@@ -111,6 +111,23 @@ def _explains(share: float, what: str = "held-out motion") -> str:
     return f"explains {percent(share)} of {what}" if share >= -1 else f"misses {what} by more than that motion itself"
 
 
+def _advice(word: str, learnt: float, spoilt: bool) -> str:
+    """What to do about a policy that explains so much of held-out motion, in a word, and of what it learnt from."""
+    if spoilt:
+        return "Fit without --guided, which explains more; or guide it to another goal or cycle, or show all of it."
+    if word == "poor" and learnt >= GOOD:
+        return (
+            f"It explains {percent(learnt)} of what it learnt from: demonstrations that are held out go where no other "
+            "does, or it is too flexible. Demonstrate between them, or try another --model."
+        )
+    return {
+        "fair": "'unconstrain diagnose' says where it fails: by noise, which a wider --window takes out, or as "
+        "demonstrations have little in common.",
+        "poor": "Look at the recordings ('unconstrain inspect'): columns, clocks or units may be wrong, or they have "
+        "too little in common.",
+    }.get(word, "Score it on recordings that were held in other ways.")
+
+
 def of_untold(share: float) -> str:
     """Say at which share of the recorded states all recordings together leave the policy open."""
     if (said := percent(max(share, 0.0))) == "0%":
@@ -119,35 +136,37 @@ def of_untold(share: float) -> str:
 
 
 def of_explained(
-    share: float, demonstrations: int, determined: float | None = None, there: str = "", learnt: float = 0.0
+    share: float,
+    demonstrations: int,
+    determined: float | None = None,
+    there: str = "",
+    learnt: float = 0.0,
+    lost: float | None = None,
 ) -> Verdict:
     """Judge how much of held-out motion a policy explains, along the motion.
 
     ``share`` is 1 − the share left unexplained, NaN where nothing could be held out; fewer than three demonstrations
     give no verdict. ``determined`` is the share of the recorded states at which recordings tell the policy, and
-    ``there`` what to record where fewer show it. ``learnt`` is the share of what was learnt from.
+    ``there`` what to record where fewer show it. ``learnt`` is the share of what was learnt from, and ``lost`` what
+    guiding takes of that, None where it is not guided: where held out it takes about as much, from ``share``.
     """
+    policy, alone, share = "The policy" if lost is None else "The guided policy", share, share - (lost or 0.0)
+    taken = (
+        "" if lost is None else f" ({alone:.0%} unguided, less {lost:.0%} that guiding takes of what it learnt from)"
+    )
     across = "What constraints hid: no recording shows it, so no score does."
     if determined is not None and determined < MOSTLY and demonstrations >= ENOUGH:
         across = f"Across the motion: {of_untold(1 - determined)}"
         across += "." if there else "; 'unconstrain diagnose' says where."
     if demonstrations < ENOUGH or not np.isfinite(share):
-        seen = f"the policy {_explains(share)}, but " if np.isfinite(share) else ""
-        few = f"{seen}no verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
-        return Verdict(Mark.DOUBTFUL, few[0].upper() + few[1:], doubt=across, next=MORE)
+        seen = f"{policy} {_explains(share)}{taken}, but no" if np.isfinite(share) else "No"
+        few = f"{seen} verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
+        return Verdict(Mark.DOUBTFUL, few, doubt=across, next=MORE)
     mark, word = _graded(share, told=determined)
     missed = f"where the policy predicts, it misses {percent(np.sqrt(max(1 - share, 0)))} of a typical action"
-    advice = {
-        "fair": "'unconstrain diagnose' says where it fails: by noise, which a wider --window takes out, or as "
-        "demonstrations have little in common.",
-        "poor": "Look at the recordings ('unconstrain inspect'): columns, clocks or units may be wrong, or they have "
-        "too little in common.",
-    }.get(word, "Score it on recordings that were held in other ways.")
-    if mark is Mark.BAD and learnt >= GOOD:
-        advice = f"It explains {percent(learnt)} of what it learnt from: demonstrations held out go where no other "
-        advice += "does, or it is too flexible. Demonstrate between them, or try another --model."
+    advice = _advice(word, learnt, mark is not _graded(alone, told=determined)[0])
     trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
-    said = f"The policy {_explains(share)}: {word}."
+    said = f"{policy} {_explains(share)}{taken}: {word}."
     return Verdict(mark, said, trust, across, f"{advice} {there}".rstrip())
 
 

@@ -72,7 +72,8 @@ def policy_page(
     xs = list(states or (f"state {index + 1}" for index in range(n)))
     us = list(actions or (f"action {index + 1}" for index in range(d)))
     learner, held_out = named(policy.learner), _held_out(policy, demos)
-    found = verdicts.of_explained(policy.held_out_score(), len(demos), diagnosis.states_told(policy))
+    lost = diagnosis.lost_by_guiding(moving, demos)
+    found = verdicts.of_explained(policy.held_out_score(), len(demos), diagnosis.states_told(policy), lost=lost)
     judged = replayed(found, moving, demos, made, None, known)
     parts = [
         *([html.section("Guided", html.paragraph(moving.aim_.promise))] if isinstance(moving, Guided) else []),
