@@ -29,7 +29,6 @@ GUIDE = "'unconstrain fit --guided auto' keeps it to the goal or the cycle that 
 
 MODELS = {"auto": "", "Affine": "So may a --model that bends: 'local', or 'auto', which tries several."}
 """What else may cure a policy of some features, by what they are called; of others :data:`ANOTHER`."""
-
 ANOTHER = "So may another --model: 'auto' tries several."
 
 ROUNDS = 1.5
