@@ -99,8 +99,8 @@ def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Policy 
         return judged
     features = getattr(innermost(policy), "features", None)
     model = MODELS.get(features if isinstance(features, str) else type(features).__name__, ANOTHER)
-    guide = GUIDE if innermost(policy) is policy else ""
-    return judged._replace(next=" ".join(filter(None, (judged.next, model, guide))))
+    more = model, GUIDE if innermost(policy) is policy else ""
+    return judged._replace(next=" ".join(filter(None, (judged.next, *more))))
 
 
 def replays(
