@@ -572,7 +572,7 @@ def test_a_good_verdict_of_a_printed_rollout_is_not_kept_back(tmp_path):
 
 def test_names_of_candidates_are_explained_where_they_stand(folder, policy, tmp_path):
     said = run("fit", folder, "-v", "-o", tmp_path / "p.npz")
-    assert "('fit -v' says what these are)" in said
+    assert "('fit -v' lists all)" in said
     rows = re.findall(r"^(direct|segments|softened hybrid, 1) +\S+ +(\S.*?) *$", said, re.MULTILINE)
     words = uc.evaluation.diagnosis.in_words
     assert dict(rows) == {name: words(name) for name in ("direct", "segments", "softened hybrid, 1")}

@@ -386,6 +386,17 @@ def test_a_fit_itself_says_how_its_policy_moves(folder, tmp_path):
     assert found["ran"] in " ".join((tmp_path / "p.h").read_text("utf-8").replace(" * ", " ").split())
 
 
+@pytest.mark.parametrize("trim", [(), ("--still", 10)], ids=["as it is", "trimmed"])
+def test_a_fit_doubts_what_it_learns_where_a_recording_stood_still_before_its_start(folder, tmp_path, trim):
+    turn, rng = np.r_[np.zeros(200), 0.01 * np.arange(800)], np.random.default_rng(0)
+    path = np.column_stack([80 * np.cos(turn), 40 * np.sin(turn), 20 * np.sin(turn)])
+    late = np.column_stack([0.01 * np.arange(1000), path + 0.02 * rng.standard_normal(path.shape)])
+    files = [write(tmp_path / "late.csv", HEAD, late), *(folder / f"same_{k}.csv" for k in range(11, 14))]
+    how = "--state", "x,y,z", "--differentiate", "--learner", "hybrid", "--variance", 500, "--json", *trim
+    doubt = json.loads(run("fit", *files, *how, "-o", tmp_path / "p.npz"))["verdict"]["doubt"]
+    assert ("Where 'late' stood still before the start: rest is learnt there; --still trims it." in doubt) != bool(trim)
+
+
 def test_what_a_page_cannot_draw_together_is_refused(folder, tmp_path):
     stroke, page, policies = folder / "held_3.csv", tmp_path / "look.html", (folder / "same.npz", folder / "slow.npz")
     assert "a page draws one policy and one constraint" in refused("look", stroke, *policies, "-o", page)

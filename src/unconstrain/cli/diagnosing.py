@@ -14,7 +14,7 @@ import unconstrain as uc
 from ..base.display import counted, percent
 from ..base.files import write
 from .fitting import options_for_model, policy_of
-from .printing import explained, in_one_unit, option_for_json, print_table, refuse_warnings, say, say_scale, say_verdict
+from .printing import as_noted, explained, option_for_json, print_table, refuse_warnings, say, say_scale, say_verdict
 from .progress import shown
 from .reading import options_for_reading, prepared, said_recipe
 from .writing import check_outputs, option_for_force
@@ -56,7 +56,7 @@ def diagnose(
     refuse_warnings(reading["strict"])
     states, actions = recipe.states or (), recipe.actions or recipe.directions
     judged = uc.evaluation.verdicts.of_diagnosis(found)
-    verdict = in_one_unit(uc.evaluation.diagnosis.about_recordings(judged, demonstrations, recipe, policy))
+    verdict = as_noted(uc.evaluation.diagnosis.about_recordings(judged, demonstrations, recipe, policy))
     if as_json:
         named = {"states": states, "actions": actions, "verdict": verdict.to_json()}
         click.echo(json.dumps(found.to_json() | named, indent=2))

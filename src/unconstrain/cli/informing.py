@@ -93,8 +93,7 @@ def info(file: str, as_json: bool) -> None:
         return
     say_verdict(verdict_of(held, notes))
     told |= {"holds": "a learnt constraint"} if isinstance(held, uc.LearntConstraint) else {}
-    if (share := told.pop(TOLD, None)) is not None:
-        told["told by all recordings"] = f"{percent(share)} of the recorded states"
+    told |= {TOLD: f"{percent(told[TOLD])}, by all recordings together"} if told.get(TOLD) is not None else {}
     print_table(["", ""], [[name, _said(value)] for name, value in told.items() if value not in (None, [], {}, "")])
 
 

@@ -30,9 +30,6 @@ if TYPE_CHECKING:
 CODES = "unconstrain.codes"
 """Where the codes of warnings are kept in the context of a command."""
 
-OTHER_UNITS = {"unit-differs", "clock-unit"}
-"""Codes of recordings in another unit than others."""
-
 MEANINGS = {
     "nUPE": "squared error of the whole policy, over the variance of the actions",
     "nCPE": "squared error along what the constraint leaves free, over the variance of the actions",
@@ -189,13 +186,16 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     found = uc.evaluation.verdicts.of_explained(alone, count, told, there, 1.0 - missed, lost)
     ran = replayed(found, moving, demos, stream.recipe, None, stream.first.units, free=False)
     verdict = uc.evaluation.diagnosis.about_recordings(ran.verdict, demos, stream.recipe, moving)
-    return Judged(in_one_unit(verdict), ran.medians, ran.in_words, count, samples, 1.0 - missed, held_out, lost)
+    return Judged(as_noted(verdict), ran.medians, ran.in_words, count, samples, 1.0 - missed, held_out, lost)
 
 
-def in_one_unit(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.Verdict:
-    """The same, no better than doubtful where it was said that units of recordings differ."""
-    apart = OTHER_UNITS & {*click.get_current_context().meta.get(CODES, [])}
-    return uc.evaluation.verdicts.of_units_apart(verdict) if apart else verdict
+def as_noted(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.Verdict:
+    """The same with what was noted: rest before a start is doubted, and where units differ, it is at best doubtful."""
+    told = click.get_current_context().meta
+    if rest := told.get(TITLES, {}).get("rest"):
+        said = f"Where {listed([*rest], 4)} stood still before the start: rest is learnt there; --still trims it."
+        verdict = verdict._replace(doubt=f"{verdict.doubt} {said}".lstrip())
+    return uc.evaluation.verdicts.of_units_apart(verdict) if "unit-differs" in told.get(CODES, ()) else verdict
 
 
 def _least_known(policy: uc.Policy, demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe) -> str:

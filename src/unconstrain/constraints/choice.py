@@ -33,10 +33,8 @@ LOOSE = 0.3
 PROPORTIONAL = 0.25
 """No function of the state holds what moves along, squared, by this share of the square of the motion that is free."""
 
-
 DOUBTFUL = 0.05
 """From this share on, of either, there is a doubt."""
-
 
 ONE_WAY = 0.5
 """Motion of which the state explains more than this share, where held out, is one function of it."""
@@ -270,8 +268,7 @@ def _check(best: _Trial, samples: int) -> None:
     if share >= LOOSE:
         raise InvalidDataError(
             f"no direction is held: along the best one that is a function of the state, {percent(share)} of a mean "
-            "square action moves where held out. The data is free, or constraints differ between demonstrations: fit "
-            "each."
+            "square action moves where held out. The data is free, or constraints differ by demonstration: fit each."
         )
     if rate >= PROPORTIONAL:
         raise InvalidDataError(

@@ -38,7 +38,6 @@ FLOOR = 4.0
 FAINTEST = 0.03
 """Directions in which fields at the floor have less than this share of their largest size are noise or not there."""
 
-
 TYPICAL = 200
 """States that the rank is found at."""
 

@@ -497,7 +497,7 @@ def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[st
     if all(one.determined == 1.0 for one in found.regions):
         return [f"Every recorded state is determined. If you record more: {advice}"]
     told, every, (open_, few) = found.told_together, len(found.regions), regions_left(found)
-    left, hangs = percent(max(1.0 - told, 0.0)), percent(max(told - found.states_determined, 0.0))
+    left, hangs = (percent(max(share, 0.0)) for share in (1.0 - told, told - found.states_determined))
     where = "" if (left, open_) == ("0%", 0) else f"Not determined: {left} of the states, {open_} of {every} regions. "
     where += f"Told by one or two demonstrations alone: {hangs} of the states, {few} of {every} regions; in "
     where += f"{sum(len(one.shown_by) < ENOUGH for one in found.regions)} regions fewer than {ENOUGH} demonstrations "

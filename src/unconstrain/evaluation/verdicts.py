@@ -278,9 +278,8 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
         said = f"No verdict: {_count(count)}; whether they were free cannot be told from fewer than {ENOUGH}."
         return Verdict(Mark.DOUBTFUL, said, doubt=doubt, next=MORE)
     mark, word = _graded(share, MOSTLY, PARTLY)
-    words = {"good": "enough", "fair": "enough in most places", "poor": "not enough"}
-    said = f"Recordings: at {percent(share)} of their states three demonstrations or more tell the policy: "
-    said += f"{words[word]}."
+    how = {"good": "enough", "fair": "enough in most places", "poor": "not enough"}
+    said = f"Recordings: at {percent(share)} of their states three demonstrations or more tell the policy: {how[word]}."
     if mark is Mark.BAD and found.told_together >= PARTLY:
         mark = Mark.DOUBTFUL
         said = f"Recordings: all together tell the policy at {percent(found.told_together)} of their states, "

@@ -34,7 +34,6 @@ _STILL = 0.02
 _TOGETHER = 0.1
 """Demonstrations end in one place within this share of their extent."""
 
-
 _ROUND, _HALF, _LITTLE = 0.9, 0.5, 0.1
 """Demonstrations of a cycle turn by so much of it, in their mean; parts of one (wiping in pieces: 0.2) by less than
 half, and without rest at their ends; by so little nothing does."""

@@ -131,8 +131,7 @@ def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> ht
     ]
     around, along = (", ".join(names) for names in (states, actions))
     header = ["", f"demonstrate around\n({around})", f"with motion left free along\n({along})", "recorded in"]
-    header += ["spread\nalong it", "spread in\nthe region", "told\nby all", "by three\nor more"]
-    header += ["moved\nalong it by", "samples"]
+    header += ["spread\nalong it", "spread in\nthe region", "told\nby all", "by three", "moved\nalong it by", "samples"]
     note = html.words("diagnosis_next", shown=len(shown), every=len(found.regions))
     return html.table(header, rows, left=4, note=note)
 

@@ -40,7 +40,6 @@ NEAR = 0.05
 PAUSE = 5.0
 """So many usual intervals between samples that follow each other are a pause that was left out."""
 
-
 MOST_NUMBERS = 50_000
 """Of the covariances of a policy's weights; of more the page does not say where recordings tell the policy."""
 

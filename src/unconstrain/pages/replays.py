@@ -29,7 +29,6 @@ GUIDE = "'unconstrain fit --guided auto' keeps it to the goal or the cycle that 
 
 MODELS = {"auto": "", "Affine": "So may a --model that bends: 'local', or 'auto', which tries several."}
 """What else may cure a policy of some features, by what they are called; of others :data:`ANOTHER`."""
-
 ANOTHER = "So may another --model: 'auto' tries several."
 
 ROUNDS = 1.5
@@ -100,8 +99,8 @@ def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Policy 
         return judged
     features = getattr(innermost(policy), "features", None)
     model = MODELS.get(features if isinstance(features, str) else type(features).__name__, ANOTHER)
-    guide = GUIDE if innermost(policy) is policy else ""
-    return judged._replace(next=" ".join(filter(None, (judged.next, model, guide))))
+    more = model, GUIDE if innermost(policy) is policy else ""
+    return judged._replace(next=" ".join(filter(None, (judged.next, *more))))
 
 
 def replays(

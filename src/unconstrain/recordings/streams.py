@@ -29,7 +29,6 @@ from .readers import Reading, check_left_out, expand, read_blocks
 HELD_BYTES = 2**25
 """Demonstrations that take no more than this in all are kept after the first walk, so files are walked through once."""
 
-
 MOST_OUTLINES = 1000
 """So many demonstrations, or blocks of rows of them, are compared with each other."""
 

@@ -1,7 +1,6 @@
 /** What no recording tells of the actions of a policy, as `Belief` and `untold_at` say it in Python; null: not known; true: nothing. */
 const untold = told && (() => {
   "use strict";
-
   if (told === true) return { at: () => 0, small: 1 };
 
   const singles = (text) => new Float32Array(Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer);

@@ -48,7 +48,6 @@ JOINTS = re.compile(r"(^|[._/ ])(actual_)?(q|qpos|joints?|joint_?(pos|positions?
 _NUMBERED = re.compile(r"(.*?)[_. \[]?(\d+)\]?")
 _OF_AXIS = re.compile(r"(.*?)(?:[_. /]|(?<=[a-z])(?=[XYZ]))?([xyzXYZ])")
 
-
 _UNIT = re.compile(r"[_ ]?[\[(](?=\D)[^\[\]()]{0,12}[\])]$")
 """A unit in brackets at the end of a name."""
 

@@ -103,9 +103,8 @@ def too_few(demonstrations: int) -> tuple[Remark, ...]:
 def doubts(demonstrations: int, missed: float) -> tuple[Remark, ...]:
     """Remarks on what was learnt from some demonstrations, by the share of their motion that it misses."""
     message = (
-        f"misses {percent(min(missed, 1))} of the motion that it learnt from; the actions may be no function of "
-        "the state, as where a movement goes out and back or stands still. Look at the warnings of a survey, and "
-        "at states=."
+        f"misses {percent(min(missed, 1))} of the motion that it learnt from; actions may be no function of the state, "
+        "as where a movement goes out and back or stands still. Look at the warnings of a survey, and at states=."
     )
     nothing = (Remark("explains-nothing", message),) if missed > MOST_MISSED else ()
     return (*too_few(demonstrations), *nothing)
@@ -154,7 +153,7 @@ def clock_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
     )
     message += "or leave it out with leave_out=."
     found = np.flatnonzero(odd & np.isfinite(usual)).tolist()
-    return [(place, Remark("clock-unit", f"{rates[place]:.3g} {message}")) for place in found]
+    return [(place, Remark("unit-differs", f"{rates[place]:.3g} {message}")) for place in found]
 
 
 def unit_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:

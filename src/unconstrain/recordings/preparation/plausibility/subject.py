@@ -20,7 +20,6 @@ from ..recipes import Recipe, select, stamps
 LEAST_ROWS = 10
 """Fewer rows show no movement."""
 
-
 GAP_INTERVALS = 5.0
 """An interval of this many median ones is a gap, where nothing else is said."""
 
