@@ -93,7 +93,8 @@ def info(file: str, as_json: bool) -> None:
         return
     say_verdict(verdict_of(held, notes))
     told |= {"holds": "a learnt constraint"} if isinstance(held, uc.LearntConstraint) else {}
-    print_table(["", ""], [[name, _said(value)] for name, value in told.items() if value not in (None, [], {}, "")])
+    rows = [[name, _said(value)] for name, value in told.items() if value not in (None, [], {}, "")]
+    print_table(["", ""], rows, uc.evaluation.verdicts.WIDTH)
 
 
 def _columns(notes: Mapping[str, Any]) -> dict[str, Any]:
