@@ -399,6 +399,19 @@ def test_what_is_missed_where_held_out_is_the_verdict(tmp_path):
     assert "or they have too little in common" in " ".join(result.stdout.split())
 
 
+def test_a_folder_that_is_called_as_a_setting_is_named_and_no_option(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    for name in ("goal", "start"):
+        Path(name).mkdir()
+        result = CliRunner().invoke(cli.main, ["fit", name, "-o", "p.npz"])
+        assert (result.exit_code, result.stderr.splitlines()[-1][: len(name) + 9]) == (2, f"Error: {name}: ")
+
+
+def test_what_info_says_fits_eighty_columns(policy):
+    lines = run("info", policy).splitlines()
+    assert max(map(len, lines)) <= 80
+
+
 def test_a_policy_is_no_recording(policy, tmp_path):
     said = refused("fit", policy, "-o", tmp_path / "p.npz")
     assert said.endswith("is a policy that was saved, not recordings to learn from.")

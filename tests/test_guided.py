@@ -418,6 +418,32 @@ def test_all_that_was_written_shows_a_goal(monkeypatch):
     assert not any(uc.Guided.goes_round(load_handwriting(shape)) for shape in SHAPES)
 
 
+def held_off(normals):
+    """Movements on plates that pass the goal at some distance, and a policy that has learnt from them."""
+    starts = GOAL + 0.5 * np.random.default_rng(8).uniform(-1, 1, (len(normals), 3))
+    demos = [uc.rollout(spiral, x, 400, 0.025, Plane(n)) for x, n in zip(starts, normals, strict=True)]
+    return demos, uc.ParametricPolicy(uc.Affine()).fit_demonstrations(demos)
+
+
+def test_where_plates_held_movements_off_the_goal_it_is_proposed_and_not_taken():
+    demos, policy = held_off(np.random.default_rng(11).normal(size=(8, 3)))
+    with pytest.raises(InvalidDataError, match="demonstrations end at rest in places up to") as told:
+        uc.Guided(policy)
+    place = re.search(r"the policy rests, to within about \S+, at goal=\((.*)\)\.$", str(told.value))[1]
+    assert_allclose([*map(float, place.split(", "))], GOAL, atol=0.01)
+    with pytest.raises(InvalidDataError) as untold:
+        uc.Guided(lambda states: policy(states), demonstrations=demos)
+    assert str(untold.value).endswith("give it with goal=.")
+
+
+def test_where_the_policy_is_hardly_told_no_goal_is_proposed():
+    demos, policy = held_off(np.random.default_rng(11).normal(size=(8, 3)))
+    known = policy.covariances(GOAL[None])[0]
+    policy.covariances = lambda states: [known + np.eye(3)]  # as much is open as it wants
+    with pytest.raises(InvalidDataError, match=r"is told to within \d\S* only: record more, held in other ways\.$"):
+        uc.Guided(policy, demonstrations=demos)
+
+
 def test_where_no_cycle_is_found_the_strokes_are_named_and_not_the_rows(monkeypatch):
     def infinite(demos, policy):
         raise InvalidDataError("states: found inf at row 32, column 0")

@@ -94,7 +94,8 @@ def info(file: str, as_json: bool) -> None:
     say_verdict(verdict_of(held, notes))
     told |= {"holds": "a learnt constraint"} if isinstance(held, uc.LearntConstraint) else {}
     told |= {TOLD: f"{percent(told[TOLD])}, by all recordings together"} if told.get(TOLD) is not None else {}
-    print_table(["", ""], [[name, _said(value)] for name, value in told.items() if value not in (None, [], {}, "")])
+    rows = [[name, _said(value)] for name, value in told.items() if value not in (None, [], {}, "")]
+    print_table(["", ""], rows, uc.evaluation.verdicts.WIDTH)
 
 
 def _columns(notes: Mapping[str, Any]) -> dict[str, Any]:

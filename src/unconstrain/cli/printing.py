@@ -17,7 +17,7 @@ import click
 import unconstrain as uc
 
 from ..base.display import bare, counted, innermost, listed, percent
-from ..base.errors import InvalidDataError, SettingError
+from ..base.errors import InvalidDataError, ModelFileError, ReadError, SettingError, WriteError
 from .endings import REFUSED, ending
 from .reading import next_command, said_recipe
 from .speaking import as_typed, meant_of
@@ -36,6 +36,9 @@ MEANINGS = {
     "nPOE": "recorded motion that the constraint would forbid, over the variance of the actions",
 }
 """What the heads of tables stand for."""
+
+OF_FILES = ModelFileError, OSError, ReadError, WriteError
+"""Errors that begin with the name of a file or folder."""
 
 PLACES = 20
 """Of each demonstration, about, that are looked at for where least is known."""
@@ -78,7 +81,7 @@ class Group(click.Group):
             raise
         except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - the last clause
             said, code = ending(error)
-            click.echo(f"Error: {as_typed(said)}", err=True)
+            click.echo(f"Error: {as_typed(said, isinstance(error, OF_FILES))}", err=True)
             ctx.exit(code)
 
 
@@ -332,16 +335,16 @@ def number(value: Any, form: str) -> str:
     return "-" if value is None else form.format(value)
 
 
-def print_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table that fits the terminal."""
+def print_table(head: Sequence[str], rows: Sequence[Sequence[str]], piped: int = 10_000) -> None:
+    """Print a table that fits the terminal, or so many columns where output is piped."""
     from rich.console import Console
     from rich.table import Table
 
     table = Table(*head, box=None, pad_edge=False, show_header=any(head))
     for row in rows:
         table.add_row(*row)
-    # Piped output is for programs and files: no wrapping there.
-    width = None if sys.stdout.isatty() else 10_000
+    # Piped output is for programs and files: rows of numbers are not wrapped there.
+    width = None if sys.stdout.isatty() else piped
     Console(width=width, markup=False, emoji=False, highlight=False, color_system=None).print(table)
     for name, meaning in MEANINGS.items():
         if any(name in title for title in head):

@@ -43,8 +43,11 @@ _SETTING = re.compile(
 """``name=value`` or ``name=``, but in no path."""
 
 
-def as_typed(said: str) -> str:
-    """A sentence of the library with options of this command, or where it has none of another, in place of settings."""
+def as_typed(said: str, of_file: bool = False) -> str:
+    """A sentence of the library with options of this command, or where it has none of another, in place of settings.
+
+    One of a file begins with its name, which may be that of a setting.
+    """
     context = click.get_current_context(silent=True)
     if context is None:
         return said
@@ -53,7 +56,7 @@ def as_typed(said: str) -> str:
     every = [one for command in (*commands.values(), own) for one in command.params]
     options = {one.name: one.opts[-1] for one in every if one.opts[-1].startswith("--")} | ALSO
     head, _, rest = said.partition(": ")
-    said = f"{option}: {rest}" if (option := _option(head, options)) else said
+    said = f"{option}: {rest}" if not of_file and (option := _option(head, options)) else said
     for made, option in OBJECTS.items():
         said = said.replace(made, option)
     return _SETTING.sub(lambda found: _set(found, options), said)
