@@ -155,6 +155,13 @@ def clock_unit(rng):
     return Fault([replace(one, times=one.times * unit) for one in recordings], recipe, "clock-unit", 0, None)
 
 
+def clock_differs(rng):
+    recordings, recipe = recorded(*movements(rng))
+    which, unit = int(rng.integers(len(recordings))), float(rng.choice([1e3, 1e6, 1e9]))
+    recordings[which] = replace(recordings[which], times=recordings[which].times * unit)
+    return Fault(recordings, recipe, "clock-differs", which, None)
+
+
 def clock_gap(rng):
     tables, dt = movements(rng)
     which, steps = int(rng.integers(len(tables))), len(tables[0])
@@ -254,7 +261,7 @@ def other_topic(rng):
 FAULTS = (
     nothing, nothing_with_actions, angle_wrap, quaternion_flip, rotation_vector_flip, seam, glitch, clock_unit,
     clock_gap, targets, mixed_units, unit_differs, pause, backwards, at_rest, all_zero, few_demonstrations, row_order,
-    other_topic,
+    other_topic, clock_differs,
 )  # fmt: skip
 
 

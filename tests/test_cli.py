@@ -27,7 +27,7 @@ from recorded import needs_rim
 from seen import below
 from unconstrain import cli, storage
 from unconstrain.base.errors import MissingExtraError
-from unconstrain.cli import fitting
+from unconstrain.cli import fitting, rolling
 from unconstrain.paper import experiments
 from unconstrain.paper import pages as report
 from unconstrain.paper.experiments import table1, washing
@@ -1070,7 +1070,7 @@ def test_trouble_with_the_file_system_is_told_in_one_sentence(policy, tmp_path, 
     def fail(*_, **__):
         raise error
 
-    monkeypatch.setattr(cli, "write", fail)
+    monkeypatch.setattr(rolling, "write", fail)
     assert refused("rollout", policy, "--start", "0,0", "-o", tmp_path / "path.csv") == sentence
 
 

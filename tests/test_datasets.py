@@ -263,6 +263,7 @@ def test_circles_are_drawn_the_same_way_round_but_for_one(local: None) -> None:
 
 
 @needs_contours
+@pytest.mark.filterwarnings("ignore:rest")  # as some did for a second, before they began
 def test_contours_pass_where_the_tracker_was(local: None) -> None:
     for setup in contours.SETUPS:
         for take, demonstration in enumerate(load_contour(setup, rate=10), 1):

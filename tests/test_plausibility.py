@@ -521,7 +521,7 @@ def test_fewer_files_in_another_unit_are_named_beside_the_others(tmp_path):
 def test_a_file_in_milliseconds_among_others_is_named_and_no_unit_is_advised(tmp_path):
     files = apart(tmp_path, (3,), clock=1000.0)
     said = run("inspect", *files)
-    assert "unit-differs: 's_3': 0.0497 samples a second, and others have 49.7" in said
+    assert "clock-differs: 's_3': 0.0497 samples a second, and others have 49.7" in said
     assert "--time-unit" not in said
     assert "--leave-out s_3" in said
     assert "if all are so, say the unit" in call("fit", *files, "-o", tmp_path / "p.npz").err

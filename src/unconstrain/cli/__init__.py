@@ -26,6 +26,7 @@ from .fitting import alpha_of, default_learner, guide_of, guided, learn, learner
 from .informing import LOST, MARK, RAN, TOLD, info, provenance
 from .looking import look, play
 from .printing import (
+    OTHER_UNITS,
     Group,
     Judged,
     judge_fit,
@@ -106,7 +107,7 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     if not first:
         raise ReadError(NOTHING_LEFT)
     own = [found.name for found in surveys]
-    units = {found.name for found in surveys if "unit-differs" in {one.code for one in found.warnings}}
+    units = {found.name for found in surveys if OTHER_UNITS & {one.code for one in found.warnings}}
     differ = [name for name in own if name in units and own.count(name) == 1] if len(units) < len({*own}) else []
     names = uc.readers.unique_names(own)
     surveys = [replace(found, name=name) for found, name in zip(surveys, names, strict=True)]

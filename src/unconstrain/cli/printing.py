@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 CODES = "unconstrain.codes"
 """Where the codes of warnings are kept in the context of a command."""
 
+OTHER_UNITS = {"unit-differs", "clock-differs"}
+"""Codes of recordings in another unit than others."""
+
 MEANINGS = {
     "nUPE": "squared error of the whole policy, over the variance of the actions",
     "nCPE": "squared error along what the constraint leaves free, over the variance of the actions",
@@ -198,7 +201,7 @@ def as_noted(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.
     if rest := told.get(TITLES, {}).get("rest"):
         said = f"Where {listed([*rest], 4)} stood still before the start: rest is learnt there; --still trims it."
         verdict = verdict._replace(doubt=f"{verdict.doubt} {said}".lstrip())
-    return uc.evaluation.verdicts.of_units_apart(verdict) if "unit-differs" in told.get(CODES, ()) else verdict
+    return uc.evaluation.verdicts.of_units_apart(verdict) if OTHER_UNITS & {*told.get(CODES, ())} else verdict
 
 
 def _least_known(policy: uc.Policy, demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe) -> str:

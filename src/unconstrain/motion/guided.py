@@ -35,9 +35,9 @@ _STILL = 0.02
 _TOGETHER = 0.1
 """Demonstrations end in one place within this share of their extent."""
 
-_ROUND, _HALF, _LITTLE = 0.9, 0.5, 0.1
-"""Demonstrations of a cycle turn by so much of it, in their mean; parts of one (wiping in pieces: 0.2) by less than
-half, and without rest at their ends; by so little nothing does."""
+_ROUND, _HALF = 0.9, 0.5
+"""Demonstrations of a cycle turn by so much of it, in their mean; parts of one by less, but what ends at rest and turns
+by less than half is none."""
 
 _SEVERAL = 3
 """So many that end at rest in as many places show no goal, whichever of them a policy rests at."""
@@ -159,7 +159,7 @@ class Guided(Exportable, Shown):
             as_vector(goal, "goal", demos[0].states.shape[1])
             return False
         rests, around = _resting(demos), turns(demos)
-        if orbit is not None and around < (_HALF if 2 * sum(rests) > len(demos) else _LITTLE):
+        if orbit is not None and around < _HALF and 2 * sum(rests) > len(demos):
             raise SettingError(f"orbit: demonstrations make {around:.2f} turns in the mean, and no cycle is near them.")
         if orbit is not None or (2 * sum(rests) <= len(demos) and around >= _ROUND):
             return True

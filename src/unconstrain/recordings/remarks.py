@@ -11,6 +11,7 @@ WARNINGS = (
     "seam",
     "glitch",
     "clock-unit",
+    "clock-differs",
     "clock-gap",
     "targets-as-velocities",
     "mixed-units",

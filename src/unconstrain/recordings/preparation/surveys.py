@@ -102,9 +102,10 @@ def survey_set(recordings: Iterable[Recording], recipe: Recipe | None = None) ->
 
 def _with(each: Survey, added: tuple[Remark, ...]) -> Survey:
     notes = tuple(remark for remark in added if not remark.warns)
-    told = {remark.code: remark for remark in added if remark.warns}  # others tell more of a clock
-    warnings = once(told.get(remark.code, remark) for remark in (*each.warnings, *told.values()))
-    return replace(each, warnings=warnings, notes=each.notes + notes)
+    told = [remark for remark in added if remark.warns]
+    known = "clock-differs" in [remark.code for remark in told]  # which tells more of a clock
+    own = [remark for remark in each.warnings if remark.code != "clock-unit" or not known]
+    return replace(each, warnings=once([*own, *told]), notes=each.notes + notes)
 
 
 def _survey(subject: Subject, asked: Recipe) -> Survey:

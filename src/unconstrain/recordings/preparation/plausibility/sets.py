@@ -153,7 +153,7 @@ def clock_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
     )
     message += "or leave it out with leave_out=."
     found = np.flatnonzero(odd & np.isfinite(usual)).tolist()
-    return [(place, Remark("unit-differs", f"{rates[place]:.3g} {message}")) for place in found]
+    return [(place, Remark("clock-differs", f"{rates[place]:.3g} {message}")) for place in found]
 
 
 def unit_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
