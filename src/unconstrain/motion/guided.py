@@ -366,7 +366,7 @@ def _proposed(policy: Any, ends: Array, demos: Sequence[Demonstration], wanted: 
     """The one place in what was shown where a policy rests, sought from where demonstrations end, as far as it is told.
 
     Of 18 sets of movements to a goal that plates held off it, it rested at most 3.3 cm from there in the eight where
-    what is open of its wishes moves that place by less than a fifth of the extent; in the others, 2 to 13 cm.
+    what demonstrations leave open of it moves that place by less than a fifth of the extent; in the others, 2 to 13 cm.
     """
     from scipy.optimize import least_squares  # takes long to import
 

@@ -350,9 +350,11 @@ class Robust(_Maximising):
             if _trivial(views[name]):
                 break
             best[name] = replace(Robust().compared(views[name], training).best, name=name, softness=0.0)
-            if name == usual:
-                best = {one: best[one] for one in best if one == name or _compared(best, views).refutes(one, name)}
-            chosen = _compared(best, views).best.name
+            found = _compared(best, views)
+            if name == usual and (worse := [one for one in best if one != name and not found.refutes(one, name)]):
+                best = {one: best[one] for one in best if one not in worse}
+                found = _compared(best, views)
+            chosen = found.best.name
             if usual is not None and chosen not in list(best)[-2:]:
                 break
         return chosen
