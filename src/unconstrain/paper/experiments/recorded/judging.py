@@ -28,7 +28,10 @@ LEARNERS: dict[str, uc.Learner] = {
 """What can be taken in the default learner's place. Segments are those of the groups, where there are any."""
 
 SAFE = ("direct", "softened hybrid")
-"""The better of these is what the default learner must not fall behind: they look for nothing in the data."""
+"""The best of these is what the default learner must not fall behind: they look for nothing in the data. Two learn in
+the local models that it chooses, and two in the widest, in case it chooses badly."""
+
+WIDEST = "widest fields"
 
 SOFTNESSES = (1.0, 0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4, 1e-6, 1e-11)
 """Of the hybrids that are candidates, beside all learners."""
@@ -55,12 +58,12 @@ def judged(data: DataSet) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``nupe`` by learner, with the default's; ``floor``, what the features reach on the free actions;
-        ``best`` and ``best_candidate``; ``cost``, the default's nUPE over that of what was not spoiled; and the
-        figures of :func:`knowledge`.
+        ``nupe`` by learner, with the default's, and of the safe ones in the widest fields where models are local;
+        ``floor``, what the features reach on the free actions; ``best`` and ``best_candidate``; ``cost``, the
+        default's nUPE over that of what was not spoiled; and the figures of :func:`knowledge`.
     """
     chosen = data.fit(uc.Robust())
-    learnt = {name: chosen.with_learner(learner) for name, learner in _learners(data).items()}
+    learnt = {name: chosen.with_learner(learner) for name, learner in _learners(data).items()} | _in_widest_fields(data)
     nupe = {name: uc.nupe(policy, data.test) for name, policy in {**learnt, DEFAULT: chosen}.items()}
     soft = {
         f"softness {s:g}": uc.nupe(chosen.with_learner(uc.Hybrid(threshold=0.0, softness=s)), data.test)
@@ -68,7 +71,7 @@ def judged(data: DataSet) -> dict[str, Any]:
     }
     candidates = {name: error for name, error in (nupe | soft).items() if name not in (DEFAULT, "hybrid")}
     best = min(candidates, key=lambda name: candidates[name])
-    free = floor(data)
+    free = floor(data, chosen)
     return {
         "nupe": nupe,
         "floor": uc.nupe(free, data.test),
@@ -79,8 +82,10 @@ def judged(data: DataSet) -> dict[str, Any]:
     }
 
 
-def floor(data: DataSet) -> uc.Policy:
+def floor(data: DataSet, chosen: uc.Policy) -> uc.Policy:
     """The same features fitted to the free actions at the states that are learnt from: nothing can do much better."""
+    if isinstance(chosen, uc.LocallyLinearPolicy):
+        data = replace(data, policy=uc.LocallyLinearPolicy(chosen.variance_))
     return data.fit(uc.Direct(), [replace(demo, actions=true_policy([demo])) for demo in data.demonstrations])
 
 
@@ -116,6 +121,13 @@ def knowledge(policy: uc.Policy, data: DataSet, free: uc.Policy) -> dict[str, fl
 
 def _learners(data: DataSet) -> dict[str, uc.Learner]:
     return {name: learner for name, learner in LEARNERS.items() if data.grouped or name != "segments"}
+
+
+def _in_widest_fields(data: DataSet) -> dict[str, uc.Policy]:
+    if not isinstance(data.policy, uc.LocallyLinearPolicy):
+        return {}
+    widest = replace(data, policy=uc.LocallyLinearPolicy(None)).fit(uc.Direct())
+    return {f"{name}, {WIDEST}": widest.with_learner(LEARNERS[name]) for name in SAFE}
 
 
 def _cost(data: DataSet, error: float) -> float | None:

@@ -30,11 +30,6 @@ RECORDED = {
 """Kinds of constraints on recorded movements. In the last two, rows are in any order: without groups, or in them."""
 
 
-def _local_policy() -> uc.Policy:
-    """Local models of one width, so that learners are compared on the same."""
-    return uc.LocallyLinearPolicy(None)
-
-
 @dataclass(frozen=True, eq=False)
 class DataSet:
     """Demonstrations to learn from, and what to test on.
@@ -62,7 +57,7 @@ class DataSet:
     name: str
     demonstrations: list[uc.Demonstration]
     test: list[uc.Demonstration]
-    policy: uc.Policy = field(default_factory=_local_policy)
+    policy: uc.Policy = field(default_factory=uc.LocallyLinearPolicy)
     grouped: bool = True
     unspoiled: list[uc.Demonstration] | None = None
 
@@ -112,7 +107,7 @@ class _Kind:
 
     draw: Callable[..., simulated.Simulated]
     variants: Mapping[str, tuple[float, ...]] = field(default_factory=lambda: {"": ()})
-    policy: Callable[[], uc.Policy] = _local_policy
+    policy: Callable[[], uc.Policy] = uc.LocallyLinearPolicy
     grouped: bool = True
 
 
