@@ -24,7 +24,7 @@ from table import Row, row, show
 from threadpoolctl import threadpool_info
 
 HERE = Path(__file__).parent
-NAMES = ("sums", "arm", "control_loop", "streaming", "cluster", "recordings", "constraints", "default_fit")
+NAMES = ("sums", "arm", "control_loop", "streaming", "cluster", "recordings", "constraints", "default_fit", "face")
 KEPT = HERE.parent / "build" / "bench.json"
 
 

@@ -2,7 +2,6 @@
 
 import os
 import pickle
-import shutil
 from itertools import product
 
 import pytest
@@ -15,6 +14,7 @@ os.environ |= {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", 
 
 import recorded
 import samples
+import seen
 import unconstrain as uc
 
 settings.register_profile(
@@ -165,33 +165,11 @@ def browser(tmp_path_factory):
     """Chromium without a window."""
     if os.environ.get("UNCONSTRAIN_NO_BROWSER") == "1":
         pytest.skip("UNCONSTRAIN_NO_BROWSER is set")
-    chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
-    if chromium is None or driver is None:
+    if seen.missing_for_pages():
         pytest.fail(
             "These tests open reports in Chromium, and it or its driver is missing. Install them with "
             "'apt-get install chromium chromium-driver' (or scripts/install-system browser), or set "
             "UNCONSTRAIN_NO_BROWSER=1 to leave these tests out."
         )
-    from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = chromium
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    for argument in (
-        "headless",
-        "no-sandbox",
-        "disable-gpu",
-        "disable-dev-shm-usage",
-        "enable-unsafe-swiftshader",  # WebGL without a graphics card
-        "no-first-run",
-        "disable-background-networking",
-        "disable-component-update",
-        "disable-sync",
-        "window-size=1200,1000",
-        f"user-data-dir={tmp_path_factory.mktemp('chromium')}",
-    ):
-        options.add_argument(f"--{argument}")
-    started = webdriver.Chrome(options=options, service=Service(driver))
-    yield started
-    started.quit()
+    with seen.chromium(tmp_path_factory.mktemp("chromium")) as started:
+        yield started

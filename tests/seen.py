@@ -1,9 +1,12 @@
 """What people see: pages, opened in a browser by day and by night, and what commands print."""
 
+import shutil
 from collections.abc import Sequence
 from contextlib import contextmanager
 
 import numpy as np
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
 
 GRAPHS = """
 return [...document.querySelectorAll("figure svg[role=img]")].map(graph => ({
@@ -36,6 +39,37 @@ UNNAMED = """
 return [...document.querySelectorAll(`svg:not([aria-hidden]):not([aria-label]), img:not([alt]), th:not([scope]),
   table:not(:has(caption)), button:empty, html:not([lang])`)].map(one => one.outerHTML.slice(0, 80));
 """
+
+
+QUIETLY = (
+    "headless",
+    "no-sandbox",
+    "disable-gpu",
+    "disable-dev-shm-usage",
+    "enable-unsafe-swiftshader",  # WebGL without a graphics card
+    "no-first-run",
+    "disable-background-networking",
+    "disable-component-update",
+    "disable-sync",
+    "window-size=1200,1000",
+)
+
+
+def missing_for_pages():
+    """Which programs are not there that open pages."""
+    return [program for program in ("chromium", "chromedriver") if shutil.which(program) is None]
+
+
+@contextmanager
+def chromium(folder):
+    """Chromium without a window, which keeps its things in a folder."""
+    options = webdriver.ChromeOptions()
+    options.binary_location = shutil.which("chromium")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    for argument in (*QUIETLY, f"user-data-dir={folder}"):
+        options.add_argument(f"--{argument}")
+    with webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver"))) as started:
+        yield started
 
 
 def opened(browser, page, folder):
