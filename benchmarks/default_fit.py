@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
-from table import Row, script, spent
+from table import Row, row, script, side_by_side, spent
 
 import unconstrain as uc
 
@@ -53,6 +54,25 @@ def learn(path: Path) -> None:
     uc.LocallyLinearPolicy().fit(held["states"], held["actions"], groups=held["groups"])
 
 
+def small() -> list[Row]:
+    """Twenty demonstrations of two hundred samples in the plane, each under a constraint that switches."""
+    rng, steps, period = np.random.default_rng(0), 200, 0.02
+    starts = rng.uniform(-1.5, 1.5, (20, 2))
+    lines = [uc.constraints.SwitchingLine.random(rng, steps * period, 4) for _ in starts]
+    demos = [
+        uc.rollout(lambda x: -x, start, steps, period, line, method="euler")
+        for start, line in zip(starts, lines, strict=True)
+    ]
+    noisy = [replace(demo, actions=demo.actions + 0.05 * rng.normal(size=demo.actions.shape)) for demo in demos]
+    policies = uc.LocallyLinearPolicy(), uc.LocallyLinearPolicy(None), uc.ParametricPolicy()
+    times = side_by_side([lambda one=one: one.fit_demonstrations(noisy) for one in policies], 3)  # type: ignore[misc]
+    names = ("chooses its model", "widest fields", "25 kernels")
+    what = f"default learner, {len(starts) * steps:,} × 2, noisy"
+    each = [row(f"{what}: {name}", time, "s") for name, time in zip(names, np.median(times, axis=0), strict=True)]
+    each[0] |= {"at_least": 5.0, "target": 0.5}
+    return each
+
+
 def main(samples: int = SAMPLES) -> list[Row]:
     """Rows of all."""
     what = f"{samples:.0e} × {AXES} in {DEMONSTRATIONS} demonstrations"
@@ -62,7 +82,11 @@ def main(samples: int = SAMPLES) -> list[Row]:
         line = ["-m", "unconstrain", "fit", folder / "samples.csv", "--state", "x*", "--action", "u*"]
         arrays = spent(f"default fit, {what}, from arrays", [__file__, "--learn", folder / "arrays.npz"], 20, 6)
         arrays[-1] |= {"at_least": 1000.0, "target": 400.0}
-        return [*arrays, *spent("the same by the command line, from CSV", [*line, "-o", folder / "p.npz"], 40, 15)]
+        return [
+            *small(),
+            *arrays,
+            *spent("the same by the command line, from CSV", [*line, "-o", folder / "p.npz"], 40, 15),
+        ]
 
 
 if __name__ == "__main__":
