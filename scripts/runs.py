@@ -317,7 +317,7 @@ RUNS = {
         "unconstrain reproduce arrival --only cycles --out results/cycles", "cycles/arrival.json", arrival_cycles
     ),
     "regimes": Run("unconstrain reproduce regimes --trials 4 --out results", "regimes.json", regimes),
-    "recorded": Run("unconstrain reproduce recorded --trials 8 --out results", "recorded.json", recorded),
+    "recorded": Run("unconstrain reproduce recorded --out results", "recorded.json", recorded),
     "constraints": Run("unconstrain reproduce constraints --out results", "constraints.json", constraints),
     "bench": Run("make bench BENCH='--out results/bench.json'", "bench.json", bench),
     "bench_full": Run(
