@@ -109,7 +109,7 @@ const learning = (() => {
 
   /** Squared distance of each action from the policy projected onto it (eqs 4 and 14), plus softness times the risk. */
   function consistency(sums, softness = 0) {
-    const { p, d } = sums, size = p * d, hessian = Float64Array.from(sums.consistent);
+    const { p, d } = sums, size = p * d, hessian = sums.consistent.slice();
     if (softness) {
       for (let j = 0; j < p; j++)
         for (let i = 0; i < p; i++)
@@ -165,7 +165,7 @@ const learning = (() => {
    * Van Loan, Matrix Computations, section 8.3).
    */
   function eigensystem(matrix, n) {
-    const a = Float64Array.from(matrix), vectors = new Float64Array(n * n);
+    const a = matrix.slice(), vectors = new Float64Array(n * n);
     const largest = a.reduce((most, each) => Math.max(most, Math.abs(each)), 0);
     const unit = largest > UNDERFLOW ? largest : 1;
     for (let i = 0; i < n * n; i++) a[i] = Math.abs(a[i] / unit) > 1e-60 ? a[i] / unit : 0;
@@ -285,7 +285,7 @@ const learning = (() => {
 
   /** Solve L y = r for the rows r of a matrix (k, n). */
   function solveLower(lower, rows, n, k) {
-    const solved = Float64Array.from(rows);
+    const solved = rows.slice();
     for (let r = 0; r < k; r++) {
       const at = r * n;
       for (let i = 0; i < n; i++)
@@ -294,24 +294,36 @@ const learning = (() => {
     return solved;
   }
 
-  /** A matrix with eigenvalues that are rounding replaced by the largest, where there are such. */
-  function regular(matrix, n) {
-    if (cholesky(matrix, n, SECONDARY_NOISE)) return matrix;
+  /** A matrix with eigenvalues that are rounding replaced by the largest. */
+  function raised(matrix, n) {
     const { values, vectors } = eigensystem(matrix, n), largest = values[n - 1];
-    const raised = values.map((each) => (largest <= UNDERFLOW ? 1 : each > SECONDARY_NOISE * largest ? each : largest));
-    const roots = vectors.map((each, i) => each * Math.sqrt(raised[Math.floor(i / n)]));
+    const kept = values.map((each) => (largest <= UNDERFLOW ? 1 : each > SECONDARY_NOISE * largest ? each : largest));
+    const roots = vectors.map((each, i) => each * Math.sqrt(kept[Math.floor(i / n)]));
     const columns = transposed(roots, n, n);
     return timesTransposed(columns, columns, n, n, n);
   }
 
+  /** A matrix as it is where no eigenvalue is rounding, else with those raised. */
+  function regular(matrix, n) {
+    return cholesky(matrix, n, SECONDARY_NOISE) ? matrix : raised(matrix, n);
+  }
+
   /** Minimum of w.H w - 2 g.w; directions in which H is zero stay zero. */
   function minimum(hessian, linear, n) {
-    const lower = cholesky(regular(hessian, n), n), w = solveLower(lower, linear, n, 1);
+    const lower = cholesky(hessian, n, SECONDARY_NOISE) || cholesky(raised(hessian, n), n);
+    const w = solveLower(lower, linear, n, 1);
     for (let i = n - 1; i >= 0; i--) {
-      for (let j = i + 1; j < n; j++) w[i] -= lower[j * n + i] * w[j];
-      w[i] /= lower[i * n + i];
+      const at = i * n, wi = (w[i] /= lower[at + i]);
+      for (let j = 0; j < i; j++) w[j] -= lower[at + j] * wi;
     }
     return w;
+  }
+
+  /** a plus a share of b. */
+  function combined(a, b, share = 1) {
+    const sum = a.slice();
+    for (let i = 0; i < sum.length; i++) sum[i] += share * b[i];
+    return sum;
   }
 
   /** Rows (k, p) of features as rows (k d, p d) of weights: each for every action. */
@@ -376,7 +388,7 @@ const learning = (() => {
       threshold: (split) => (split > 0 && largest > 0 ? values[split - 1] / largest : 0),
       /** Calls back with the weights at every split from the lowest on. */
       walk(visit) {
-        const w = Float64Array.from(finest);
+        const w = finest.slice();
         visit(lowest, w, true);
         w.set(at(lowest));
         for (let s = lowest; s < size; s++) {
@@ -461,7 +473,7 @@ const learning = (() => {
 
   function plus(one, other) {
     const sum = (a, b) => ({
-      hessian: a.hessian.map((each, i) => each + b.hessian[i]), linear: a.linear.map((each, i) => each + b.linear[i]),
+      hessian: combined(a.hessian, b.hessian), linear: combined(a.linear, b.linear),
       constant: a.constant + b.constant, size: a.size,
     });
     return { error: sum(one.error, other.error), risk: sum(one.risk, other.risk), weight: one.weight + other.weight };
@@ -469,8 +481,8 @@ const learning = (() => {
 
   /** The least of the error plus the softness times the risk. */
   function softened({ error, risk }, softness) {
-    return minimum(error.hessian.map((each, i) => each + softness * risk.hessian[i]),
-      error.linear.map((each, i) => each + softness * risk.linear[i]), error.size);
+    return minimum(combined(error.hessian, risk.hessian, softness), combined(error.linear, risk.linear, softness),
+      error.size);
   }
 
   /** Softness, and the least with it, of a prior that has the information of so many samples. */
@@ -495,8 +507,8 @@ const learning = (() => {
         squares.push(square);
       }
     if (!squares.length) return Infinity;
-    squares.sort((a, b) => a - b);
-    const middle = squares.length >> 1, median = (squares[middle] + squares[(squares.length - 1) >> 1]) / 2;
+    const sorted = Float64Array.from(squares).sort(), middle = sorted.length >> 1;
+    const median = (sorted[middle] + sorted[(sorted.length - 1) >> 1]) / 2;
     return median / MEDIANS[d] / 70; // the squares of 1, 4, 6, 4 and 1 sum to 70
   }
 
