@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
-from ..base.display import percent
+from ..base.display import counted, percent
 from ..models import SUPPORTED
 
 if TYPE_CHECKING:
@@ -472,5 +472,4 @@ def of_surveys(surveys: Sequence[Any], needed: str = "", then: str = "unconstrai
     return Verdict(Mark.DOUBTFUL, said, doubt=fewer, next=then)
 
 
-def _count(demonstrations: int) -> str:
-    return f"{demonstrations} demonstration{'' if demonstrations == 1 else 's'}"
+_count = partial(counted, noun="demonstration")

@@ -108,11 +108,6 @@ def find_clock_of(stamps: Array, name: str, unit: str | None = None) -> Clock:
     return Clock(float(known[0]) if typical * length > SINCE_1970 else 0.0, length)
 
 
-def seconds(stamps: Array, name: str, unit: str | None = None) -> Array:
-    """Time stamps in seconds, shape (T,); from the first one where they count since 1970."""
-    return find_clock_of(stamps, name, unit).seconds(stamps)
-
-
 def unit_in_name(name: str) -> str | None:
     """The unit of time at the end of a name, None where there is none."""
     found = _UNIT_IN_NAME.search(name)

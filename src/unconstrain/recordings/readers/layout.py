@@ -269,7 +269,7 @@ def read_list(cell: str) -> list[float] | None:
 
 def _weight(run: _Run, rows: Rows, decimal: str) -> float:
     above = next((cells for cells in reversed(rows[: run.first]) if cells is not None), None)
-    named = above is not None and _fit(above, run.kinds) is not None and _is_words(above, decimal)
+    named = above is not None and fitted(above, run.kinds) is not None and _is_words(above, decimal)
     return run.weight * (HEADER_COUNTS if named else 1)
 
 
@@ -284,8 +284,8 @@ def _counts(cells: Sequence[str]) -> bool:
     return len(numbers) > 2 and numbers == [str(number) for number in range(len(numbers))]
 
 
-def _fit(cells: list[str], kinds: str, *, pad: bool = False) -> list[str] | None:
-    """Cells as many as columns; None if they cannot be meant for them."""
+def fitted(cells: list[str], kinds: str, *, pad: bool = False) -> list[str] | None:
+    """Cells as many as columns, as a delimiter may stand at the end of a row or not; None if they are for others."""
     extra = len(cells) - len(kinds)
     if extra > 0:
         return None if any(cells[len(kinds) :]) else cells[: len(kinds)]
@@ -301,7 +301,7 @@ def _true_start(rows: Rows, run: _Run, decimal: str) -> int:
         cells = rows[line]
         if cells is None:
             continue
-        if _fit(cells, run.kinds) is None:
+        if fitted(cells, run.kinds) is None:
             break
         if _is_words(cells, decimal):
             return start
@@ -343,7 +343,7 @@ def _header(rows: Rows, lines: Sequence[str], first: int, kinds: str, delimiter:
         directly = [rows[line] or [] for line in range(above[-1] - 1, -1, -1)] if len(kinds) > 1 else []
         needed = "" in nearest[: len(kinds.rstrip("e"))]
         higher = takewhile(lambda cells: _goes_above(cells, len(kinds), decimal, needed), directly)
-        return [*reversed([_fit(cells, kinds, pad=True) or cells for cells in higher]), nearest]
+        return [*reversed([fitted(cells, kinds, pad=True) or cells for cells in higher]), nearest]
     comments = (line for line in reversed(lines[:first]) if is_comment(line))
     named = (split(_MARK.sub("", line), delimiter) for line in comments)
     return [cells for cells in named if len(cells) == len(kinds) and _is_words(cells, decimal)][:1]
@@ -353,7 +353,7 @@ def _nearest(cells: list[str], below: list[str], kinds: str) -> list[str] | None
     """Cells as many as columns; R leaves out the name of the numbers of rows, which it writes first."""
     if len(cells) == len(kinds) - 1 and all(cells) and below[0] in ("0", "1"):
         return ["", *cells]
-    return _fit(cells, kinds)
+    return fitted(cells, kinds)
 
 
 def _may_name(cells: Sequence[str], decimal: str) -> bool:

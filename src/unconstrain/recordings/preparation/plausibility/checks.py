@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from ....base.arrays import Array
+from ...readers.clocks import UNITS
 from ...remarks import Remark
 from ...signals.stillness import is_noise, noise_share, pauses, rest_before
 from ..meaning import are_backwards, are_targets
-from .subject import GAP_INTERVALS, LEAST_ROWS, Subject
+from .subject import FLIPS, GAP_INTERVALS, LEAST_ROWS, Subject
 
 SLOWEST, FASTEST = 2.0, 2e4
 """Samples per second that a movement is recorded with; others are a clock in another unit."""
-
-UNITS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-"""Units that clocks count in, in seconds."""
 
 SHORTEST_GAP_S = 0.1
 """Shorter gaps are the jitter of a computer."""
@@ -143,17 +142,8 @@ def angle_wrap(subject: Subject) -> Remark | None:
     return Remark("angle-wrap", message, name, subject.row(wrap.rows[0]))
 
 
-def quaternion_flip(subject: Subject) -> Remark | None:
-    """Four columns of unit quaternions that turn their sign."""
-    return _flip(subject, "quaternion-flip")
-
-
-def rotation_vector_flip(subject: Subject) -> Remark | None:
-    """Three columns of a rotation vector that turns into its opposite at half a turn."""
-    return _flip(subject, "rotation-vector-flip")
-
-
-def _flip(subject: Subject, code: str) -> Remark | None:
+def turned_sign(code: str, subject: Subject) -> Remark | None:
+    """Columns of one kind of orientation (:data:`~.subject.FLIPS`) whose numbers turn their sign."""
     for start, flip in subject.flips.items():
         if flip.code == code:
             names = [subject.name(column) for column in range(start, start + flip.width)]
@@ -254,7 +244,7 @@ def all_zero(subject: Subject) -> Remark | None:
     return Remark("all-zero", message, (subject.recipe.actions or ("",))[0])
 
 
-CHECKS = (
+CHECKS: tuple[Callable[[Subject], Remark | None], ...] = (
     clock_unit,
     clock_gap,
     irregular,
@@ -262,8 +252,7 @@ CHECKS = (
     reversed_in_time,
     other_topic,
     angle_wrap,
-    quaternion_flip,
-    rotation_vector_flip,
+    *(partial(turned_sign, flip.code) for flip in FLIPS),
     glitch,
     seam,
     targets,
