@@ -111,13 +111,13 @@ class Space(ABC):
         so that local models hold sines exactly, for one weight more; of a rotation matrix there would be six more.
         """
 
-    @abstractmethod
     def frame(self, coordinates: Array) -> Array | None:
-        """Orthogonal matrix (m, m) that takes a point (m,) to where all begin; None where that is arbitrary."""
+        """Orthogonal matrix (m, m) that takes a point (m,) to where all begin; None where nothing is turned."""
+        return None
 
-    @abstractmethod
     def relative(self, states: Array, origin: Array) -> Array:
         """States (N, n) as seen from other states."""
+        return states - origin
 
     @abstractmethod
     def difference(self, states: Array, origin: Array) -> Array:
@@ -173,22 +173,11 @@ class Euclidean(Space):
         """Identities (M, n, n)."""
         return np.tile(np.eye(coordinates.shape[1]), (len(coordinates), 1, 1))
 
-    def frame(self, coordinates: Array) -> None:
-        """None: nothing is turned."""
-
-    def relative(self, states: Array, origin: Array) -> Array:
-        """Subtract."""
-        return states - origin
-
-    difference = relative
+    difference = Space.relative
 
     def step(self, states: Array, differences: Array) -> Array:
         """Add."""
         return states + differences
-
-    def mean(self, states: Array) -> Array:
-        """Arithmetic mean."""
-        return states.mean(axis=0, keepdims=True)
 
     def unrolled(self, states: Array) -> Array:
         """The states."""
@@ -239,10 +228,6 @@ class Circle(Space):
         length = float(np.linalg.norm(coordinates))
         cosine, sine = coordinates / length if length > 0.0 else (1.0, 0.0)
         return np.array([[cosine, sine], [-sine, cosine]])
-
-    def relative(self, states: Array, origin: Array) -> Array:
-        """Subtract."""
-        return states - origin
 
     def difference(self, states: Array, origin: Array) -> Array:
         """Angles (N, 1) of at most half a turn."""

@@ -108,6 +108,12 @@ def find_clock_of(stamps: Array, name: str, unit: str | None = None) -> Clock:
     return Clock(float(known[0]) if typical * length > SINCE_1970 else 0.0, length)
 
 
+def usual(intervals: Array) -> float:
+    """The median step forward, 0 if there is none."""
+    forward = intervals[intervals > 0]
+    return float(np.median(forward)) if forward.size else 0.0
+
+
 def unit_in_name(name: str) -> str | None:
     """The unit of time at the end of a name, None where there is none."""
     found = _UNIT_IN_NAME.search(name)

@@ -113,9 +113,8 @@ def _masks(file: Any, visit: Visit) -> dict[str, list[str]]:
     mask = visit.members(file).get("mask")
     for title, names in visit.members(mask).items() if hasattr(mask, "items") else ():
         for name in names[()].tolist() if getattr(names, "ndim", 0) == 1 else ():
-            lists.setdefault(name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name), []).append(
-                title
-            )
+            text = name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)
+            lists.setdefault(text, []).append(title)
     return lists
 
 

@@ -22,6 +22,9 @@ from .table import unique_names
 NOTHING = {"", *"NA N/A n/a #N/A <NA> NaN nan -nan -NaN NAN None none null NULL -".split()}  # noqa: SIM905
 """Cells that stand for no number."""
 
+DIALECTS = (*((mark, ".") for mark in ",\t;| "), *((mark, ",") for mark in "\t; "))
+"""Delimiters and decimal marks that are tried, the usual ones first; a blank stands for any white space."""
+
 LISTS = re.compile(r"[\[(].*[\])]")
 """A cell that holds a list: ``[0.1, 0.2]``, ``(1 2 3)``."""
 
@@ -67,8 +70,6 @@ class Layout:
         Names of the columns, one for each cell of a row; empty where the header has none.
     kinds : str
         For each column ``n`` if it holds numbers, ``l`` lists, ``w`` words, ``e`` nothing yet.
-    has_header : bool
-        Whether the text names the columns.
     header : tuple of tuple of str
         The rows of the header, cell by cell; one that comes again is no row.
     units, attributes : mapping of str to str
@@ -88,7 +89,6 @@ class Layout:
     first: int
     titles: tuple[str, ...]
     kinds: str
-    has_header: bool
     header: tuple[tuple[str, ...], ...]
     units: dict[str, str]
     attributes: dict[str, Any]
@@ -154,16 +154,7 @@ def find_layout(lines: Sequence[str]) -> Layout | None:
         The beginning of a text, without the ends of the lines.
     """
     best: tuple[float, Layout] | None = None
-    for delimiter, decimal in (
-        (",", "."),
-        ("\t", "."),
-        (";", "."),
-        ("|", "."),
-        (" ", "."),
-        ("\t", ","),
-        (";", ","),
-        (" ", ","),
-    ):
+    for delimiter, decimal in DIALECTS:
         if (delimiter != " " or decimal == ",") and not any(delimiter in line for line in lines):
             continue
         rows = [split(line, delimiter) if line.strip() and not is_comment(line) else None for line in lines]
@@ -196,10 +187,19 @@ def find_block(rows: Rows, lines: Sequence[str], delimiter: str, decimal: str) -
     after = [line for line, cells in enumerate(rows) if line > run.last and cells is not None]
     stop = after[0] if after and any(line > run.last for line, _, _ in others) else None
     titles, units = _titles(header, len(run.kinds), above)
-    units = _degrees(titles, above) | units
     layout = Layout(
-        *(delimiter, decimal, first, titles, kinds, any(titles), tuple(map(tuple, header)), units),
-        *(_attributes(rows[:first], header), _rate(above), stop, others, _various(rows[first:], kinds)),
+        delimiter,
+        decimal,
+        first,
+        titles,
+        kinds,
+        header=tuple(map(tuple, header)),
+        units=_degrees(titles, above) | units,
+        attributes=_attributes(rows[:first], header),
+        rate=_rate(above),
+        stop=stop,
+        others=others,
+        various=_various(rows[first:], kinds),
     )
     return weight, layout
 
@@ -376,8 +376,8 @@ def _titles(header: Sequence[list[str]], width: int, above: str) -> tuple[tuple[
     if not header:
         markers = _MARKERS.search(above)
         names = markers[1].split("\t") if markers else []
-        fits = 3 * len(names) == width
-        return tuple(f"{name.strip()}.{axis}" for name in names for axis in "XYZ") if fits else ("",) * width, {}
+        titles = tuple(f"{name.strip()}.{axis}" for name in names for axis in "XYZ")
+        return titles if len(titles) == width else ("",) * width, {}
     rows = [list(row) for row in header]
     unit_row = next(
         (row for row in reversed(rows[1:]) if all(_UNIT_WORD.fullmatch(cell) for cell in row if cell)), None

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from ....base.arrays import Array
-from ...readers.clocks import UNITS
+from ...readers.clocks import UNITS, usual
 from ...remarks import Remark
 from ...signals.stillness import is_noise, noise_share, pauses, rest_before
 from ..meaning import are_backwards, are_targets
@@ -48,10 +48,10 @@ def clock_unit(subject: Subject) -> Remark | None:
         return None
     stamps = np.sort(times[np.isfinite(times)])
     intervals = np.diff(stamps)
-    forward = intervals[intervals > 0]
-    if not forward.size:
+    typical = usual(intervals)
+    if not typical:
         return None
-    rates = 1.0 / float(np.median(forward)), float(len(intervals) / (stamps[-1] - stamps[0]))
+    rates = 1.0 / typical, float(len(intervals) / (stamps[-1] - stamps[0]))
     if max(rates) > SLOWEST and min(rates) < FASTEST:
         return None
     unit = next((unit for unit, seconds in UNITS.items() if seconds / max(rates) < 1.0 / SLOWEST), "ns")
@@ -66,9 +66,7 @@ def clock_gap(subject: Subject) -> Remark | None:
     if stamps is None or len(stamps) < LEAST_ROWS or not subject.is_in_order:
         return None
     intervals = np.diff(stamps)
-    moving = intervals[intervals > 0]
-    usual = float(np.median(moving)) if moving.size else 0.0
-    longest = subject.recipe.max_gap_s or max(GAP_INTERVALS * usual, SHORTEST_GAP_S)
+    longest = subject.recipe.max_gap_s or max(GAP_INTERVALS * usual(intervals), SHORTEST_GAP_S)
     rows = np.flatnonzero(intervals > longest) + 1
     rows = rows[(rows >= SHORTEST_PIECE) & (rows <= len(stamps) - SHORTEST_PIECE)]
     if not rows.size:
