@@ -168,15 +168,14 @@ def find_layout(lines: Sequence[str]) -> Layout | None:
 def find_block(rows: Rows, lines: Sequence[str], delimiter: str, decimal: str) -> tuple[float, Layout] | None:
     """The heaviest block of rows of one kind, and its weight; None if no number is there or none needs a comma."""
     runs = _runs(rows, decimal)
-    if not runs or (
-        decimal == "," and (len(runs[0].kinds) < 2 or not any("," in cell for cell in rows[runs[0].first] or ()))
-    ):
+    if not runs or (decimal == "," and not _has_commas(runs[0], rows)):
         return None
     run, weight = max(((run, _weight(run, rows, decimal)) for run in runs), key=lambda pair: pair[1])
     first = _true_start(rows, run, decimal)
     header = _header(rows, lines, first, run.kinds, delimiter, decimal)
     if not header and _counts(rows[first] or []):
-        header, first = [rows[first] or []], first + 1
+        header = [rows[first] or []]
+        first += 1
     kinds = _kinds_below(rows, first, run, decimal)
     above = "\n".join(lines[:first])
     others = tuple(
@@ -202,6 +201,11 @@ def find_block(rows: Rows, lines: Sequence[str], delimiter: str, decimal: str) -
         various=_various(rows[first:], kinds),
     )
     return weight, layout
+
+
+def _has_commas(run: _Run, rows: Rows) -> bool:
+    """Whether a run has several columns, and a comma in a cell of its first row."""
+    return len(run.kinds) > 1 and any("," in cell for cell in rows[run.first] or ())
 
 
 def _runs(rows: Rows, decimal: str) -> list[_Run]:
