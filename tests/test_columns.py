@@ -12,7 +12,12 @@ from unconstrain.recordings.columns import resolve
 from unconstrain.recordings.demonstration import Recording
 from unconstrain.recordings.preparation.recipes import complete_recipe
 from unconstrain.recordings.readers import Reading
-from unconstrain.recordings.readers.clocks import find_clock, read_words, seconds
+from unconstrain.recordings.readers.clocks import find_clock, find_clock_of, read_words
+
+
+def seconds(stamps, name):
+    return find_clock_of(stamps, name).seconds(stamps)
+
 
 COLUMNS = (
     "q1",

@@ -18,7 +18,7 @@ from recorded import DATA, needs_data
 from unconstrain.base.errors import ReadError, SettingError, UnconstrainError
 from unconstrain.recordings.demonstration import Recording
 from unconstrain.recordings.readers import read
-from unconstrain.recordings.readers.clocks import seconds
+from unconstrain.recordings.readers.clocks import find_clock_of
 from unconstrain.recordings.readers.table import unique_names
 
 one_folder = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
@@ -34,6 +34,10 @@ def write(tmp_path: Path) -> Write:
         return path
 
     return to_file
+
+
+def seconds(stamps: np.ndarray, name: str) -> np.ndarray:
+    return find_clock_of(stamps, name).seconds(stamps)
 
 
 def only(recordings: list[Recording]) -> Recording:

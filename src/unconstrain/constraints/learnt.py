@@ -98,8 +98,8 @@ class LearntConstraint(Parameters, Shown):
         """
         table: Any = as_matrix(states, "states", convert=False)
         if actions is None:
-            return self._fit_parts([[(table, table - table.mean(axis=0), sample_weight, groups)]], _here, surface=True)
-        return self._fit_parts([[(table, actions, sample_weight, groups)]], _here)
+            return self.fit_parts([[(table, table - table.mean(axis=0), sample_weight, groups)]], _here, surface=True)
+        return self.fit_parts([[(table, actions, sample_weight, groups)]], _here)
 
     def fit_each(
         self, states: ArrayLike, actions: ArrayLike | None, groups: Groups
@@ -166,7 +166,7 @@ class LearntConstraint(Parameters, Shown):
         What can be walked through twice is; of a generator, the first batch places the features.
         """
         if iter(batches) is not batches:
-            return self._fit_parts([batches], _here)
+            return self.fit_parts([batches], _here)
         rest = iter(batches)
         first = next(rest, None)
         if first is None:
@@ -187,10 +187,6 @@ class LearntConstraint(Parameters, Shown):
             raise SettingError("this constraint was stored, without what it was learnt from: fit it anew.")
         begun = self.evidence_ if hasattr(self, "evidence_") else self._begun(_looked([batch]), surface=False)
         return self._learnt(begun.with_batches(_checked([batch])))
-
-    def fit_parts(self, parts: Sequence[Any], summed: Callable[..., Any]) -> Self:
-        """Learn from parts wherever they are; see :mod:`unconstrain.cluster`."""
-        return self._fit_parts(parts, summed)
 
     def projection(self, states: ArrayLike) -> Array:
         """What the constraint leaves free, ``N = I − A⁺A``, shape (N, d, d)."""
@@ -217,7 +213,8 @@ class LearntConstraint(Parameters, Shown):
             raise InvalidDataError(f"states: got {table.shape[1]} columns, expected {choice.columns} as fitted.")
         return choice.form.lift(table, np.zeros((len(table), choice.actions)))
 
-    def _fit_parts(self, parts: Sequence[Any], summed: Callable[..., Any], *, surface: bool = False) -> Self:
+    def fit_parts(self, parts: Sequence[Any], summed: Callable[..., Any], *, surface: bool = False) -> Self:
+        """Learn from parts wherever they are; see :mod:`unconstrain.cluster`. Of a ``surface`` actions say nothing."""
         if not parts:
             raise InvalidDataError("got no part to learn from, expected at least one.")
         begun = self._begun(summed(_looked, parts), surface=surface)

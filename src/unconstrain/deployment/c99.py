@@ -80,23 +80,8 @@ def c_source(
 ) -> Source:
     """Source and header of ``void NAME_step(const double state[n], double action[d])`` and what belongs to it.
 
-    They are C99 as well as C++11. Constants have all digits. The file needs nothing but ``exp``, for angles
-    ``sin`` and ``cos``, and for a guided policy ``sqrt``, from the standard library. With ``NAME_SELF_TEST`` defined,
-    in capitals, it has a ``main`` that compares itself with the policy.
-
-    Parameters
-    ----------
-    form : ClosedForm
-    name : str
-        A C identifier, with which all names begin.
-    policy : callable
-        States (N, n) to actions (N, d), which the self-test expects.
-    described : Description
-        Goes into a comment.
-    file : str
-        Name of the file that the source is for.
-    single : bool
-        Compute in ``float``.
+    Constants have all digits. The file needs nothing but ``exp``, for angles ``sin`` and ``cos``, and for a guided
+    policy ``sqrt``, from the standard library. The self-test expects what the policy says.
 
     Raises
     ------

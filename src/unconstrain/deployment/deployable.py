@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted
 
+from ..base import files
 from ..base.arrays import Array
 from ..models import ClosedForm, Scale
 from .c99 import export_c
 from .description import Description
 from .javascript import export_javascript, javascript
-from .onnx_graph import export_onnx
+from .onnx_graph import onnx_model
 from .ros2 import Messages, export_ros2
 from .scaled import Scaler, scaled
 from .stepping import Step, stepper
@@ -85,7 +86,7 @@ class Exportable:
         Needs the extra ``onnx``. Parameters and errors as in :meth:`export_c`; what is said goes into the metadata.
         """
         form = self.closed_form(scaler)
-        export_onnx(form, path, self.describe(form, notes), single=single)
+        files.write(path, onnx_model(form, self.describe(form, notes), single=single))
 
     def export_ros2(
         self,
@@ -105,6 +106,11 @@ class Exportable:
         messages : {"joints", "pose"}, optional
             Whether states are the positions of joints (``JointState`` in, ``Float64MultiArray`` out) or of a pose
             (``PoseStamped`` in, ``TwistStamped`` out); by default of a pose where they are called x, y and z.
+
+        Raises
+        ------
+        SettingError
+            Also if states are orientations, or those of a pose are not three with three actions.
         """
         form = self.closed_form(scaler)
         export_ros2(form, self._after(scaler), folder, name, self.describe(form, notes), messages)

@@ -71,15 +71,8 @@ def digest(form: ClosedForm) -> str:
     found = hashlib.sha256(repr(form.embedding.space).encode())
     guide = form.correction
     added = [] if guide is None else [*guide.tables.values(), np.array(list(guide.numbers.values()))]
-    for table in (
-        form.origin,
-        form.maps,
-        form.exponents,
-        form.monomials,
-        form.precisions,
-        form.embedding.frame,
-        *added,
-    ):
+    own = form.origin, form.maps, form.exponents, form.monomials, form.precisions, form.embedding.frame
+    for table in (*own, *added):
         if table is not None:
             found.update(f"{table.shape}".encode() + np.ascontiguousarray(table, np.float64).tobytes())
     return found.hexdigest()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from functools import partial, reduce, singledispatch
 from typing import Any
@@ -10,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base import files
 from ..base.arrays import Array, require_extra
 from ..models import ClosedForm, Correction, spaces
 from .description import Description
@@ -21,29 +19,8 @@ OPSET = 17
 IR_VERSION = 8
 
 
-def export_onnx(
-    form: ClosedForm, path: str | os.PathLike[str], described: Description, *, single: bool = False
-) -> None:
-    """Write :func:`onnx_model` to a file."""
-    files.write(path, onnx_model(form, described, single=single))
-
-
-def onnx_model(form: ClosedForm, described: Description, *, single: bool = False) -> bytes:
-    """Serialised graph from ``states`` (N, n) to ``actions`` (N, d), of standard operators only, for any N.
-
-    Parameters
-    ----------
-    form : ClosedForm
-    described : Description
-        Goes into the metadata.
-    single : bool
-        Take, compute and give float32 rather than float64.
-
-    Raises
-    ------
-    MissingExtraError
-        If ``onnx`` is not installed.
-    """
+def onnx_model(form: ClosedForm, described: Description, *, single: bool) -> bytes:
+    """Serialised graph from ``states`` (N, n) to ``actions`` (N, d), of standard operators only, for any N."""
     require_extra("onnx", "onnx")
     from onnx import TensorProto, checker, helper
 

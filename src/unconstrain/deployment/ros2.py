@@ -47,23 +47,9 @@ def export_ros2(
     described: Description,
     messages: Messages | None = None,
 ) -> None:
-    """Write a package with a node that takes each state to a velocity.
+    """Write a package with a node that takes each state to a velocity, in place of a folder that is there.
 
-    The node limits the speed, stops where the support of the data ends, and stops when no state comes. States are
-    positions of joints, or three coordinates of a pose; by default of a pose if they are called so.
-
-    Parameters
-    ----------
-    form, policy, name, described
-        As in :func:`~unconstrain.deployment.c99.c_source`; the name, in small letters, is by default as the folder's.
-    folder : str or path-like
-        Replaced, if it is there.
-    messages : {"joints", "pose"}, optional
-
-    Raises
-    ------
-    SettingError
-        If states are orientations, or those of a pose are not three with three actions.
+    The node limits the speed, stops where the support of the data ends, and stops when no state comes.
     """
     package = c_name(Path(os.path.realpath(folder)).name if name is None else name).lower()
     coordinates = [bare(name)[-1:].lower() for name in described.states] == ["x", "y", "z"]

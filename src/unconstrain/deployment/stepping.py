@@ -90,13 +90,8 @@ def _polynomial(form: ClosedForm, monomials: NDArray[np.intp]) -> Step:
 
 def _blended(form: ClosedForm, exponents: Array) -> Step:
     n, d, models = form.sizes
-    relative, exp, dot, divide, affine = (
-        _relative_to(form.origin, form.embedding),
-        np.exp,
-        np.dot,
-        np.divide,
-        form.is_affine,
-    )
+    relative, affine = _relative_to(form.origin, form.embedding), form.is_affine
+    exp, dot, divide = np.exp, np.dot, np.divide
     # A column of ones, so that one product gives the blend and the sum of the shares.
     slopes, maps = np.ascontiguousarray(exponents), np.column_stack([form.maps.reshape(models, -1), np.ones(models)])
     buffers = _PerThread(n, models, maps.shape[1])

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
-from ..base.display import percent
+from ..base.display import counted, percent
 from ..models import SUPPORTED
 
 if TYPE_CHECKING:
@@ -151,9 +151,9 @@ def of_explained(
     guiding takes of that, None where it is not guided: where held out it takes about as much, from ``share``.
     """
     policy, alone, share = "The policy" if lost is None else "The guided policy", share, share - (lost or 0.0)
-    taken = (
-        "" if lost is None else f" ({alone:.0%} unguided, less {lost:.0%} that guiding takes of what it learnt from)"
-    )
+    taken = ""
+    if lost is not None:
+        taken = f" ({percent(alone)} unguided, less {percent(lost)} that guiding takes of what it learnt from)"
     across = "What constraints hid: no recording shows it, so no score does."
     if determined is not None and determined < MOSTLY and demonstrations >= ENOUGH:
         across = f"Across the motion: {of_untold(1 - determined)}"
@@ -289,7 +289,7 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
     elif mark is Mark.BAD and found.planes:
         mark, said = Mark.DOUBTFUL, f"{said[:-1]} to be sure, though each lies on a plane of its own."
     if found.noise_share > 3 * SMALL:
-        mark = Mark.BAD if mark is Mark.BAD else Mark.DOUBTFUL
+        mark = _no_better(mark)
         said = f"{said[:-1]}, though noise is {percent(found.noise_share)} of a typical action."
     trust = "" if mark is Mark.BAD else f"The policy at these states, to {percent(found.noise_share)} of noise."
     trust = f"{trust}{hangs}".strip()
@@ -472,5 +472,4 @@ def of_surveys(surveys: Sequence[Any], needed: str = "", then: str = "unconstrai
     return Verdict(Mark.DOUBTFUL, said, doubt=fewer, next=then)
 
 
-def _count(demonstrations: int) -> str:
-    return f"{demonstrations} demonstration{'' if demonstrations == 1 else 's'}"
+_count = partial(counted, noun="demonstration")

@@ -111,13 +111,13 @@ class Space(ABC):
         so that local models hold sines exactly, for one weight more; of a rotation matrix there would be six more.
         """
 
-    @abstractmethod
     def frame(self, coordinates: Array) -> Array | None:
-        """Orthogonal matrix (m, m) that takes a point (m,) to where all begin; None where that is arbitrary."""
+        """Orthogonal matrix (m, m) that takes a point (m,) to where all begin; None where nothing is turned."""
+        return None
 
-    @abstractmethod
     def relative(self, states: Array, origin: Array) -> Array:
         """States (N, n) as seen from other states."""
+        return states - origin
 
     @abstractmethod
     def difference(self, states: Array, origin: Array) -> Array:
@@ -173,22 +173,11 @@ class Euclidean(Space):
         """Identities (M, n, n)."""
         return np.tile(np.eye(coordinates.shape[1]), (len(coordinates), 1, 1))
 
-    def frame(self, coordinates: Array) -> None:
-        """None: nothing is turned."""
-
-    def relative(self, states: Array, origin: Array) -> Array:
-        """Subtract."""
-        return states - origin
-
-    difference = relative
+    difference = Space.relative
 
     def step(self, states: Array, differences: Array) -> Array:
         """Add."""
         return states + differences
-
-    def mean(self, states: Array) -> Array:
-        """Arithmetic mean."""
-        return states.mean(axis=0, keepdims=True)
 
     def unrolled(self, states: Array) -> Array:
         """The states."""
@@ -239,10 +228,6 @@ class Circle(Space):
         length = float(np.linalg.norm(coordinates))
         cosine, sine = coordinates / length if length > 0.0 else (1.0, 0.0)
         return np.array([[cosine, sine], [-sine, cosine]])
-
-    def relative(self, states: Array, origin: Array) -> Array:
-        """Subtract."""
-        return states - origin
 
     def difference(self, states: Array, origin: Array) -> Array:
         """Angles (N, 1) of at most half a turn."""
@@ -388,18 +373,16 @@ class Product(Space):
 
     def coordinates(self, states: Array) -> Array:
         """Coordinates of each part, side by side."""
-        parts = zip(self.parts, self._cut(states, 0), strict=True)
-        return namespace(states).concat([part.coordinates(own) for part, own in parts], axis=1)
+        return namespace(states).concat(self._each("coordinates", (states, 0)), axis=1)
 
     def states(self, coordinates: Array) -> Array:
         """States of each part, side by side."""
-        parts = zip(self.parts, self._cut(coordinates, 1), strict=True)
-        return np.concatenate([part.states(own) for part, own in parts], axis=1)
+        return np.concatenate(self._each("states", (coordinates, 1)), axis=1)
 
     def axes(self, coordinates: Array) -> Array:
         """Axes of each part, as blocks on the diagonal."""
-        each = [part.axes(own) for part, own in zip(self.parts, self._cut(coordinates, 1), strict=True)]
-        return np.stack([_block_diagonal(*blocks) for blocks in zip(*each, strict=True)])
+        each = zip(*self._each("axes", (coordinates, 1)), strict=True)
+        return np.stack([_block_diagonal(*blocks) for blocks in each])
 
     def frame(self, coordinates: Array) -> Array:
         """Matrix of the frames of the parts."""
@@ -409,28 +392,24 @@ class Product(Space):
 
     def relative(self, states: Array, origin: Array) -> Array:
         """States of each part as seen from others."""
-        return self._each("relative", states, origin)
+        return np.concatenate(self._each("relative", (states, 0), (origin, 0)), axis=1)
 
     def difference(self, states: Array, origin: Array) -> Array:
         """Differences of each part, side by side."""
-        return self._each("difference", states, origin)
+        return np.concatenate(self._each("difference", (states, 0), (origin, 0)), axis=1)
 
     def step(self, states: Array, differences: Array) -> Array:
         """Steps of each part, side by side."""
-        pairs = zip(self._cut(states, 0), self._cut(differences, 2), strict=True)
-        moved = [part.step(own, way) for part, (own, way) in zip(self.parts, pairs, strict=True)]
-        return np.concatenate(moved, axis=1)
+        return np.concatenate(self._each("step", (states, 0), (differences, 2)), axis=1)
 
     def unrolled(self, states: Array) -> Array:
         """Paths of each part, side by side."""
-        return np.concatenate(
-            [part.unrolled(own) for part, own in zip(self.parts, self._cut(states, 0), strict=True)], axis=1
-        )
+        return np.concatenate(self._each("unrolled", (states, 0)), axis=1)
 
-    def _each(self, what: str, states: Array, origin: Array) -> Array:
-        pairs = zip(self._cut(states, 0), self._cut(origin, 0), strict=True)
-        found = [getattr(part, what)(own, other) for part, (own, other) in zip(self.parts, pairs, strict=True)]
-        return np.concatenate(found, axis=1)
+    def _each(self, what: str, *tables: tuple[Array, int]) -> list[Array]:
+        """What each part makes of its columns of some tables, which are of kinds as in :meth:`_cut`."""
+        cut = zip(*(self._cut(table, kind) for table, kind in tables), strict=True)
+        return [getattr(part, what)(*own) for part, own in zip(self.parts, cut, strict=True)]
 
     def _cut(self, table: Array, kind: int) -> list[Array]:
         """The columns of each part, of states, coordinates or directions: 0, 1, 2."""

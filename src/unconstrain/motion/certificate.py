@@ -10,9 +10,9 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import SettingError
-from ..models import ClosedForm, spaces
+from ..models import spaces
 from ..risks import null_space_projection
-from .guided import Guided
+from .guided import Guided, formula_of
 from .rollouts import rollout
 
 TRIES = 60
@@ -126,8 +126,11 @@ def _blended(policy: Any) -> Certificate | None:
     With z = x − x* and ``‖J_m‖ ≤ L`` a step changes ``‖z‖²`` by ``−2 Δt c ‖z‖² + Δt² L² ‖z‖²`` at most. On a surface
     whose nearest point is h from the goal, ``zᵀ N J_m h ≤ K ‖z‖ ‖h‖``, where a multiple of I in J_m does not count.
     """
-    form = _formula(policy)
-    if form is None or form.monomials is not None or form.maps.shape[1:] != (len(form.origin), len(form.origin) + 1):
+    try:
+        form = formula_of(policy)
+    except SettingError:
+        return None
+    if form.monomials is not None or form.maps.shape[1:] != (len(form.origin), len(form.origin) + 1):
         return None
     jacobians, offsets = form.maps[..., :-1], form.maps[..., -1]
     rate = -float(np.linalg.eigvalsh(0.5 * (jacobians + jacobians.mT))[:, -1].max())
@@ -148,14 +151,6 @@ def _blended(policy: Any) -> Certificate | None:
         f"surface that misses it they end within {skew / rate:.3g} times the distance between it and the surface's "
         "nearest point.",
     )
-
-
-def _formula(policy: Any) -> ClosedForm | None:
-    """What a policy says of itself, if it does."""
-    try:
-        return policy.closed_form() if hasattr(policy, "closed_form") else None
-    except SettingError:
-        return None
 
 
 def _refuted(policy: Callable[[Array], Array], starts: Array, normals: Array, near: float) -> Certificate:

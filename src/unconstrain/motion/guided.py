@@ -56,7 +56,7 @@ class Moved:
 
     def closed_form(self) -> ClosedForm:
         """The formula elsewhere."""
-        form = _formula(self.policy)
+        form = formula_of(self.policy)
         return replace(form, origin=form.origin + self.by)
 
     def describe(self, form: ClosedForm, notes: Mapping[str, Any] | None = None) -> Any:
@@ -227,7 +227,7 @@ class Guided(Exportable, Shown):
         """
         if scaler is not None:
             raise SettingError("scaler: a guided policy is guided in the units of its own states. Export without one.")
-        return replace(_formula(self.policy), correction=self.aim_.correction())
+        return replace(formula_of(self.policy), correction=self.aim_.correction())
 
     def describe(self, form: ClosedForm, notes: Mapping[str, Any] | None = None) -> Any:
         """What is said of the formula where it is used."""
@@ -252,7 +252,7 @@ class Guided(Exportable, Shown):
         return type(self.policy).__name__, str(self.aim_)
 
 
-def _formula(policy: Any) -> ClosedForm:
+def formula_of(policy: Any) -> ClosedForm:
     """Closed form of the policy that is guided."""
     if not hasattr(policy, "closed_form"):
         raise SettingError(

@@ -179,10 +179,8 @@ class Orbit(Shown):
         rows = np.concatenate([np.eye(n), table.directions, np.zeros((1, n))])
         floor = np.concatenate([np.full(n, -np.inf), table.directions @ table.goal, [1.0]])
         sums = np.zeros((len(rows), 3 * n))
-        sums[:n, : 2 * n], sums[n:-1, 2 * n :] = (
-            np.hstack([np.eye(n), self.turn.T]),
-            table.weights[:, None] * table.directions,
-        )
+        sums[:n, : 2 * n] = np.hstack([np.eye(n), self.turn.T])
+        sums[n:-1, 2 * n :] = table.weights[:, None] * table.directions
         sums[-1] = -np.concatenate([table.goal, floor[n:-1]]) @ sums[:-1]
         return rows, floor, sums
 

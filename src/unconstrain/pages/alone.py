@@ -27,7 +27,3 @@ def literal(data: Any) -> str:
     """Data as JSON that can stand in a script of a page, whatever text it holds."""
     plain = json.dumps(data, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return plain.replace("<", "\\u003c")
-
-
-def _file(name: str) -> str:
-    return (resources.files(__package__) / "static" / name).read_text("utf-8")

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.arrays import Array
 from ..evaluation import npoe, verdicts
 from ..recordings import Demonstration, stack
 from . import figures, html
+from .figures.planes import strokes
 
 if TYPE_CHECKING:
     from ..constraints import LearntConstraint
@@ -114,7 +114,7 @@ def held_directions(parts: Sequence[Part], columns: Sequence[str] | None = None)
     every = -(-len(states) // MOST_NORMALS)
     at = [(one, stack(held)[0][::every]) for one, held in parts]
     rows = [(states, reach * one(states)[:, row]) for one, states in at for row in range(one.rank_)]
-    lines = np.concatenate([_strokes(*each) for each in rows])[:, :shown]
+    lines = np.concatenate([strokes(*each) for each in rows])[:, :shown]
     thinned = -(-len(states) // MOST_POINTS)
     drawn = [*(("training", demo.states[::thinned, :shown]) for demo in demos), (_HELD, lines)]
     panel = (
@@ -125,8 +125,3 @@ def held_directions(parts: Sequence[Part], columns: Sequence[str] | None = None)
     caption = "Grey lines are the demonstrations. Strokes are directions in which they were held at these states."
     words = {_HELD: "held directions", "training": "demonstrations"}
     return html.picture("held", [panel], caption, keys=(_HELD, "training"), labels=words)
-
-
-def _strokes(points: Array, half: Array) -> Array:
-    """Lines through points to either side, with a row of NaN after each, shape (3 N, n)."""
-    return np.stack([points - half, points + half, np.full_like(points, np.nan)], axis=1).reshape(-1, points.shape[1])

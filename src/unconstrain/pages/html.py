@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.arrays import require_extra
-from .figures.style import COLOURS, LABELS, MARKERS, PALETTE, THEMED, described, svg
+from .figures.style import COLOURS, LABELS, MARKERS, PALETTE, RAISED, THEMED, described, svg
 
 if TYPE_CHECKING:
     from markupsafe import Markup as Markup
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 ALONE, WIDER = 620, 50
 """Width for which the text of a picture is made where it is alone in its row, and by how much it is wider than the
 least width where it is not, pixels."""
-
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def document(title: str, verdict: verdicts.Verdict, lead: str, *parts: Markup) -> str:
@@ -96,7 +94,7 @@ def number(value: float | None, digits: int = 3) -> str:
     if -5 < power < 6:
         text, raised = f"{float(f'{mantissa}e{power}'):.{max(digits - 1 - power, 0)}f}", ""
     else:
-        text, raised = mantissa, f"×10{str(power).translate(_SUPERSCRIPTS)}"
+        text, raised = mantissa, f"×10{str(power).translate(RAISED)}"
     shorter = text.rstrip("0").rstrip(".") if "." in text else text
     return shorter.replace("-", "−") + raised
 

@@ -26,13 +26,7 @@ class LocallyLinearPolicy(Policy):
         Fields are added until every sample has at least this weight in one.
     centres : array_like, shape (M, n), optional
         Use these instead.
-    learner : Learner or str, optional
-        Or its name: "robust", "hybrid", "inconsistency", "direct"; :class:`~unconstrain.Robust` by default.
-    validation : Folds or HeldOut, optional
-        What the learner chooses its thresholds on; ten folds by default.
-    space : Space, optional
-        Which states are angles or orientations (:mod:`unconstrain.spaces`); by default as the demonstrations say.
-    scale : sequence of float or "auto", optional
+    learner, validation, space, scale : optional
         As in :class:`~unconstrain.ParametricPolicy`.
 
     Attributes

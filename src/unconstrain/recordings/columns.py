@@ -8,7 +8,8 @@ from fnmatch import fnmatchcase
 from ..base.display import bare
 
 _RANGE = re.compile(r"(.*?)(\d+)\.\.(?:\1)?(\d+)")
-_SHORT = {"states": "x", "actions": "u"}
+SHORT = {"states": "x", "actions": "u"}
+"""What columns of arrays of these names are called, where both are there: x1..xn and u1..ud."""
 
 
 def resolve(asked: Sequence[str], columns: Sequence[str]) -> tuple[str, ...]:
@@ -37,7 +38,7 @@ def _meant(name: str, columns: Sequence[str], named: Mapping[str, str]) -> tuple
             return tuple(columns[ends[0] : (ends[1] or 0) + 1])
     if any(mark in name for mark in "*?["):
         return tuple(column for column in columns if fnmatchcase(column, name))
-    numbered = re.compile(rf"({re.escape(name)}|{_SHORT.get(name, '(?!)')})([_. \[]?\d+\]?|\..+)")
+    numbered = re.compile(rf"({re.escape(name)}|{SHORT.get(name, '(?!)')})([_. \[]?\d+\]?|\..+)")
     of_stem = tuple(column for column in columns if numbered.fullmatch(column))
     ending = tuple(column for column in columns if re.search(rf"[._/ ]{re.escape(name)}$", column))
     return of_stem or (ending if len(ending) == 1 else ())

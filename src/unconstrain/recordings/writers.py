@@ -24,6 +24,7 @@ from ..base.arrays import Array, require_extra
 from ..base.errors import SettingError, WriteError
 from ..base.files import put_folder, workshop, write
 from .demonstration import Recording
+from .readers.clocks import usual
 
 GROUP, TIME = "demo", "t"
 """Columns with the name of the demonstration and the time, before those of the recordings."""
@@ -76,17 +77,15 @@ def write_recordings(
 
 
 def _write_csv(recordings: Sequence[Recording], path: Path, *_: Any) -> None:
+    timed = _has_times(recordings)
+
     def fill(stream: Any) -> None:
         text = io.TextIOWrapper(stream, "utf-8", newline="")
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerow([GROUP, *([TIME] if _has_times(recordings) else []), *recordings[0].columns])
-        for recording in recordings:
-            rows = (
-                recording.values
-                if not _has_times(recordings)
-                else np.column_stack([_times(recording), recording.values])
-            )
-            writer.writerows([recording.name, *map(_cell, row)] for row in rows.tolist())
+        writer.writerow([GROUP, *([TIME] if timed else []), *recordings[0].columns])
+        for one in recordings:
+            rows = np.column_stack([_times(one), one.values]) if timed else one.values
+            writer.writerows([one.name, *map(_cell, row)] for row in rows.tolist())
         text.detach()
 
     write(path, fill)
@@ -251,11 +250,10 @@ def _times(recording: Recording) -> Array:
 
 def _rate(recordings: Sequence[Recording]) -> float:
     """Samples a second of all, whole where they nearly are."""
-    intervals = np.concatenate([np.diff(_times(recording)) for recording in recordings])
-    forward = intervals[intervals > 0]
-    if not forward.size:
+    typical = usual(np.concatenate([np.diff(_times(recording)) for recording in recordings]))
+    if not typical:
         raise WriteError("the recordings have no two samples at different times, and so no rate.")
-    rate = float(1.0 / np.median(forward))
+    rate = 1.0 / typical
     return float(round(rate)) if abs(rate - round(rate)) < 0.01 * rate else rate
 
 

@@ -13,7 +13,7 @@ from ..base.arrays import Array, Groups, on_host
 from ..base.errors import InvalidDataError
 from ..models import spaces
 from .batches import Batch
-from .order import content, mixed
+from .order import by_arrival, content, mixed
 from .suspects import lengths_in
 
 PLACING_SAMPLES = 20_000
@@ -236,9 +236,9 @@ def _smallest(keys: NDArray[np.uint64], largest: np.uint64) -> tuple[NDArray[np.
 
 def _contents(groups: Groups, states: Array, actions: Array, counts: Array) -> dict[Hashable, Array]:
     """Content of each demonstration, in the order of first appearance."""
-    names, first, places = np.unique(np.asarray(groups), return_index=True, return_inverse=True)
-    sums, order = content(places, states, actions, counts), np.argsort(first)
-    return dict(zip(names[order].tolist(), sums[order], strict=True))
+    names = np.asarray(groups)
+    first, places = by_arrival(names)
+    return dict(zip(names[first].tolist(), content(places, states, actions, counts), strict=True))
 
 
 def _added(mine: dict[Hashable, Array], theirs: dict[Hashable, Array]) -> dict[Hashable, Array]:
@@ -255,6 +255,6 @@ def _largest_at(keys: NDArray[np.uint64], every: NDArray[np.uint64], values: Arr
 
 def in_order(names: Groups) -> list[Hashable]:
     """Different names in the order of first appearance."""
-    different, first = np.unique(np.asarray(names), return_index=True)
-    ordered: list[Hashable] = different[np.argsort(first)].tolist()
+    every = np.asarray(names)
+    ordered: list[Hashable] = every[by_arrival(every)[0]].tolist()
     return ordered

@@ -1,6 +1,7 @@
 """Orders that depend on nothing but what the samples are: not on the order of arrival, nor on names or units."""
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,8 +64,12 @@ def distinct(samples: Batch) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """
     columns = [*samples.states.T, *samples.actions.T, *([] if samples.times is None else [samples.times])]
     bits = [np.ascontiguousarray(column + 0.0, dtype=np.float64).view(np.uint64) for column in columns]
-    table = np.stack([*bits, _codes(samples).astype(np.uint64)])
-    _, first, places = np.unique(mixed(table, 0), return_index=True, return_inverse=True)
+    return by_arrival(mixed(np.stack([*bits, _codes(samples).astype(np.uint64)]), 0))
+
+
+def by_arrival(values: NDArray[Any]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Where each different value (N,) is first, ascending, (K,), and which of these each one is, (N,)."""
+    _, first, places = np.unique(values, return_index=True, return_inverse=True)
     arrival = np.argsort(first)
     return first[arrival], np.argsort(arrival)[places]
 

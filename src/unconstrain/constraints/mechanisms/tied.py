@@ -34,7 +34,22 @@ class Slider(Line):
         return [replace(start, orientation=mean_orientation(track.quaternions)) for start in super().starts(track)]
 
 
-class Hinge(Circle):
+class _Turning(Mechanism):
+    """About an axis, the tool turning with it."""
+
+    def residuals(self, track: Track) -> Array:
+        """Height and distance (N, 2), how far ahead along the way (N, 1), tilts of the tool (N, 2)."""
+        angle, tilts = _turned(self, track)
+        along, first, second = self.frame @ (track.positions - self.centre).T
+        outwards, ahead = np.cos(angle) * first + np.sin(angle) * second, np.cos(angle) * second - np.sin(angle) * first
+        return np.column_stack([along - self.pitch * angle, outwards - self.radius, ahead, tilts])
+
+    def travel(self, track: Track) -> Array:
+        """Angle of the tool."""
+        return _turned(self, track)[0][:, None]
+
+
+class Hinge(_Turning, Circle):
     """About an axis, the tool turning with it."""
 
     form = Circle.form._replace(
@@ -46,32 +61,16 @@ class Hinge(Circle):
         ties=True,
     )
 
-    def residuals(self, track: Track) -> Array:
-        """Height and distance (N, 2), how far ahead along the way (N, 1), tilts of the tool (N, 2)."""
-        return _residuals(self, track)
-
-    def travel(self, track: Track) -> Array:
-        """Angle of the tool."""
-        return _turned(self, track)[0][:, None]
-
     @classmethod
     def starts(cls, track: Track) -> list[Self]:
         """The plane of the quaternions, then a regression."""
         return [replace(_turning(cls, track), pitch=0.0)]
 
 
-class TurningScrew(Screw):
+class TurningScrew(_Turning, Screw):
     """About an axis and along it in step, the tool turning with it."""
 
     form = Screw.form._replace(chart=(*Screw.form.chart, "turn"), blocks=(2, 1, 2), straight=Hinge, ties=True)
-
-    def residuals(self, track: Track) -> Array:
-        """As of a hinge."""
-        return _residuals(self, track)
-
-    def travel(self, track: Track) -> Array:
-        """Angle of the tool."""
-        return _turned(self, track)[0][:, None]
 
     @classmethod
     def starts(cls, track: Track) -> list[Self]:
@@ -91,14 +90,6 @@ def _turned(mechanism: Mechanism, track: Track) -> tuple[Array, Array]:
     tilts = 2 * np.column_stack([cosine * first - sine * second, cosine * second + sine * first])
     along = (track.positions - mechanism.centre) @ mechanism.axis
     return in_step(track.unwrapped(2 * np.arctan2(sine, cosine)), along, mechanism.pitch, track), tilts
-
-
-def _residuals(mechanism: Mechanism, track: Track) -> Array:
-    angle, tilts = _turned(mechanism, track)
-    along, first, second = mechanism.frame @ (track.positions - mechanism.centre).T
-    outwards, ahead = np.cos(angle) * first + np.sin(angle) * second, np.cos(angle) * second - np.sin(angle) * first
-    height = along - mechanism.pitch * angle
-    return np.column_stack([height, outwards - mechanism.radius, ahead, tilts])
 
 
 def _turning(cls: type[M], track: Track) -> M:

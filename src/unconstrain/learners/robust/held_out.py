@@ -22,9 +22,8 @@ def held_out_together(samples: Samples) -> Samples:
         blocks = min(BLOCKS_IN_A_FOLD * count, len(samples))
         return replace(samples, folds=np.arange(len(samples)) * blocks // len(samples) % count)
     like = like_constraints(samples.actions, samples.groups)
-    return (
-        samples if like.max() + 1 < LEAST_CONSTRAINTS else replace(samples, folds=_dealt(like, count)[samples.groups])
-    )
+    few = like.max() + 1 < LEAST_CONSTRAINTS
+    return samples if few else replace(samples, folds=_dealt(like, count)[samples.groups])
 
 
 def like_constraints(actions: Array, groups: NDArray[np.intp]) -> NDArray[np.intp]:

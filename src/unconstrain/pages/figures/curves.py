@@ -10,9 +10,7 @@ from ...base.arrays import Array
 from .style import COLOURS, DASHES, figure, keyed, log_axis
 
 
-def bars(
-    groups: Sequence[str], values: Mapping[str, Sequence[float]], *, title: str, label: str, height: int = 320
-) -> Any:
+def bars(groups: Sequence[str], values: Mapping[str, Sequence[float]], *, title: str, label: str) -> Any:
     """One bar for each method in each group.
 
     Parameters
@@ -23,10 +21,8 @@ def bars(
         Key to the height of its bar in each group.
     title, label : str
         Of the picture and its vertical axis.
-    height : int
-        Pixels.
     """
-    made = figure(title, "", label, height)
+    made = figure(title, "", label)
     [axes] = made.axes
     at, wide = np.arange(len(groups)), 0.76 / max(len(values), 1)
     for index, (key, heights) in enumerate(values.items()):

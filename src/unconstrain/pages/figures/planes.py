@@ -23,7 +23,6 @@ def vector_field(
     title: str = "",
     labels: tuple[str, str] = ("x₁ (m)", "x₂ (m)"),
     height: int = 430,
-    equal: bool = True,
 ) -> Any:
     """Arrows of several fields at the same points, with equal axes.
 
@@ -45,8 +44,6 @@ def vector_field(
         Of the axes, with their unit.
     height : int
         Pixels.
-    equal : bool
-        Both axes to one scale.
     """
     made = figure(title, *labels, height=height)
     [axes] = made.axes
@@ -55,8 +52,7 @@ def vector_field(
     for key in sorted(fields, key=list(_ARROWS).index):
         vectors = scale * clipped(fields[key], longest)
         axes.plot(*arrow_lines(points, vectors).T, **keyed(key, linewidth=_ARROWS[key]))
-    if equal:
-        axes.set_aspect("equal")
+    axes.set_aspect("equal")
     if fields:
         low, high = points.min(axis=0), points.max(axis=0)
         edge = np.maximum(0.12 * (high - low), 1e-12)
@@ -81,8 +77,10 @@ def paths(
         Points (T, 2).
     reach : float, optional
         The axes span [−reach, reach]; what is beyond is not drawn.
-    title, labels, height, equal
+    title, labels, height
         As in :func:`vector_field`.
+    equal : bool
+        Both axes to one scale.
     """
     made = figure(title, *labels, height=height)
     [axes] = made.axes
@@ -139,8 +137,7 @@ def known_map(
     if directions is not None and len(marked):
         reach = float(np.ptp(points, axis=0).max()) / 16
         ways = directions * reach / max(float(np.linalg.norm(directions, axis=1).max()), 1e-300)
-        ends = np.stack([marked - ways, marked + ways, np.full_like(marked, np.nan)], axis=1).reshape(-1, 2)
-        axes.plot(*ends.T, **keyed("to leave free", color=COLOURS["inconsistency"], linewidth=2))
+        axes.plot(*strokes(marked, ways).T, **keyed("to leave free", color=COLOURS["inconsistency"], linewidth=2))
     ring = {"markersize": 14, "markerfacecolor": "#ffffff", "markeredgecolor": COLOURS["inconsistency"]}
     axes.plot(*marked.T, "o", **ring)
     for number, place in enumerate(marked, 1):
@@ -154,22 +151,15 @@ def clipped(vectors: Array, longest: float) -> Array:
     return vectors * np.minimum(1.0, longest / np.maximum(lengths, 1e-300))
 
 
-def arrow_lines(points: Array, vectors: Array, head: float = 0.32) -> Array:
-    """Arrows as one broken line, six rows each, the last of them NaN.
+def strokes(points: Array, half: Array) -> Array:
+    """Lines through points (K, n) to either side as one broken line, with a row of NaN after each, shape (3 K, n)."""
+    return np.stack([points - half, points + half, np.full_like(points, np.nan)], axis=1).reshape(-1, points.shape[1])
 
-    Parameters
-    ----------
-    points, vectors : ndarray, shape (A, 2)
-        Where the arrows begin, and how far they reach.
-    head : float
-        Length of the barbs, as a share of the arrow's.
 
-    Returns
-    -------
-    ndarray, shape (6 A, 2)
-    """
+def arrow_lines(points: Array, vectors: Array) -> Array:
+    """Arrows from points (A, 2) by vectors (A, 2) as one broken line, six rows each, the last of them NaN."""
     tips = points + vectors
-    angle = 0.45  # between barb and shaft, radians
+    angle, head = 0.45, 0.32  # between barb and shaft, radians; length of a barb as a share of the arrow's
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     left, right = tips - head * vectors @ turn.T, tips - head * vectors @ turn
     gaps = np.full_like(points, np.nan)

@@ -55,7 +55,7 @@ THEMED = {INK: "var(--ink)", COLOURS["truth"]: "var(--ink)", RULE: "var(--rule)"
 """Colours that the page decides, by its variables: they are others in the dark."""
 
 _KEY = "key:"
-_POWERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @contextmanager
@@ -94,19 +94,18 @@ def keyed(key: str, **look: Any) -> dict[str, Any]:
     return {"gid": f"{_KEY}{key}", "color": COLOURS.get(key, PALETTE[0])} | look
 
 
-def log_axis(axes: Any, axis: str = "y") -> None:
-    """Make an axis logarithmic, with powers as text."""
+def log_axis(axes: Any) -> None:
+    """Make the vertical axis logarithmic, with powers as text."""
     with _look():
-        getattr(axes, f"set_{axis}scale")("log")
-    own = getattr(axes, f"{axis}axis")
-    own.set_major_formatter(lambda value, _: power(value))
-    own.set_minor_formatter(lambda *_: "")
+        axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(lambda value, _: power(value))
+    axes.yaxis.set_minor_formatter(lambda *_: "")
 
 
 def power(value: float) -> str:
     """A number of an axis, such as ``0.1``, ``20`` or ``10⁻⁶``."""
     exponent = round(float(np.log10(value)))
-    return f"{value:g}" if abs(exponent) < 4 else f"10{str(exponent).translate(_POWERS)}"
+    return f"{value:g}" if abs(exponent) < 4 else f"10{str(exponent).translate(RAISED)}"
 
 
 def readable(colour: Sequence[float]) -> str:

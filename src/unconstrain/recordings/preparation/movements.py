@@ -19,6 +19,7 @@ from ...base.arrays import Array, as_matrix, as_vector, check_at_least
 from ...base.display import counted
 from ...base.errors import InvalidDataError, SettingError
 from ..demonstration import Demonstration, Recording, Source
+from ..readers.clocks import usual
 from ..remarks import Remark
 from ..signals.jumps import glitches, repaired, seams
 from ..signals.smoothing import LEAST, kalman_velocities
@@ -27,11 +28,8 @@ from .continuity import continuous
 from .decisions import decide
 from .plausibility.checks import examine, is_irregular
 from .plausibility.sets import PUSHED, compare, outline
-from .plausibility.subject import Subject
+from .plausibility.subject import GAP_INTERVALS, Subject
 from .recipes import Recipe, select, stamps
-
-GAP_INTERVALS = 5.0
-"""An interval of this many median ones is a gap, where nothing else is said."""
 
 MOST_SAMPLES = 1e8
 """More than this is no rate but a mistake, and would fill the memory."""
@@ -144,13 +142,9 @@ def differentiate(
         Seconds, increasing; uniform for ``"savgol"``.
     positions : array_like, shape (T, n)
         No gaps.
-    method : {"savgol", "kalman", "central"}
-        Savitzky-Golay: the slope of a polynomial of degree ``order`` fitted to a window of
-        ``window_s`` seconds, at least the samples that the polynomial needs. A Kalman smoother of constant
-        acceleration under white jerk, with the most likely noise, or central differences of second order, both for
-        stamps at any distance.
-    window_s : float
-    order : int
+    method, window_s, order
+        As ``differentiate``, ``window_s`` and ``order`` of a :class:`Recipe`; stamps may be at any distance but for
+        ``"savgol"``, whose window has at least the samples that the polynomial needs.
 
     Returns
     -------
@@ -481,9 +475,7 @@ def _joined(pieces: Sequence[_Piece]) -> _Piece:
 
 def _typical(times: Array) -> float:
     """Median interval between stamps, NaN if there is none."""
-    intervals = np.diff(times)
-    forward = intervals[intervals > 0]
-    return float(np.median(forward)) if forward.size else float("nan")
+    return usual(np.diff(times)) or float("nan")
 
 
 def _longest(times: Array, max_gap_s: float | None) -> float:

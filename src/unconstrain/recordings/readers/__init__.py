@@ -61,7 +61,7 @@ def read(
     topic : str, optional
         Topic of a ROS recording, or several with commas between; or sheet of a workbook.
     episodes : sequence of str, optional
-        Only these demonstrations: names, numbers, ranges such as ``"0-9"``.
+        Only these demonstrations: names, numbers, ranges such as ``"0-9"``, or a list that the file itself holds.
     task : str, optional
         Only the demonstrations of this task.
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...base.arrays import Array
 from ...base.errors import ReadError
-from .layout import NOTHING, Layout, is_comment, number, read_list, split
+from .layout import NOTHING, Layout, fitted, is_comment, number, read_list, split
 from .lines import Lines
 from .table import numbers_of
 
@@ -126,15 +126,11 @@ class Parser:
         return rows, breaks
 
     def _fitted(self, cells: list[str], line: int) -> list[str]:
-        width = len(self.names)
-        if len(cells) == width:
-            return cells
-        # A delimiter may stand at the end of a row, or not.
-        if len(cells) > width and not any(cells[width:]):
-            return cells[:width]
-        if len(cells) < width and set(self.layout.kinds[len(cells) :]) == {"e"}:
-            return cells + [""] * (width - len(cells))
-        raise ReadError(f"{self.path}, line {line}: got {len(cells)} cells, expected {width} as in the header.")
+        found = fitted(cells, self.layout.kinds)
+        if found is None:
+            expected = f"expected {len(self.names)} as in the header"
+            raise ReadError(f"{self.path}, line {line}: got {len(cells)} cells, {expected}.")
+        return found
 
     def _columns(self, rows: Sequence[Row]) -> Array:
         lines = [line for line, _ in rows]

@@ -108,9 +108,10 @@ def find_clock_of(stamps: Array, name: str, unit: str | None = None) -> Clock:
     return Clock(float(known[0]) if typical * length > SINCE_1970 else 0.0, length)
 
 
-def seconds(stamps: Array, name: str, unit: str | None = None) -> Array:
-    """Time stamps in seconds, shape (T,); from the first one where they count since 1970."""
-    return find_clock_of(stamps, name, unit).seconds(stamps)
+def usual(intervals: Array) -> float:
+    """The median step forward, 0 if there is none."""
+    forward = intervals[intervals > 0]
+    return float(np.median(forward)) if forward.size else 0.0
 
 
 def unit_in_name(name: str) -> str | None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -44,14 +45,9 @@ _CONTROL_RATE = re.compile(r'"control_freq"\s*:\s*([\d.]+)')
 _ROLES = {"groups": "group"}
 
 
-def read_hdf5(path: Path, reading: Reading) -> Iterator[Table]:
-    """Read one file whole; see :class:`~.table.ReadFile`."""
-    return apart(_read, path, reading, None)
-
-
-def read_hdf5_blocks(path: Path, reading: Reading) -> Iterator[Table]:
-    """Go through one file by some rows at a time."""
-    return apart(_read, path, reading, BLOCK_ROWS)
+def read_hdf5(path: Path, reading: Reading, rows: int | None = None) -> Iterator[Table]:
+    """Read one file whole, or by so many rows at a time; see :class:`~.table.ReadFile`."""
+    return apart(_read, path, reading, rows)
 
 
 def _read(place: Path, path: Path, reading: Reading, rows: int | None) -> Iterator[Table]:
@@ -117,9 +113,8 @@ def _masks(file: Any, visit: Visit) -> dict[str, list[str]]:
     mask = visit.members(file).get("mask")
     for title, names in visit.members(mask).items() if hasattr(mask, "items") else ():
         for name in names[()].tolist() if getattr(names, "ndim", 0) == 1 else ():
-            lists.setdefault(name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name), []).append(
-                title
-            )
+            text = name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)
+            lists.setdefault(text, []).append(title)
     return lists
 
 
@@ -137,6 +132,6 @@ FORMAT = Format(
     (".h5", ".hdf5", ".hdf", ".he5"),
     lambda head: head.startswith(b"\x89HDF\r\n\x1a\n"),
     read_hdf5,
-    read_hdf5_blocks,
+    partial(read_hdf5, rows=BLOCK_ROWS),
     expected=EXPECTED,
 )

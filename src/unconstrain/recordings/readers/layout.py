@@ -22,6 +22,9 @@ from .table import unique_names
 NOTHING = {"", *"NA N/A n/a #N/A <NA> NaN nan -nan -NaN NAN None none null NULL -".split()}  # noqa: SIM905
 """Cells that stand for no number."""
 
+DIALECTS = (*((mark, ".") for mark in ",\t;| "), *((mark, ",") for mark in "\t; "))
+"""Delimiters and decimal marks that are tried, the usual ones first; a blank stands for any white space."""
+
 LISTS = re.compile(r"[\[(].*[\])]")
 """A cell that holds a list: ``[0.1, 0.2]``, ``(1 2 3)``."""
 
@@ -67,8 +70,6 @@ class Layout:
         Names of the columns, one for each cell of a row; empty where the header has none.
     kinds : str
         For each column ``n`` if it holds numbers, ``l`` lists, ``w`` words, ``e`` nothing yet.
-    has_header : bool
-        Whether the text names the columns.
     header : tuple of tuple of str
         The rows of the header, cell by cell; one that comes again is no row.
     units, attributes : mapping of str to str
@@ -88,7 +89,6 @@ class Layout:
     first: int
     titles: tuple[str, ...]
     kinds: str
-    has_header: bool
     header: tuple[tuple[str, ...], ...]
     units: dict[str, str]
     attributes: dict[str, Any]
@@ -154,16 +154,7 @@ def find_layout(lines: Sequence[str]) -> Layout | None:
         The beginning of a text, without the ends of the lines.
     """
     best: tuple[float, Layout] | None = None
-    for delimiter, decimal in (
-        (",", "."),
-        ("\t", "."),
-        (";", "."),
-        ("|", "."),
-        (" ", "."),
-        ("\t", ","),
-        (";", ","),
-        (" ", ","),
-    ):
+    for delimiter, decimal in DIALECTS:
         if (delimiter != " " or decimal == ",") and not any(delimiter in line for line in lines):
             continue
         rows = [split(line, delimiter) if line.strip() and not is_comment(line) else None for line in lines]
@@ -177,15 +168,14 @@ def find_layout(lines: Sequence[str]) -> Layout | None:
 def find_block(rows: Rows, lines: Sequence[str], delimiter: str, decimal: str) -> tuple[float, Layout] | None:
     """The heaviest block of rows of one kind, and its weight; None if no number is there or none needs a comma."""
     runs = _runs(rows, decimal)
-    if not runs or (
-        decimal == "," and (len(runs[0].kinds) < 2 or not any("," in cell for cell in rows[runs[0].first] or ()))
-    ):
+    if not runs or (decimal == "," and not _has_commas(runs[0], rows)):
         return None
     run, weight = max(((run, _weight(run, rows, decimal)) for run in runs), key=lambda pair: pair[1])
     first = _true_start(rows, run, decimal)
     header = _header(rows, lines, first, run.kinds, delimiter, decimal)
     if not header and _counts(rows[first] or []):
-        header, first = [rows[first] or []], first + 1
+        header = [rows[first] or []]
+        first += 1
     kinds = _kinds_below(rows, first, run, decimal)
     above = "\n".join(lines[:first])
     others = tuple(
@@ -196,12 +186,26 @@ def find_block(rows: Rows, lines: Sequence[str], delimiter: str, decimal: str) -
     after = [line for line, cells in enumerate(rows) if line > run.last and cells is not None]
     stop = after[0] if after and any(line > run.last for line, _, _ in others) else None
     titles, units = _titles(header, len(run.kinds), above)
-    units = _degrees(titles, above) | units
     layout = Layout(
-        *(delimiter, decimal, first, titles, kinds, any(titles), tuple(map(tuple, header)), units),
-        *(_attributes(rows[:first], header), _rate(above), stop, others, _various(rows[first:], kinds)),
+        delimiter,
+        decimal,
+        first,
+        titles,
+        kinds,
+        header=tuple(map(tuple, header)),
+        units=_degrees(titles, above) | units,
+        attributes=_attributes(rows[:first], header),
+        rate=_rate(above),
+        stop=stop,
+        others=others,
+        various=_various(rows[first:], kinds),
     )
     return weight, layout
+
+
+def _has_commas(run: _Run, rows: Rows) -> bool:
+    """Whether a run has several columns, and a comma in a cell of its first row."""
+    return len(run.kinds) > 1 and any("," in cell for cell in rows[run.first] or ())
 
 
 def _runs(rows: Rows, decimal: str) -> list[_Run]:
@@ -269,7 +273,7 @@ def read_list(cell: str) -> list[float] | None:
 
 def _weight(run: _Run, rows: Rows, decimal: str) -> float:
     above = next((cells for cells in reversed(rows[: run.first]) if cells is not None), None)
-    named = above is not None and _fit(above, run.kinds) is not None and _is_words(above, decimal)
+    named = above is not None and fitted(above, run.kinds) is not None and _is_words(above, decimal)
     return run.weight * (HEADER_COUNTS if named else 1)
 
 
@@ -284,8 +288,8 @@ def _counts(cells: Sequence[str]) -> bool:
     return len(numbers) > 2 and numbers == [str(number) for number in range(len(numbers))]
 
 
-def _fit(cells: list[str], kinds: str, *, pad: bool = False) -> list[str] | None:
-    """Cells as many as columns; None if they cannot be meant for them."""
+def fitted(cells: list[str], kinds: str, *, pad: bool = False) -> list[str] | None:
+    """Cells as many as columns, as a delimiter may stand at the end of a row or not; None if they are for others."""
     extra = len(cells) - len(kinds)
     if extra > 0:
         return None if any(cells[len(kinds) :]) else cells[: len(kinds)]
@@ -301,7 +305,7 @@ def _true_start(rows: Rows, run: _Run, decimal: str) -> int:
         cells = rows[line]
         if cells is None:
             continue
-        if _fit(cells, run.kinds) is None:
+        if fitted(cells, run.kinds) is None:
             break
         if _is_words(cells, decimal):
             return start
@@ -343,7 +347,7 @@ def _header(rows: Rows, lines: Sequence[str], first: int, kinds: str, delimiter:
         directly = [rows[line] or [] for line in range(above[-1] - 1, -1, -1)] if len(kinds) > 1 else []
         needed = "" in nearest[: len(kinds.rstrip("e"))]
         higher = takewhile(lambda cells: _goes_above(cells, len(kinds), decimal, needed), directly)
-        return [*reversed([_fit(cells, kinds, pad=True) or cells for cells in higher]), nearest]
+        return [*reversed([fitted(cells, kinds, pad=True) or cells for cells in higher]), nearest]
     comments = (line for line in reversed(lines[:first]) if is_comment(line))
     named = (split(_MARK.sub("", line), delimiter) for line in comments)
     return [cells for cells in named if len(cells) == len(kinds) and _is_words(cells, decimal)][:1]
@@ -353,7 +357,7 @@ def _nearest(cells: list[str], below: list[str], kinds: str) -> list[str] | None
     """Cells as many as columns; R leaves out the name of the numbers of rows, which it writes first."""
     if len(cells) == len(kinds) - 1 and all(cells) and below[0] in ("0", "1"):
         return ["", *cells]
-    return _fit(cells, kinds)
+    return fitted(cells, kinds)
 
 
 def _may_name(cells: Sequence[str], decimal: str) -> bool:
@@ -376,8 +380,8 @@ def _titles(header: Sequence[list[str]], width: int, above: str) -> tuple[tuple[
     if not header:
         markers = _MARKERS.search(above)
         names = markers[1].split("\t") if markers else []
-        fits = 3 * len(names) == width
-        return tuple(f"{name.strip()}.{axis}" for name in names for axis in "XYZ") if fits else ("",) * width, {}
+        titles = tuple(f"{name.strip()}.{axis}" for name in names for axis in "XYZ")
+        return titles if len(titles) == width else ("",) * width, {}
     rows = [list(row) for row in header]
     unit_row = next(
         (row for row in reversed(rows[1:]) if all(_UNIT_WORD.fullmatch(cell) for cell in row if cell)), None

@@ -7,6 +7,7 @@ x1..xn and u1..ud. Other arrays are read as :mod:`~.trees` says, and so are thos
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -39,17 +40,8 @@ def read_npz(path: Path, reading: Reading) -> Iterator[Table]:
         raise ReadError(f"{path}: {str(error).removeprefix(f'{path}: ')} {_EXPECTED}.") from error
 
 
-def read_npy(path: Path, reading: Reading) -> Iterator[Table]:
-    """Read one array."""
-    return _npy(path, reading, None)
-
-
-def read_npy_blocks(path: Path, reading: Reading) -> Iterator[Table]:
-    """Go through one array by some rows at a time."""
-    return _npy(path, reading, BLOCK_ROWS)
-
-
-def _npy(path: Path, reading: Reading, rows: int | None) -> Iterator[Table]:
+def read_npy(path: Path, reading: Reading, rows: int | None = None) -> Iterator[Table]:
+    """Read one array whole, or go through it by so many rows at a time."""
     array: Any = OnDisk(path)
     if rows is None or not array.is_by_rows:
         with _nothing_unpickled(path):
@@ -142,6 +134,6 @@ ARRAY = Format(
     (".npy",),
     lambda head: head.startswith(b"\x93NUMPY"),
     read_npy,
-    read_npy_blocks,
+    partial(read_npy, rows=BLOCK_ROWS),
     expected="an array, as from numpy.save",
 )

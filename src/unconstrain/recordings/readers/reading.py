@@ -19,22 +19,7 @@ _LAST_NUMBER = re.compile(r"(\d+)\D*$")
 
 @dataclass(frozen=True)
 class Reading:
-    """How to read files.
-
-    Parameters
-    ----------
-    group, time : str, optional
-        Columns that tell the demonstrations apart and hold the time stamps, where their names do not say so.
-    time_unit : {"s", "ms", "us", "ns"}, optional
-        What the stamps count; by default as the name of their column or their size says.
-    columns : sequence of str, optional
-        Names of the columns, in order, for files that have none.
-    topic : str, optional
-        Topic of a ROS recording, sheet of a workbook, or whatever else holds several tables.
-    episodes : sequence of str, optional
-        Demonstrations to read: names, numbers, ranges such as ``"0-9"``, or a list that the file itself holds.
-    task : str, optional
-        Read only the demonstrations of this task.
+    """How to read files: what :func:`~unconstrain.read` takes by name, with the same meaning.
 
     Raises
     ------

@@ -17,7 +17,7 @@ from ...base.display import legible, listed, meant
 from ...base.errors import ReadError
 from ..demonstration import Recording
 from ..remarks import Remark
-from .clocks import Clock, ClockColumns, find_clock, find_clock_of, find_pair, read_words, unit_in_name, unit_of_word
+from .clocks import Clock, ClockColumns, find_clock, find_clock_of, find_pair, read_words, unit_of_word, usual
 from .reading import Reading
 
 GROUP_NAMES = (
@@ -200,12 +200,12 @@ class Assembly:
             names,
             table.values[:, _as_slice(np.array(places))],
             times,
-            legible(table.name),
-            (*table.remarks, *remarks),
-            {name: unit for name, unit in table.units.items() if name in names},
-            table.attributes,
-            legible(str(self.path)),
-            tuple(name for name in table.words if name not in taken),
+            name=legible(table.name),
+            remarks=(*table.remarks, *remarks),
+            units={name: unit for name, unit in table.units.items() if name in names},
+            attributes=table.attributes,
+            file=legible(str(self.path)),
+            words=tuple(name for name in table.words if name not in taken),
         )
         groups = _groups(table, roles.group)
         tasks = table.words.get("task")
@@ -224,7 +224,7 @@ class Assembly:
             parts = _column(table, roles.clock.nanoseconds) * 1e-9
             clock = self._clocks.setdefault(table.name, find_clock_of(stamps, "stamp_s", "s"))
             return clock.seconds(stamps) + parts, ()
-        unit = self.reading.time_unit or unit_of_word(table.units.get(name, "")) or unit_in_name(name)
+        unit = self.reading.time_unit or unit_of_word(table.units.get(name, ""))
         label = name if unit is None else f"stamp_{unit}"
         clock = self._clocks.setdefault(table.name, find_clock_of(stamps, label, self.reading.time_unit))
         return clock.seconds(stamps), ()
@@ -254,7 +254,8 @@ class Assembly:
         """Recordings between breaks: blank lines, and where the clock or the count of rows begins anew."""
         counter = roles.counter if roles.counter in table.columns else None
         counts = whole.times if counter is None or whole.times is not None else _column(table, counter)
-        bounds, where = _continued(_long_enough(table.breaks, len(whole)), whole.times), "blank lines"
+        bounds = _continued(_long_enough(table.breaks, len(whole)), whole.times)
+        where = "blank lines"
         start = self._starts.setdefault(whole.name, Start.of(counts))
         part = self._parts.get(whole.name, 0) + start.is_again(self._latest.get(whole.name), counts)
         if not bounds:
@@ -284,7 +285,7 @@ class Start(NamedTuple):
         """The start of some rows; none where they have no clock."""
         if counts is None or not len(counts):
             return cls(float("nan"), 0.0)
-        return cls(float(counts[0]), _usual(np.diff(counts)))
+        return cls(float(counts[0]), usual(np.diff(counts)))
 
     def is_again(self, before: float | None, counts: Array | None) -> bool:
         """Whether rows begin where a clock began, after rows that ended later."""
@@ -350,7 +351,8 @@ def named_by(names: Sequence[str] | None, held: Sequence[str], path: Path) -> tu
 
 def _labels(table: Table, roles: Roles) -> tuple[str, int]:
     """The column with the most values, one after the other, at whose changes other columns jump, and their number."""
-    most, head = ("", 0), table.values[:1000]
+    most = "", 0
+    head = table.values[:1000]
     steady = np.count_nonzero(head[1:] != head[:-1], axis=0) <= len(head) // FEWEST_ROWS  # as few columns are
     columns = ((table.columns[at], table.values[:, at]) for at in np.flatnonzero(steady))
     for name, cells in (*table.words.items(), *columns):
@@ -408,7 +410,7 @@ def _continued(bounds: list[int], times: Array | None) -> list[int]:
     if times is None or not bounds:
         return bounds
     steps = np.diff(times)
-    return [at for at in bounds if not 0 < steps[at - 1] <= 3 * _usual(steps)]
+    return [at for at in bounds if not 0 < steps[at - 1] <= 3 * usual(steps)]
 
 
 def _restarts(counts: Array | None, start: Start) -> list[int]:
@@ -421,9 +423,3 @@ def _restarts(counts: Array | None, start: Start) -> list[int]:
         return []
     is_near = np.abs(counts[back] - start.first) <= NEAR_START * start.interval
     return [int(at) for at in back] if is_near.all() else []
-
-
-def _usual(steps: Array) -> float:
-    """The median step forward, 0 if there is none."""
-    forward = steps[steps > 0]
-    return float(np.median(forward)) if forward.size else 0.0

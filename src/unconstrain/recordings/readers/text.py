@@ -122,7 +122,7 @@ def _table(cells: Cells, kept: list[int], names: Sequence[str], parser: Parser, 
 
 
 def _remarks(layout: Layout, names: Sequence[str], parser: Parser) -> Iterator[Remark]:
-    if not layout.has_header and tuple(names) == layout.names:
+    if not any(layout.titles) and tuple(names) == layout.names:
         said = f"it has no header, so its columns are called {listed(names)}; name them with columns=('t', 'x', 'y')."
         yield Remark("no-header", said)
     for line, rows, columns in layout.others:

@@ -20,13 +20,11 @@ import numpy as np
 from ...base.arrays import Array
 from ...base.display import listed
 from ...base.errors import ReadError
+from ..columns import SHORT
 from ..remarks import Remark
 from .clocks import TIME_NAME
 from .reading import Reading
 from .table import FEWEST_ROWS, Table, named_by, unique_names
-
-SHORT = {"states": "x", "actions": "u"}
-"""What the columns of arrays of these names are called, where both are there: x1..xn and u1..ud."""
 
 ACTIONS = ("actions", "action")
 """An array of such a name has a row for each sample; observations may have one more, after the last action."""

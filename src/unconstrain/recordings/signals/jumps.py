@@ -109,7 +109,7 @@ def seams(values: Array) -> list[int]:
         squares += (np.diff(values[:, column]) / extent[column]) ** 2
     steps = np.sqrt(squares)
     far = _far(steps)
-    alone = [start for start, stop in _runs(far) if stop - start == 1 and _stands_out(steps, far, start, stop)]
+    alone = [start for start, stop in stretches(far) if stop - start == 1 and _stands_out(steps, far, start, stop)]
     return [start + 1 for start in alone if AROUND / 2 <= start + 1 <= len(values) - AROUND / 2]
 
 
@@ -144,7 +144,7 @@ def _bursts(signal: Array) -> Iterator[tuple[int, int]]:
     """Several samples off together: a jump away, and the same one back."""
     steps = np.diff(signal)
     far = _far(np.abs(steps))
-    runs = [(start, stop) for start, stop in _runs(far) if _stands_out(np.abs(steps), far, start, stop)]
+    runs = [(start, stop) for start, stop in stretches(far) if _stands_out(np.abs(steps), far, start, stop)]
     for start, stop in runs:
         if 2 <= stop - start <= 4 and abs(steps[start:stop].sum()) < 0.3 * np.abs(steps[start:stop]).max():
             yield start + 1, stop
@@ -169,7 +169,7 @@ def _stands_out(sizes: Array, far: NDArray[np.bool_], start: int, stop: int) -> 
     return bool(sizes[start:stop].max() > FAR / 2 * others.max(initial=0.0))
 
 
-def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def stretches(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Half-open stretches in which all are true."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import BLOCK_ROWS, Array, slices
+from .jumps import stretches
 
 SLOW = 0.08
 """Whoever moves by less than this share of a usual movement in the same time stands still."""
@@ -123,9 +124,7 @@ def _runs(values: Array, span: int, least: Array, shortest: int) -> list[tuple[i
     still = np.ones(len(values) - span, dtype=bool)
     for column, allowed in zip(values.T, least, strict=True):
         still &= np.abs(column[span:] - column[:-span]) <= allowed
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], _reached(still, span), [False]])))
-    runs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
-    return [(start, stop) for start, stop in runs if stop - start >= shortest]
+    return [(start, stop) for start, stop in stretches(_reached(still, span)) if stop - start >= shortest]
 
 
 def _reached(windows: NDArray[np.bool_], span: int) -> NDArray[np.bool_]:

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from ....base.arrays import Array
+from ...readers.clocks import UNITS, usual
 from ...remarks import Remark
 from ...signals.stillness import is_noise, noise_share, pauses, rest_before
 from ..meaning import are_backwards, are_targets
-from .subject import GAP_INTERVALS, LEAST_ROWS, Subject
+from .subject import FLIPS, GAP_INTERVALS, LEAST_ROWS, Subject
 
 SLOWEST, FASTEST = 2.0, 2e4
 """Samples per second that a movement is recorded with; others are a clock in another unit."""
-
-UNITS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-"""Units that clocks count in, in seconds."""
 
 SHORTEST_GAP_S = 0.1
 """Shorter gaps are the jitter of a computer."""
@@ -49,10 +48,10 @@ def clock_unit(subject: Subject) -> Remark | None:
         return None
     stamps = np.sort(times[np.isfinite(times)])
     intervals = np.diff(stamps)
-    forward = intervals[intervals > 0]
-    if not forward.size:
+    typical = usual(intervals)
+    if not typical:
         return None
-    rates = 1.0 / float(np.median(forward)), float(len(intervals) / (stamps[-1] - stamps[0]))
+    rates = 1.0 / typical, float(len(intervals) / (stamps[-1] - stamps[0]))
     if max(rates) > SLOWEST and min(rates) < FASTEST:
         return None
     unit = next((unit for unit, seconds in UNITS.items() if seconds / max(rates) < 1.0 / SLOWEST), "ns")
@@ -67,9 +66,7 @@ def clock_gap(subject: Subject) -> Remark | None:
     if stamps is None or len(stamps) < LEAST_ROWS or not subject.is_in_order:
         return None
     intervals = np.diff(stamps)
-    moving = intervals[intervals > 0]
-    usual = float(np.median(moving)) if moving.size else 0.0
-    longest = subject.recipe.max_gap_s or max(GAP_INTERVALS * usual, SHORTEST_GAP_S)
+    longest = subject.recipe.max_gap_s or max(GAP_INTERVALS * usual(intervals), SHORTEST_GAP_S)
     rows = np.flatnonzero(intervals > longest) + 1
     rows = rows[(rows >= SHORTEST_PIECE) & (rows <= len(stamps) - SHORTEST_PIECE)]
     if not rows.size:
@@ -143,17 +140,8 @@ def angle_wrap(subject: Subject) -> Remark | None:
     return Remark("angle-wrap", message, name, subject.row(wrap.rows[0]))
 
 
-def quaternion_flip(subject: Subject) -> Remark | None:
-    """Four columns of unit quaternions that turn their sign."""
-    return _flip(subject, "quaternion-flip")
-
-
-def rotation_vector_flip(subject: Subject) -> Remark | None:
-    """Three columns of a rotation vector that turns into its opposite at half a turn."""
-    return _flip(subject, "rotation-vector-flip")
-
-
-def _flip(subject: Subject, code: str) -> Remark | None:
+def turned_sign(code: str, subject: Subject) -> Remark | None:
+    """Columns of one kind of orientation (:data:`~.subject.FLIPS`) whose numbers turn their sign."""
     for start, flip in subject.flips.items():
         if flip.code == code:
             names = [subject.name(column) for column in range(start, start + flip.width)]
@@ -254,7 +242,7 @@ def all_zero(subject: Subject) -> Remark | None:
     return Remark("all-zero", message, (subject.recipe.actions or ("",))[0])
 
 
-CHECKS = (
+CHECKS: tuple[Callable[[Subject], Remark | None], ...] = (
     clock_unit,
     clock_gap,
     irregular,
@@ -262,8 +250,7 @@ CHECKS = (
     reversed_in_time,
     other_topic,
     angle_wrap,
-    quaternion_flip,
-    rotation_vector_flip,
+    *(partial(turned_sign, flip.code) for flip in FLIPS),
     glitch,
     seam,
     targets,

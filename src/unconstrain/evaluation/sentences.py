@@ -1,0 +1,155 @@
+"""A diagnosis in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.display import percent
+from ..learners import robust
+from .shown import named
+from .verdicts import ENOUGH, SMALL, regions_left
+
+if TYPE_CHECKING:
+    from .diagnosis import Diagnosis, Place, Region
+
+MISFIT = 1.5
+"""Residuals above this many times the noise by differences in time are mostly misfit of the model."""
+
+LITTLE = 0.01
+"""Shares of samples below this are not worth a sentence."""
+
+FREE, CONSTRAINED = 0.5, 0.1
+"""A demonstration looks free above the first, and constrained below the second mean probability of free samples."""
+
+MOST_NAMED = 8
+"""So many samples that look wrong are named."""
+
+
+def sentences(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> list[str]:
+    """The diagnosis in sentences.
+
+    Parameters
+    ----------
+    found : Diagnosis
+    states, actions : sequence of str
+        Names of the columns.
+    """
+    return [
+        _about_noise(found),
+        about_choice(found.method, found.candidates),
+        *_about_regions(found, states, actions),
+        _about_freedom(found),
+        *about_suspects(found.suspects),
+    ]
+
+
+def about_suspects(places: Sequence[Place]) -> list[str]:
+    """Samples that look wrong, in a sentence, if there are any."""
+    if not places:
+        return []
+    number = "1 sample looks" if len(places) == 1 else f"{len(places)} samples look"
+    more = ", ..." if len(places) > MOST_NAMED else ""
+    named = ", ".join(map(str, places[:MOST_NAMED]))
+    return [f"{number} wrong beside the neighbours in time, and counted nothing: {named}{more}."]
+
+
+def _about_noise(found: Diagnosis) -> str:
+    verdict = "little" if found.noise_share < SMALL else "some" if found.noise_share < 3 * SMALL else "much"
+    too_much = found.noise_share > robust.SPHERE_HIDDEN_BY_NOISE
+    hidden = " So much noise makes the following unreliable." if too_much else ""
+    said = (
+        f"Noise: {verdict}, {found.noise:.3g} on each action coordinate, {found.noise_share:.1%} of a typical action "
+        f"({found.typical:.3g}) in all.{hidden}"
+    )
+    if found.noise_share < 0.5 * SMALL or found.noise < MISFIT * found.jitter:
+        return said
+    return said + (
+        f" Only {found.jitter:.3g} of it changes from sample to sample; the rest is what the model does not follow, or "
+        "people who vary."
+    )
+
+
+_WAYS = {
+    "direct": "ordinary regression, as constraints do not show",
+    "softened hybrid": "consistent with the actions, and near to them",
+    "noise-corrected": "consistent with the actions, with the noise taken out",
+    "hard noise-corrected": "consistent with the actions, with the noise taken out, and little else supposed",
+    "segments": "with one constraint for each demonstration",
+    "likelihood": "samples look free, or constrained at random",
+    "hybrid": "consistent with the actions, and as near to them as that allows",
+}
+
+
+def in_words(method: str) -> str:
+    """What is told of a way of learning, by its name with or without a softness after a comma; empty of others."""
+    return _WAYS.get(method.partition(", ")[0], "")
+
+
+def about_choice(method: str, candidates: Mapping[str, float]) -> str:
+    """Which candidate was taken and how much worse the others are, in two sentences; see :class:`~unconstrain.Robust`.
+
+    Parameters
+    ----------
+    method : str
+        Name of the candidate that was taken.
+    candidates : mapping
+        Estimated squared error of each, by name.
+    """
+    way, _, softness = method.partition(", ")
+    said = f"Learnt as {way}{f' (softness {softness})' * bool(softness)}: {in_words(way) or 'as asked for'}."
+    if len(candidates) < 2:
+        return f"{said} Nothing was compared with it."
+    least = {}
+    for name, risk in sorted(candidates.items(), key=lambda one: -one[1]):
+        least[name.partition(", ")[0]] = risk
+    own = max(candidates[method], 1e-300)
+    others = [f"{name} {risk / own:.3g}" for name, risk in reversed(least.items()) if name != way]
+    return f"{said} Estimated squared error of other ways over that of this: {', '.join(others)} ('fit -v' lists all)."
+
+
+def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> list[str]:
+    worst = found.regions[0]
+    advice = (
+        f"demonstrate around {named(worst.state, states)} with motion along {named(worst.direction, actions)} left "
+        f"free (standard deviation there: {percent(worst.along)} of a typical action; see '{worst.demonstration}')."
+    )
+    if all(one.determined == 1.0 for one in found.regions):
+        return [f"Every recorded state is determined. If you record more: {advice}"]
+    told, every, (open_, few) = found.told_together, len(found.regions), regions_left(found)
+    left, hangs = (percent(max(share, 0.0)) for share in (1.0 - told, told - found.states_determined))
+    where = "" if (left, open_) == ("0%", 0) else f"Not determined: {left} of the states, {open_} of {every} regions. "
+    where += f"Told by one or two demonstrations alone: {hangs} of the states, {few} of {every} regions; in "
+    where += f"{sum(len(one.shown_by) < ENOUGH for one in found.regions)} regions fewer than {ENOUGH} demonstrations "
+    where += f"moved along what is least known. {_least_shown(worst, states, actions)}"
+    return [where, f"What would help most: {advice}"]
+
+
+def _least_shown(region: Region, states: Sequence[str], actions: Sequence[str]) -> str:
+    """What was seen of the direction that is least determined in a region."""
+    where = f"along {named(region.direction, actions)} near {named(region.state, states)}"
+    if not region.shown_by:
+        return f"Nothing was ever seen {where}."
+    if len(region.shown_by) < ENOUGH:
+        only = " and ".join(f"'{one}'" for one in region.shown_by)
+        return f"Only {only} moved {where}: record two more there."
+    return f"What was seen {where} is too little, or does not agree."
+
+
+def _about_freedom(found: Diagnosis) -> str:
+    said = f"Free, or held by less than the noise: {percent(found.free_share)} of the samples"
+    if found.undecided_share >= LITTLE:
+        said += (
+            f"; {percent(found.undecided_share)} were free or always held in the same way, which looks alike. "
+            "Demonstrations held in another way would tell"
+        )
+    if found.free is None:
+        return f"{said}. That is of the samples that the policy was fitted to."
+    means = np.array([one.free for one in found.movements], dtype=np.float64)
+    free, held = int((means > FREE).sum()), int((means < CONSTRAINED).sum())
+    between = len(means) - free - held
+    return f"{said}. Of {len(means)} demonstrations, {free} look free and {held} constrained" + (
+        f"; of {between} that is not certain." if between else "."
+    )
