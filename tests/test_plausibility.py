@@ -251,6 +251,68 @@ def test_standing_still_before_the_start_is_told_in_seconds_with_what_trims_it(n
     assert not survey(begun_late(2.0, noise), replace(recipe, still=0.02)).notes
 
 
+def halted(values, row, rows):
+    """The same movement with a stop of so many rows, slowing down and setting off within five each."""
+    slow = 0.5 + 0.5 * np.cos(np.linspace(0, np.pi, 5))
+    pace = np.concatenate([np.ones(row), slow, np.zeros(rows), slow[::-1], np.ones(len(values) - row)])
+    at = np.cumsum(pace)[: np.searchsorted(np.cumsum(pace), len(values) - 1)]
+    return np.column_stack([np.interp(at, np.arange(len(values)), column) for column in values.T])
+
+
+def stops_told(values, rate):
+    recording = uc.Recording(("x", "y", "z"), values, np.arange(len(values)) / rate, "wipe")
+    return [
+        one for one in survey(recording, uc.Recipe(("x", "y", "z"), differentiate="savgol")).notes if one.code == "stop"
+    ]
+
+
+def to_and_fro(rate, beside=0.0, noise=0.0, turn_s=2.0):
+    t, rng = np.arange(0, 3 * turn_s, 1 / rate), np.random.default_rng(3)
+    angle = 2 * np.pi * t / turn_s
+    path = np.column_stack([np.cos(angle), beside * np.sin(angle), 0.3 * np.cos(angle)])
+    return 0.2 * (path + noise * rng.standard_normal(path.shape))
+
+
+@pytest.mark.parametrize("rate", [20, 50, 200])
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_a_stop_on_the_way_is_told_with_its_second_and_what_to_do(rate, noise):
+    clean = to_and_fro(rate, 1.0, turn_s=4.0)
+    values = halted(clean, 3 * rate, round(0.4 * rate))
+    values += 0.2 * noise * np.random.default_rng(1).standard_normal(values.shape)
+    [said] = stops_told(values, rate)
+    seconds, start = map(float, re.search(r"for ([\d.]+) s from ([\d.]+) s", said.message).groups())
+    assert 3.0 - 0.2 <= start <= 3.0 + 5 / rate + 0.1
+    assert 0.3 <= seconds <= 0.4 + 10 / rate + 0.1
+    assert "cut it in two there" in said.message
+    assert abs(said.row / rate - start) < 0.01
+
+
+@pytest.mark.parametrize("rate", [20, 50, 200])
+@pytest.mark.parametrize("noise", [0.0, 0.002])
+@pytest.mark.parametrize("beside", [0.0, 0.1, 1.0])
+@pytest.mark.parametrize("turn_s", [1.0, 3.0, 8.0])
+def test_turning_points_are_no_stops(rate, noise, beside, turn_s):
+    assert not stops_told(to_and_fro(rate, beside, noise, turn_s), rate)
+
+
+@needs_data
+@pytest.mark.parametrize(("recordings", "every"), [(strokes, 3), (contours, 1)])
+def test_handwriting_and_contours_do_not_stop_on_the_way(recordings, every):
+    for recording in list(recordings())[::every]:
+        found = survey(recording, uc.Recipe(recording.columns, differentiate="savgol"))
+        assert "stop" not in [one.code for one in found.notes], recording.name
+
+
+@needs_rim
+def test_rests_between_bouts_of_wiping_are_stops():
+    told = [
+        [one.message for one in survey(uc.read(path)[0]).notes if one.code == "stop"]
+        for path in sorted(RIM.glob("demo_*.csv"))
+    ]
+    assert [len(one) for one in told] == [0, 0, 0, 0, 0, 1]
+    assert "0.99 s from 11.9 s on" in told[5][0]
+
+
 def test_how_long_a_pause_lasts_is_told_in_seconds():
     late = begun_late(0.0)
     values = np.vstack([late.values[:75], np.repeat(late.values[75:76], 60, axis=0), late.values[75:]])
