@@ -96,6 +96,41 @@ def test_nothing_is_said_of_any_real_recording(recordings, allowed):
     assert sum(one != [[]] for one in said) <= allowed
 
 
+def of_one_kind():
+    """Real movements beside others of their kind: seven strokes of each shape, tracks of one sign, contours."""
+    every, signs = list(strokes()), np.loadtxt(DATA / "libras_hand" / "movement_libras.csv", delimiter=",")[:, -1]
+    tracks = list(hands())
+    yield from (every[first : first + 7] for first in range(0, len(every), 7))
+    yield from ([tracks[row] for row in np.flatnonzero(signs == sign)] for sign in np.unique(signs))
+    yield list(contours())
+
+
+def beside(recordings):
+    found = survey_set(recordings, uc.Recipe(recordings[0].columns, differentiate="savgol"))
+    return [next((one for one in each.warnings if one.code == "columns-differ"), None) for each in found]
+
+
+@needs_data
+def test_real_movements_of_one_kind_have_the_same_columns():
+    for recordings in of_one_kind():
+        assert beside(recordings) == [None] * len(recordings), recordings[0].name
+
+
+@needs_data
+@pytest.mark.parametrize("sign", [True, False])
+def test_of_handwriting_most_files_with_other_columns_are_named_and_no_others(sign):
+    named = false = 0
+    for recordings in list(of_one_kind())[:30]:
+        values = recordings[2].values * [-1.0, 1.0] if sign else recordings[2].values[:, ::-1]
+        found = beside([*recordings[:2], replace(recordings[2], values=values), *recordings[3:]])
+        named += (
+            found[2] is not None and ("the sign of 'x' turned" if sign else "'x' and 'y' exchanged") in found[2].message
+        )
+        false += sum(one is not None for one in found[:2] + found[3:])
+    assert named >= 22
+    assert false == 0
+
+
 @needs_rim
 def test_nothing_is_said_of_wiping_but_of_its_quaternions_where_they_are_used():
     recordings = [uc.read(path)[0] for path in sorted(RIM.glob("demo_*.csv"))]
