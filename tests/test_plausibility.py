@@ -348,6 +348,56 @@ def test_rests_between_bouts_of_wiping_are_stops():
     assert "0.99 s from 11.9 s on" in told[5][0]
 
 
+def of_joints(names, size=40.0, units=None):
+    t = np.linspace(0, 4, 200)
+    values = size * np.column_stack([np.sin((1 + 0.3 * column) * t) for column in range(len(names))])
+    return [
+        uc.Recording(tuple(names), (1 + 0.1 * number) * values, t, f"r{number}", units=units or {})
+        for number in range(4)
+    ]
+
+
+def about_degrees(recordings, **recipe):
+    asked = uc.Recipe(recordings[0].columns, differentiate="savgol", **recipe)
+    notes = [[one.message for one in each.notes if one.code == "degrees"] for each in survey_set(recordings, asked)]
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        prepare(recordings, asked)
+    assert ([one.message.remark.message for one in said if one.message.remark.code == "degrees"] != []) == any(notes)
+    return notes
+
+
+@pytest.mark.parametrize(
+    "names",
+    [("q1", "q2"), ("joint_1", "joint_2"), ("shoulder_pan", "elbow_flex"), ("left_elbow", "wrist_roll"),
+     ("robot/qpos0", "robot/qpos1"), ("shoulder_lift.pos", "elbow.pos"), ("Knee", "Hip")],
+)  # fmt: skip
+def test_joints_that_are_all_in_degrees_are_told_with_the_option(names):
+    for [said] in about_degrees(of_joints(names)):
+        assert "looks like degrees" in said
+        assert f"degrees={names}" in said
+
+
+@pytest.mark.parametrize(
+    ("names", "size", "settings"),
+    [
+        (("x", "y", "z"), 400.0, {}),  # mm
+        (("wrist_x", "wrist_y", "wrist.z", "kneeX"), 400.0, {}),  # markers
+        (("hip_height", "q", "qx", "qy"), 3.0, {}),
+        (("q1", "q2"), 4.5, {}),  # radians, nearly two turns from end to end
+        (("wheel_left", "wheel_right"), 400.0, {}),
+        (("q1", "q2"), 40.0, {"degrees": ()}),
+        (("q1", "q2"), 40.0, {"degrees": ("q1", "q2")}),
+    ],
+)
+def test_positions_wheels_and_joints_of_known_unit_are_not_said_to_be_in_degrees(names, size, settings):
+    assert about_degrees(of_joints(names, size), **settings) == [[]] * 4
+
+
+def test_joints_whose_unit_is_given_are_not_doubted():
+    assert about_degrees(of_joints(("q1", "q2"), 40.0, {"q1": "rad", "q2": "rad"})) == [[]] * 4
+
+
 def test_how_long_a_pause_lasts_is_told_in_seconds():
     late = begun_late(0.0)
     values = np.vstack([late.values[:75], np.repeat(late.values[75:76], 60, axis=0), late.values[75:]])
