@@ -258,10 +258,24 @@ def other_topic(rng):
     return Fault(*recorded(tables, dt), "other-topic", which, int(np.argmax(at_other)))
 
 
+def columns_differ(rng):
+    """Strokes along one path, each a little beside it; of one, two columns are exchanged, or the sign of one turned."""
+    n, count, t = int(rng.integers(2, 5)), int(rng.integers(5, 9)), np.linspace(0, 1, int(rng.integers(80, 300)))
+    bends = np.vstack([rng.permutation(3.0 * np.arange(1, n + 1)), rng.normal(size=(3, n))])
+    powers = np.vander(t, 4, increasing=True)
+    tables = [powers @ (bends + 0.05 * rng.normal(size=bends.shape)) for _ in range(count)]
+    which, (one, other) = int(rng.integers(count)), rng.permutation(n)[:2]
+    if rng.integers(2):
+        tables[which][:, [one, other]] = tables[which][:, [other, one]]
+    else:
+        tables[which][:, 0] *= -1.0
+    return Fault(*recorded(tables, 0.01), "columns-differ", which, None)
+
+
 FAULTS = (
     nothing, nothing_with_actions, angle_wrap, quaternion_flip, rotation_vector_flip, seam, glitch, clock_unit,
     clock_gap, targets, mixed_units, unit_differs, pause, backwards, at_rest, all_zero, few_demonstrations, row_order,
-    other_topic, clock_differs,
+    other_topic, clock_differs, columns_differ,
 )  # fmt: skip
 
 

@@ -397,6 +397,24 @@ def test_a_fit_doubts_what_it_learns_where_a_recording_stood_still_before_its_st
     assert ("Where 'late' stood still before the start: rest is learnt there; --still trims it." in doubt) != bool(trim)
 
 
+@pytest.mark.parametrize("command", ["fit", "diagnose"])
+def test_what_still_leaves_is_told_of_all_together_and_of_each_where_asked_for(tmp_path, command):
+    turn = np.r_[np.zeros(100), 0.02 * np.arange(300)]
+    path = np.column_stack([0.01 * np.arange(400), 80 * np.cos(turn), 40 * np.sin(turn), 20 * np.sin(turn)])
+    files = [write(tmp_path / f"{name}.csv", HEAD, rows) for name, rows in (("late", path), ("a", path[100:]))]
+    files += [write(tmp_path / f"{name}.csv", HEAD, path[110:]) for name in "bc"]
+    how = command, *files, "--state", "x,y,z", "--by", "central", "--model", "affine"
+    how += ("-o", tmp_path / "p.npz", "--force") if command == "fit" else ()
+    assert "--still left" not in call(*how).err
+    said = call(*how, "--still", 20).err
+    assert "Note: --still left 1180 of 1280 samples (11.8 of 12.8 s).\n" in said
+    assert "late: " not in said
+    assert (
+        "\n  late: 300 of 400 samples (3 of 4 s)\n  a: 300 of 300 samples (3 of 3 s)\n"
+        in call(*how, "--still", 20, "-v").err
+    )
+
+
 def test_what_a_page_cannot_draw_together_is_refused(folder, tmp_path):
     stroke, page, policies = folder / "held_3.csv", tmp_path / "look.html", (folder / "same.npz", folder / "slow.npz")
     assert "a page draws one policy and one constraint" in refused("look", stroke, *policies, "-o", page)

@@ -96,6 +96,41 @@ def test_nothing_is_said_of_any_real_recording(recordings, allowed):
     assert sum(one != [[]] for one in said) <= allowed
 
 
+def of_one_kind():
+    """Real movements beside others of their kind: seven strokes of each shape, tracks of one sign, contours."""
+    every, signs = list(strokes()), np.loadtxt(DATA / "libras_hand" / "movement_libras.csv", delimiter=",")[:, -1]
+    tracks = list(hands())
+    yield from (every[first : first + 7] for first in range(0, len(every), 7))
+    yield from ([tracks[row] for row in np.flatnonzero(signs == sign)] for sign in np.unique(signs))
+    yield list(contours())
+
+
+def beside(recordings):
+    found = survey_set(recordings, uc.Recipe(recordings[0].columns, differentiate="savgol"))
+    return [next((one for one in each.warnings if one.code == "columns-differ"), None) for each in found]
+
+
+@needs_data
+def test_real_movements_of_one_kind_have_the_same_columns():
+    for recordings in of_one_kind():
+        assert beside(recordings) == [None] * len(recordings), recordings[0].name
+
+
+@needs_data
+@pytest.mark.parametrize("sign", [True, False])
+def test_of_handwriting_most_files_with_other_columns_are_named_and_no_others(sign):
+    named = false = 0
+    for recordings in list(of_one_kind())[:30]:
+        values = recordings[2].values * [-1.0, 1.0] if sign else recordings[2].values[:, ::-1]
+        found = beside([*recordings[:2], replace(recordings[2], values=values), *recordings[3:]])
+        named += (
+            found[2] is not None and ("the sign of 'x' turned" if sign else "'x' and 'y' exchanged") in found[2].message
+        )
+        false += sum(one is not None for one in found[:2] + found[3:])
+    assert named >= 22
+    assert false == 0
+
+
 @needs_rim
 def test_nothing_is_said_of_wiping_but_of_its_quaternions_where_they_are_used():
     recordings = [uc.read(path)[0] for path in sorted(RIM.glob("demo_*.csv"))]
@@ -249,6 +284,118 @@ def test_standing_still_before_the_start_is_told_in_seconds_with_what_trims_it(n
     assert "still=" in told.message
     assert not survey(begun_late(0.0, noise), recipe).notes
     assert not survey(begun_late(2.0, noise), replace(recipe, still=0.02)).notes
+
+
+def halted(values, row, rows):
+    """The same movement with a stop of so many rows, slowing down and setting off within five each."""
+    slow = 0.5 + 0.5 * np.cos(np.linspace(0, np.pi, 5))
+    pace = np.concatenate([np.ones(row), slow, np.zeros(rows), slow[::-1], np.ones(len(values) - row)])
+    at = np.cumsum(pace)[: np.searchsorted(np.cumsum(pace), len(values) - 1)]
+    return np.column_stack([np.interp(at, np.arange(len(values)), column) for column in values.T])
+
+
+def stops_told(values, rate):
+    recording = uc.Recording(("x", "y", "z"), values, np.arange(len(values)) / rate, "wipe")
+    return [
+        one for one in survey(recording, uc.Recipe(("x", "y", "z"), differentiate="savgol")).notes if one.code == "stop"
+    ]
+
+
+def to_and_fro(rate, beside=0.0, noise=0.0, turn_s=2.0):
+    t, rng = np.arange(0, 3 * turn_s, 1 / rate), np.random.default_rng(3)
+    angle = 2 * np.pi * t / turn_s
+    path = np.column_stack([np.cos(angle), beside * np.sin(angle), 0.3 * np.cos(angle)])
+    return 0.2 * (path + noise * rng.standard_normal(path.shape))
+
+
+@pytest.mark.parametrize("rate", [20, 50, 200])
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_a_stop_on_the_way_is_told_with_its_second_and_what_to_do(rate, noise):
+    clean = to_and_fro(rate, 1.0, turn_s=4.0)
+    values = halted(clean, 3 * rate, round(0.4 * rate))
+    values += 0.2 * noise * np.random.default_rng(1).standard_normal(values.shape)
+    [said] = stops_told(values, rate)
+    seconds, start = map(float, re.search(r"for ([\d.]+) s from ([\d.]+) s", said.message).groups())
+    assert 3.0 - 0.2 <= start <= 3.0 + 5 / rate + 0.1
+    assert 0.3 <= seconds <= 0.4 + 10 / rate + 0.1
+    assert "cut it in two there" in said.message
+    assert abs(said.row / rate - start) < 0.01
+
+
+@pytest.mark.parametrize("rate", [20, 50, 200])
+@pytest.mark.parametrize("noise", [0.0, 0.002])
+@pytest.mark.parametrize("beside", [0.0, 0.1, 1.0])
+@pytest.mark.parametrize("turn_s", [1.0, 3.0, 8.0])
+def test_turning_points_are_no_stops(rate, noise, beside, turn_s):
+    assert not stops_told(to_and_fro(rate, beside, noise, turn_s), rate)
+
+
+@needs_data
+@pytest.mark.parametrize(("recordings", "every"), [(strokes, 3), (contours, 1)])
+def test_handwriting_and_contours_do_not_stop_on_the_way(recordings, every):
+    for recording in list(recordings())[::every]:
+        found = survey(recording, uc.Recipe(recording.columns, differentiate="savgol"))
+        assert "stop" not in [one.code for one in found.notes], recording.name
+
+
+@needs_rim
+def test_rests_between_bouts_of_wiping_are_stops():
+    told = [
+        [one.message for one in survey(uc.read(path)[0]).notes if one.code == "stop"]
+        for path in sorted(RIM.glob("demo_*.csv"))
+    ]
+    assert [len(one) for one in told] == [0, 0, 0, 0, 0, 1]
+    assert "0.99 s from 11.9 s on" in told[5][0]
+
+
+def of_joints(names, size=40.0, units=None):
+    t = np.linspace(0, 4, 200)
+    values = size * np.column_stack([np.sin((1 + 0.3 * column) * t) for column in range(len(names))])
+    return [
+        uc.Recording(tuple(names), (1 + 0.1 * number) * values, t, f"r{number}", units=units or {})
+        for number in range(4)
+    ]
+
+
+def about_degrees(recordings, **recipe):
+    asked = uc.Recipe(recordings[0].columns, differentiate="savgol", **recipe)
+    notes = [[one.message for one in each.notes if one.code == "degrees"] for each in survey_set(recordings, asked)]
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        prepare(recordings, asked)
+    assert ([one.message.remark.message for one in said if one.message.remark.code == "degrees"] != []) == any(notes)
+    return notes
+
+
+@pytest.mark.parametrize(
+    "names",
+    [("q1", "q2"), ("joint_1", "joint_2"), ("shoulder_pan", "elbow_flex"), ("left_elbow", "wrist_roll"),
+     ("robot/qpos0", "robot/qpos1"), ("shoulder_lift.pos", "elbow.pos"), ("Knee", "Hip")],
+)  # fmt: skip
+def test_joints_that_are_all_in_degrees_are_told_with_the_option(names):
+    for [said] in about_degrees(of_joints(names)):
+        assert "looks like degrees" in said
+        assert f"degrees={names}" in said
+
+
+@pytest.mark.parametrize(
+    ("names", "size", "settings"),
+    [
+        (("x", "y", "z"), 400.0, {}),  # mm
+        (("wrist_x", "wrist_y", "wrist.z", "kneeX"), 400.0, {}),  # markers
+        (("hip_height", "q", "qx", "qy"), 3.0, {}),
+        (("q1", "q2"), 4.5, {}),  # radians, nearly two turns from end to end
+        (("wheel_left", "wheel_right"), 400.0, {}),
+        (("q1", "q2"), 40.0, {"degrees": ()}),
+        (("q1", "q2"), 40.0, {"degrees": ("q1", "q2")}),
+    ],
+)
+def test_positions_wheels_and_joints_of_known_unit_are_not_said_to_be_in_degrees(names, size, settings):
+    assert about_degrees(of_joints(names, size), **settings) == [[]] * 4
+
+
+def test_joints_whose_unit_is_given_are_not_doubted():
+    assert about_degrees(of_joints(("q1", "q2"), 40.0, {"q1": "rad", "q2": "rad"})) == [[]] * 4
 
 
 def test_how_long_a_pause_lasts_is_told_in_seconds():

@@ -19,7 +19,7 @@ import unconstrain as uc
 from ..base.display import bare, counted, innermost, listed, percent
 from ..base.errors import InvalidDataError, ModelFileError, ReadError, SettingError, WriteError
 from .endings import REFUSED, ending
-from .reading import next_command, said_recipe
+from .reading import next_command, said_recipe, say_left
 from .speaking import as_typed, meant_of
 from .terminal import plain_output
 
@@ -185,6 +185,7 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
         count = len(stream.paths)
         found = uc.evaluation.verdicts.of_explained(alone, count, told, lost=lost)
         return Judged(found, None, "", count, 0, float("nan"), held_out, lost)
+    say_left(demos, stream.recipe)
     usual = float((uc.stack(demos).actions ** 2).sum(axis=1).mean() ** 0.5)
     count, samples, missed = _walked(moving, stream, usual)
     open_ = told is not None and told < uc.evaluation.verdicts.MOSTLY

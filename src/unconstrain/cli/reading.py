@@ -244,6 +244,24 @@ def said_recipe(recipe: uc.Recipe, recording: uc.Recording) -> str:
     return f"{states} as states and {actions}{'' if recipe.actions else ' as actions'}{radians}"
 
 
+def say_left(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe) -> None:
+    """Print how much of all demonstrations ``--still`` left, and with ``--verbose`` of each."""
+    if recipe.still is not None:
+        click.echo(f"Note: --still left {_left_of(demonstrations)}.", err=True)
+        for one in demonstrations if click.get_current_context().params.get("verbose") else ():
+            click.echo(f"  {one.name}: {_left_of([one])}", err=True)
+
+
+def _left_of(demonstrations: Sequence[uc.Demonstration]) -> str:
+    import numpy as np
+
+    left, of = [*map(len, demonstrations)], [(one.source and one.source.whole) or len(one) for one in demonstrations]
+    steps = [np.ptp(one.times) / (len(one) - 1) for one in demonstrations if one.times is not None and len(one) > 1]
+    known = len(steps) == len(left)
+    seconds = f" ({np.dot(left, steps):.3g} of {np.dot(of, steps):.3g} s)" if known else ""
+    return f"{sum(left)} of {sum(of)} samples{seconds}"
+
+
 def reading_of(**options: Any) -> uc.readers.Reading:
     """How to read the files, as the options say."""
     known = [field.name for field in fields(uc.readers.Reading)]
@@ -345,7 +363,9 @@ def prepared(paths: Sequence[Any], reading: dict[str, Any], notes: Mapping[str, 
     if not recordings:
         raise ReadError(NOTHING_LEFT)
     with of_files(recordings):
-        return Prepared(uc.prepare(recordings, asked), uc.preparation.decide(asked, recordings[0])[0], recordings)
+        found = Prepared(uc.prepare(recordings, asked), uc.preparation.decide(asked, recordings[0])[0], recordings)
+    say_left(found.demonstrations, found.recipe)
+    return found
 
 
 def _but(kept: Any, asked: Any) -> Any:

@@ -125,14 +125,18 @@ class Truth(Shown):
 
 
 class Source(NamedTuple):
-    """Where samples were recorded: the file, and rows (T,) of its recording, from 0, that each is at or nearest to."""
+    """Where samples were recorded: the file, and rows (T,) of its recording, from 0, that each is at or nearest to.
+
+    Before both ends were trimmed there were ``whole`` samples, if known.
+    """
 
     file: str
     rows: NDArray[np.intp]
+    whole: int | None = None
 
     def at(self, rows: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Source:
         """Of some of the samples."""
-        return Source(self.file, self.rows[rows])
+        return self._replace(rows=self.rows[rows])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -16,6 +16,7 @@ WARNINGS = (
     "targets-as-velocities",
     "mixed-units",
     "unit-differs",
+    "columns-differ",
     "pause",
     "reversed",
     "at-rest",

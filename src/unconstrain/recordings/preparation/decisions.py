@@ -3,6 +3,8 @@
 import re
 from dataclasses import replace
 
+import numpy as np
+
 from ...base.errors import SettingError
 from ..demonstration import Recording
 from ..remarks import Remark
@@ -13,6 +15,16 @@ from .recipes import Recipe, complete_recipe, stamps
 
 DEGREES = re.compile(r"\s*(deg|degs|degrees?|[°º])\s*((/|per |\*|·)?\s*s(ec|econds?)?(\^?-1|⁻¹)?)?\s*", re.IGNORECASE)
 """How people write degrees, and degrees a second."""
+
+JOINT = re.compile(
+    r"(.*[._/ ])?(q|qpos|theta|joints?|shoulder|elbow|wrist|hip|knee|ankle)"
+    r"([._ ]?(left|right|[lr]|pan|lift|roll|pitch|yaw|flex|flexion|rotation|angle|joint|pos|position|\d+|\[\d+\]))*",
+    re.IGNORECASE,
+)
+"""How people call a joint: markers at one, such as ``wrist_x``, are positions."""
+
+FARTHEST = 2.0
+"""Turns from end to end that joints of arms have at most."""
 
 NOT_TOLD = "jumps by 360, and is taken for radians; name it with degrees=, or leave that off."
 """What is said of an angle in degrees that is not told to be."""
@@ -81,5 +93,17 @@ def _about_degrees(asked: Recipe, decided: Recipe, recording: Recording) -> tupl
     if asked.degrees is not None:
         return tuple(Remark("degrees", NOT_TOLD, name) for name in _turning_by_360(decided, recording))
     if not degrees:
-        return ()
+        return may_be_degrees(asked, decided, recording)
     return (Remark("degrees", f"{', '.join(degrees)} is taken in radians; degrees=() forbids it."),)
+
+
+def may_be_degrees(asked: Recipe, decided: Recipe, recording: Recording) -> tuple[Remark, ...]:
+    """The remark on joints that go farther than they do in radians, where nothing says their unit."""
+    joints = [name for name in decided.states or () if JOINT.fullmatch(name) and not recording.units.get(name)]
+    far = float(np.ptp(recording.select(joints), axis=0).max(initial=0.0)) if len(recording) else 0.0
+    if asked.degrees is not None or decided.degrees or not far > FARTHEST * TURNS[0]:
+        return ()
+    said = (
+        f"joints go through {far:.3g}, which looks like degrees, and are taken for radians; if they are degrees, say "
+    )
+    return (Remark("degrees", f"{said}degrees={tuple(joints)}.", joints[0]),)

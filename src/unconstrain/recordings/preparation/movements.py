@@ -293,7 +293,7 @@ def _prepare(recording: Recording, recipe: Recipe) -> tuple[Demonstration, list[
             f"'{recording.name}' has no times, which are needed to differentiate: "
             "name the time column with time=, or give its rate in samples per second with rate=."
         )
-    source = Source(recording.file, at)
+    source = Source(recording.file, at, len(at))
     demonstration = Demonstration(states, actions, times, None, recording.name, recipe.space, noise, source)
     if recipe.trim is not None or recipe.still is not None:
         demonstration = trim(demonstration, *(recipe.trim or (0.0, 0.0)), still=recipe.still)

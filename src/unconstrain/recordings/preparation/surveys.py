@@ -9,7 +9,7 @@ from ...base.arrays import Array
 from ...base.errors import UnconstrainError
 from ..demonstration import Recording
 from ..remarks import Remark, titled
-from .decisions import in_radians
+from .decisions import in_radians, may_be_degrees
 from .movements import Gap, find_gaps
 from .plausibility.checks import examine, once
 from .plausibility.sets import compare, outline, too_few
@@ -112,7 +112,8 @@ def _survey(subject: Subject, asked: Recipe) -> Survey:
     recording, acts = subject.recording, subject.recipe.actions
     times = stamps(recording, asked)
     known = np.empty(0) if times is None else times[np.isfinite(times)]
-    gaps, remarks = find_gaps(known - known[:1], asked.max_gap_s), examine(subject)
+    gaps = find_gaps(known - known[:1], asked.max_gap_s)
+    remarks = (*examine(subject), *may_be_degrees(asked, subject.recipe, recording))
     steady = _steady_intervals(known, gaps)
     typical = float(np.median(steady)) if steady.size else None
     bad_cells = len(recording) - np.count_nonzero(np.isfinite(recording.values), axis=0)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 
 from ....base.arrays import Array
+from ....base.display import listed
 from ...readers.clocks import UNITS, usual
 from ...remarks import Remark
-from ...signals.stillness import is_noise, noise_share, pauses, rest_before
+from ...signals.stillness import is_noise, noise_share, rest_before, stops
 from ..meaning import are_backwards, are_targets
 from .subject import FLIPS, GAP_INTERVALS, LEAST_ROWS, Subject
 
@@ -23,6 +23,9 @@ SHORTEST_GAP_S = 0.1
 
 IRREGULAR = 0.01
 """Intervals that differ from the median by more than this share are no uniform sampling."""
+
+SHORTEST_STOP_S, STOP_ROWS = 0.3, 6
+"""A stop takes so many seconds, and rows, at least: who turns a corner is slow for a shorter time."""
 
 SHORTEST_PIECE = 5
 """Rows before and after a gap; fewer are a stray row at an end."""
@@ -194,20 +197,25 @@ def targets(subject: Subject) -> Remark | None:
 
 def pause(subject: Subject) -> Remark | None:
     """Standing still in the middle."""
-    if not subject.moves or subject.topic is not None:
-        return None
-    bounds = [0, *subject.seams, len(subject.rows)]
-    found = [
-        (first + start, first + stop)
-        for first, last in pairwise(bounds)
-        for start, stop in pauses(subject.clean[first:last])
-    ]
-    if not found:
+    if not (found := subject.pauses):
         return None
     rows = sum(stop - start for start, stop in found)
     done = "left out (pauses='keep')" if subject.recipe.pauses == "drop" else "kept (pauses='drop')"
     message = f"stands still for {subject.lasting(rows)} in the middle; they are {done}."
     return Remark("pause", message, row=subject.row(found[0][0]))
+
+
+def stop(subject: Subject) -> Remark | None:
+    """Stopping in the middle for less long than a pause."""
+    if (stamps := subject.stamps) is None or not subject.moves or subject.topic is not None or subject.pauses:
+        return None
+    interval = float(np.median(np.diff(stamps)))
+    if not 0.0 < interval <= SHORTEST_STOP_S / STOP_ROWS:
+        return None
+    found = stops(subject.clean, round(SHORTEST_STOP_S / interval))
+    told = [f"{stamps[last - 1] - stamps[row]:.2g} s from {stamps[row] - stamps[0]:.3g} s on" for row, last in found]
+    said = f"stops on the way for {listed(told, 3)}, and moves on: learnt as rest there; cut it in two there, or leave "
+    return Remark("stop", f"{said}it out with leave_out=.", row=subject.row(found[0][0])) if found else None
 
 
 def rest(subject: Subject) -> Remark | None:
@@ -255,6 +263,7 @@ CHECKS: tuple[Callable[[Subject], Remark | None], ...] = (
     seam,
     targets,
     pause,
+    stop,
     rest,
     at_rest,
     all_zero,

@@ -30,7 +30,7 @@ class _Others:
         at = (places - places.mean(axis=0)) / scale
         ends = np.cumsum([len(one.places) for one in outlines])
         self._rows = [slice(end - len(one.places), end) for end, one in zip(ends, outlines, strict=True)]
-        self.steps = np.concatenate([_of_length_one(one.steps / scale) for one in outlines])
+        self.steps = np.concatenate([of_length_one(one.steps / scale) for one in outlines])
         from scipy.linalg import lapack  # takes a fifth of a second to import
 
         half = lapack.dpotri(lapack.dpotrf(_kernel(at) + RIDGE * np.eye(len(at)))[0])[0]  # at half the price of LU
@@ -79,7 +79,7 @@ def _kernel(at: Array) -> Array:
     return gaussian + 1.0 + products / n
 
 
-def _of_length_one(steps: Array) -> Array:
+def of_length_one(steps: Array) -> Array:
     """Steps of a root mean square length of one: how fast a demonstration is says nothing about its direction."""
     length = np.sqrt((steps**2).sum(axis=1).mean())
     return steps / length if length > 0 else steps

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from ...remarks import Remark
 from ...signals.stillness import is_noise, noise_share
 from .checks import FASTEST, SLOWEST
 from .directions import turned_round
+from .exchanged import exchanged
 from .outlines import Outline
 from .subject import Subject
 
@@ -86,7 +87,7 @@ def compare(outlines: Sequence[Outline | None]) -> list[tuple[Remark, ...]]:
     if known:
         several = [one for _, one in known]
         remarks[known[0][0]] += [*mixed_units(several), *different_places(several)]
-        for check in (clock_differs, unit_differs, smaller_than_others, reversed_among_others):
+        for check in (clock_differs, unit_differs, smaller_than_others, columns_differ, reversed_among_others):
             for place, remark in check(several):
                 remarks[known[place][0]].append(remark)
     return [tuple(each) for each in remarks]
@@ -224,14 +225,33 @@ def smaller_than_others(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]
     return [(int(place), Remark("at-rest", message)) for place in still]
 
 
+def columns_differ(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
+    """Demonstrations that are like the others once two columns are exchanged, or the sign of one is turned."""
+    found = []
+    for places in _together(outlines, {place for place, _ in unit_differs(outlines)}):
+        if told := exchanged([outlines[place] for place in places]):
+            pairs = [[outlines[0].names[column] for column in pair] for pair in told[1]]
+            ways = [f"the sign of {a!r} turned" if a == b else f"{a!r} and {b!r} exchanged" for a, b in pairs]
+            said = f"is like the others only with {' or '.join(ways)}; mend that, or leave it out with leave_out=."
+            found.append((places[told[0]], Remark("columns-differ", said, pairs[0][0])))
+    return found
+
+
 def reversed_among_others(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
     """Demonstrations that move against what all others say at their places."""
-    strange = {place for place, _ in unit_differs(outlines)}
-    moving = [place for place, one in enumerate(outlines) if len(one.steps) and place not in strange]
-    together = [moving[first : first + TOGETHER] for first in range(0, len(moving), TOGETHER)]
-    message = "moves against the others at the same places; leave it out with leave_out=, or turn it round."
+    strange = {place for check in (unit_differs, columns_differ) for place, _ in check(outlines)}
+    message = (
+        "moves against the others at the same places; leave it out with leave_out=, or turn it round. If a column "
+    )
+    message += "has another sign in it, or two are exchanged, mend that."
     return [
         (places[index], Remark("reversed", message))
-        for places in together
+        for places in _together(outlines, strange)
         for index in turned_round([outlines[place] for place in places])
     ]
+
+
+def _together(outlines: Sequence[Outline], without: Collection[int]) -> list[list[int]]:
+    """Demonstrations in motion that are compared at once, but for some."""
+    moving = [place for place, one in enumerate(outlines) if len(one.steps) and place not in without]
+    return [moving[first : first + TOGETHER] for first in range(0, len(moving), TOGETHER)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from ....base.arrays import Array
 from ...demonstration import Recording
 from ...signals.jumps import Glitch, glitches, repaired, seams, topics
 from ...signals.orientations import Wrap, continuous_quaternions, quaternion_flips, rotation_flips, wraps
+from ...signals.stillness import pauses
 from ..continuity import continuous, unturned
 from ..recipes import Recipe, select, stamps
 
@@ -159,6 +161,13 @@ class Subject:
             return found
         intervals = np.diff(self.stamps)
         return [row for row in found if intervals[row - 1] <= GAP_INTERVALS * float(np.median(intervals))]
+
+    @cached_property
+    def pauses(self) -> list[tuple[int, int]]:
+        """Half-open stretches of :attr:`states` that stand still in the middle, between seams."""
+        bounds = [0, *self.seams, len(self.rows)] if self.moves and self.topic is None else []
+        pieces = [(first, pauses(self.clean[first:last])) for first, last in pairwise(bounds)]
+        return [(first + start, first + stop) for first, found in pieces for start, stop in found]
 
     def lasting(self, rows: int) -> str:
         """So many rows of all, in seconds, too, where these are known."""
