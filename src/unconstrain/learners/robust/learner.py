@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...base.arrays import Array, check_at_least
 from ...base.display import counted
@@ -59,13 +60,8 @@ class SampleLearner(Learner):
 
     def learn(self, training: Training) -> Solution:
         """Learn from the samples; as :class:`~unconstrain.Hybrid` with one action, no motion or a single fold."""
-        everything = training.samples
-        suspects = everything.suspects
-        if len(suspects) and (rest := training.without(suspects)).gathered.filled:
-            training, everything = rest, rest.samples
-        else:  # where no field sees any of the rest, nothing says that the suspects are wrong
-            suspects = suspects[:0]
-        found = self._learnt(training, everything)
+        training, suspects = _trusted(training)
+        found = self._learnt(training, training.samples)
         thinned = _thinned(training)
         listed = suspects[:0] if thinned else suspects  # which they are among all is not known
         return replace(found, belief=replace(found.believed, suspects=listed), notes=(*found.notes, *thinned))
@@ -345,7 +341,7 @@ class Robust(_Maximising):
         chosen, first = usual or names[0], list(Training.opening(seen))
         best, views = dict[str, Candidate](), dict[str, Samples]()
         for name in names:
-            training = begun[name].keeping(Training.MOST_KEPT).with_batches(first)
+            training, _ = _trusted(begun[name].keeping(Training.MOST_KEPT).with_batches(first))
             views[name] = held_out_together(training.samples.counted)
             if _trivial(views[name]):
                 break
@@ -358,6 +354,14 @@ class Robust(_Maximising):
             if usual is not None and chosen not in list(best)[-2:]:
                 break
         return chosen
+
+
+def _trusted(training: Training) -> tuple[Training, NDArray[np.intp]]:
+    """The training without samples that look wrong, and which these are."""
+    suspects = training.samples.suspects
+    if len(suspects) and (rest := training.without(suspects)).gathered.filled:
+        return rest, suspects
+    return training, suspects[:0]  # where no field sees any of the rest, nothing says that the suspects are wrong
 
 
 def _compared(best: Mapping[str, Candidate], views: Mapping[str, Samples]) -> Comparison:
