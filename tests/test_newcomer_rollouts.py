@@ -217,8 +217,8 @@ def test_strokes_that_are_too_large_are_not_outweighed_by_others_that_are_too_sm
     found = of_replays(Verdict(Mark.GOOD, "Good."), np.array([0.6, 0.7, 1.0, 1.5, 1.7]), np.full(5, np.nan), "3 mm")
     assert found.mark is Mark.DOUBTFUL
     assert (
-        "size 1.00 times (0.60 to 1.70) the demonstrated, typically 3 mm away; more than 20% off: size of 4 of 5."
-        in found.said
+        "size 1.00 times (0.60 to 1.70) the demonstrated (in brackets, least to most of 5 runs), typically 3 mm "
+        "away; more than 20% off: size of 4 of 5." in found.said
     )
 
 
