@@ -27,11 +27,8 @@ from .continuity import continuous
 from .decisions import decide
 from .plausibility.checks import examine, is_irregular
 from .plausibility.sets import PUSHED, compare, outline
-from .plausibility.subject import Subject
+from .plausibility.subject import GAP_INTERVALS, Subject
 from .recipes import Recipe, select, stamps
-
-GAP_INTERVALS = 5.0
-"""An interval of this many median ones is a gap, where nothing else is said."""
 
 MOST_SAMPLES = 1e8
 """More than this is no rate but a mistake, and would fill the memory."""
