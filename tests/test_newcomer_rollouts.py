@@ -363,7 +363,8 @@ def test_a_fit_itself_says_how_its_policy_moves(folder, tmp_path):
     assert all(" ".join(found["verdict"][name].split()) in page for name in ("said", "trust", "doubt", "next"))
     told = re.search(r"un from the same starts: size (\S+) times", found["verdict"]["said"])
     assert float(told[1]) == pytest.approx(found["replayed"]["extent"], abs=0.006)
-    assert re.fullmatch(r"size \S+ times \(\S+ to \S+\), pace .*times.* the demonstrated", found["ran"])
+    ran = r"size \S+ times \(\S+ to \S+\), pace .*times.* the demonstrated \(in brackets, least to most of \d+ runs\)"
+    assert re.fullmatch(ran, found["ran"])
     assert f"{found['ran']}, typically" in found["verdict"]["said"]  # ranges go with the policy, to info and to exports
     notes = json.loads(run("info", tmp_path / "p.npz", "--json"))
     assert notes["from the same starts"] == found["ran"]
