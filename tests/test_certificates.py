@@ -122,3 +122,5 @@ def test_on_the_command_line_the_exit_code_says_it(tmp_path):
     assert (good.exit_code, bad.exit_code, wrong.exit_code) == (0, 1, 2)
     assert "From every state, movements arrive: free at (0.3" in good.output
     assert "guaranteed" in bad.output
+    assert f"Next: unconstrain export {tmp_path / 'guided.npz'} -o policy.c" in good.output
+    assert "Next: unconstrain fit with --guided auto" in bad.output

@@ -237,6 +237,7 @@ def test_plates_of_other_tilts_have_a_constraint_each_and_a_table(tilted, tmp_pa
     assert "Record what is missing" not in said
     [line] = [line for line in said.splitlines() if line.startswith("Mechanism: ")]
     assert "a plane for each of 3 demonstrations, against" in line
+    assert line.rstrip().endswith("± is half of a 95 % interval, and 10:1 are odds.")
     rows = [line.split() for line in said.splitlines() if line.startswith("plate_")]
     assert_allclose(
         [float(row[row.index("constant") + 2].rstrip("°")) for row in rows], np.degrees(np.abs(TILTS)), atol=1

@@ -196,6 +196,7 @@ class TestCommand:
             "Learnt as likelihood: ",
             "Estimated squared error of other ways over that of this: ",
             "demonstrate around (x = ",
+            "left free: tilt what holds it, such as the plate, another way, or take another (",
         ):
             assert words in said
         references = References()

@@ -217,8 +217,8 @@ def test_strokes_that_are_too_large_are_not_outweighed_by_others_that_are_too_sm
     found = of_replays(Verdict(Mark.GOOD, "Good."), np.array([0.6, 0.7, 1.0, 1.5, 1.7]), np.full(5, np.nan), "3 mm")
     assert found.mark is Mark.DOUBTFUL
     assert (
-        "size 1.00 times (0.60 to 1.70) the demonstrated, typically 3 mm away; more than 20% off: size of 4 of 5."
-        in found.said
+        "size 1.00 times (0.60 to 1.70) the demonstrated (in brackets, least to most of 5 runs), typically 3 mm "
+        "away; more than 20% off: size of 4 of 5." in found.said
     )
 
 
@@ -363,7 +363,8 @@ def test_a_fit_itself_says_how_its_policy_moves(folder, tmp_path):
     assert all(" ".join(found["verdict"][name].split()) in page for name in ("said", "trust", "doubt", "next"))
     told = re.search(r"un from the same starts: size (\S+) times", found["verdict"]["said"])
     assert float(told[1]) == pytest.approx(found["replayed"]["extent"], abs=0.006)
-    assert re.fullmatch(r"size \S+ times \(\S+ to \S+\), pace .*times.* the demonstrated", found["ran"])
+    ran = r"size \S+ times \(\S+ to \S+\), pace .*times.* the demonstrated \(in brackets, least to most of \d+ runs\)"
+    assert re.fullmatch(ran, found["ran"])
     assert f"{found['ran']}, typically" in found["verdict"]["said"]  # ranges go with the policy, to info and to exports
     notes = json.loads(run("info", tmp_path / "p.npz", "--json"))
     assert notes["from the same starts"] == found["ran"]

@@ -700,7 +700,7 @@ def noted(recordings, code="places"):
 
 def test_centring_is_suggested_where_demonstrations_are_at_different_places():
     [message] = noted(at_places(TRACK))
-    assert "farther apart than each is wide" in message
+    assert "in different places, each farther from others than it is long" in message
     assert "take each from its own centre with centre=True" in message
     assert noted(at_places(TRACK, apart=0.5)) == []
     with pytest.warns(PreparationWarning, match="places: '0': .* with centre=True") as said:

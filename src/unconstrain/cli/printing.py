@@ -248,7 +248,7 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
     elif learner != "direct":
         _say_determined(solution, learner)
     click.echo(
-        "share of the observed motion left unexplained, of what is slow less: "
+        "share of the observed motion left unexplained, where slow samples count less: "
         + (f"{1.0 - judged.training:.4g} on the training data, " if known else "")
         + (
             f"{1.0 - judged.held_out:.4g} where held out."

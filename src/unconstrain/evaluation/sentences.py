@@ -114,7 +114,8 @@ def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[st
     worst = found.regions[0]
     advice = (
         f"demonstrate around {named(worst.state, states)} with motion along {named(worst.direction, actions)} left "
-        f"free (standard deviation there: {percent(worst.along)} of a typical action; see '{worst.demonstration}')."
+        "free: tilt what holds it, such as the plate, another way, or take another (standard deviation there: "
+        f"{percent(worst.along)} of a typical action; see '{worst.demonstration}')."
     )
     if all(one.determined == 1.0 for one in found.regions):
         return [f"Every recorded state is determined. If you record more: {advice}"]

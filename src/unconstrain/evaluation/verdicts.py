@@ -408,7 +408,8 @@ def of_replays(found: Verdict, extents: Array, paces: Array, apart: str, lasts: 
 def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> str:
     """Those of :func:`of_replays` in words: the middle ones, and their ranges."""
     told = ", ".join(f"{name} {_times(ratios)}" for name, ratios in _measured(extents, paces, lasts).items())
-    return f"{told} the demonstrated" if told else ""
+    runs = f" (in brackets, least to most of {len(extents)} runs)" if "(" in told else ""
+    return f"{told} the demonstrated{runs}" if told else ""
 
 
 def _measured(*given: Sequence[float] | Array) -> dict[str, Array]:

@@ -80,11 +80,11 @@ class Orbit(Shown):
         """What is guaranteed, in words."""
         middle = ", ".join(f"{each:.4g}" for each in self.potential.goal)
         return (
-            f"A closed convex surface attracts, of radius {self.radius:.4g} about ({middle}), from every state but its "
-            f"middle, free and under any flat constraint: at {PULL * self.rate:.4g} to {RUSH * self.rate:.4g} per "
-            "second. A plane through its inside cuts it in one cycle, on which the pace is within "
-            f"{STRAY:.0%} of the one learnt wherever the plane lets it turn. A constraint that moves, or an obstacle, "
-            "may lead off it."
+            f"A closed convex surface, round or oval, attracts, typically {self.radius:.4g} off its middle ({middle}), "
+            "from every state but that, free and under any flat constraint: the distance from it shrinks at rates of "
+            f"{PULL * self.rate:.4g} to {RUSH * self.rate:.4g} per second. A plane through its inside cuts it in one "
+            f"cycle, on which the pace is within {STRAY:.0%} of the one learnt wherever the plane lets it turn. A "
+            "constraint that moves, or an obstacle, may lead off it."
         )
 
     def correction(self) -> Correction:

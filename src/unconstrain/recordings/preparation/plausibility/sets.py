@@ -141,7 +141,9 @@ def different_places(outlines: Sequence[Outline]) -> list[Remark]:
         cure = "if where they are does not matter, take each from its own centre with centre=True"
     else:
         cure = "they move on from end to end, so no mean tells their places (centre=True would hide a constant push)"
-    return [Remark("places", f"demonstrations are farther apart than each is wide; {cure}.")]
+    return [
+        Remark("places", f"demonstrations are in different places, each farther from others than it is long; {cure}.")
+    ]
 
 
 def clock_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
