@@ -14,7 +14,8 @@ FEWEST, MOST_COLUMNS = 5, 12
 
 FAR, NEARER, ALIKE = 2.0, 4.0, 1.5
 """It is farther from the others than each of these by the first factor, and exchanged nearer by the second and within
-the third of these. What comes as near, to within that, is named, too; nothing is if it does so backwards.
+the third of these. What comes as near, to within that, is named, too; nothing is if it comes nearer by the first factor
+when it is played backwards.
 
 Of 630 recorded movements beside others of their kind none is so. Put in, 83 % are found."""
 
@@ -36,7 +37,7 @@ def exchanged(outlines: Sequence[Outline]) -> tuple[int, list[tuple[int, int]]] 
     pairs, one = [*combinations_with_replacement(columns, 2)], outlines[odd]
     offs = [_off(_table(_with_exchanged(one, *pair), scale), others) for pair in pairs]
     near, backwards = ALIKE * min(offs), _off(_table(one._replace(steps=-one.steps), scale), others)
-    if min(offs) >= min(far[odd] / NEARER, ALIKE * rest) or backwards < near:
+    if min(offs) >= min(far[odd] / NEARER, ALIKE * rest) or backwards < far[odd] / FAR:
         return None
     return odd, [pair for pair, off in zip(pairs, offs, strict=True) if off <= near]
 
