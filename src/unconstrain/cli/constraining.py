@@ -302,8 +302,8 @@ class Named(NamedTuple):
         """The verdict, and what it leaves open."""
         known = "Mechanism" if self.found.mechanism.unit else "Mechanism, if these are positions"
         doubt = self.found.doubt
-        meant = "± is half of a 95 % interval, and 10:1 are odds."
-        return [f"{known}: {self.found.summary}. {meant}", *([f"{doubt[0].upper()}{doubt[1:]}."] if doubt else [])]
+        meant = "± is half of a 95 % interval, 10:1 are odds" if "±" in self.found.summary else "10:1 are odds"
+        return [f"{known}: {self.found.summary} ({meant}).", *([f"{doubt[0].upper()}{doubt[1:]}."] if doubt else [])]
 
 
 def mechanism_of(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe, first: uc.Recording) -> Named | None:
