@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 import unconstrain as uc
 from unconstrain.evaluation.diagnosis import diagnose, sentences
 from unconstrain.learners.robust.evidence import surely
+from unconstrain.learners.robust.pivot import pivot_of
 
 TURN = np.array([[-0.3, -1.5, 0.4], [1.5, -0.3, -0.6], [-0.4, 0.6, -0.3]])
 SHIFT = np.array([0.4, -0.3, 0.5])
@@ -149,6 +150,63 @@ class TestWithoutAnyTwo:
 
     def test_without_two_of_two_nothing_is_left(self):
         assert surely(np.stack([np.eye(3)] * 2), 0.0).shape == (3, 0)
+
+
+def swung(seed, dimensions=2):
+    """Doors that are opened about one hinge, held at radii that differ a little."""
+    rng, found, time = np.random.default_rng(seed), [], np.arange(200) * 0.01
+    for _ in range(6):
+        radius = 0.65 + 0.01 * rng.standard_normal()
+        angle = rng.uniform(-0.1, 0.1) + 1.3 * (1.0 - np.exp(-1.5 * time))
+        path = HINGE + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+        path = np.pad(path, ((0, 0), (0, dimensions - 2)), constant_values=0.8)
+        actions = np.gradient(path, time, axis=0)
+        actions += 0.03 * np.sqrt((actions**2).sum(axis=1).mean()) * rng.standard_normal(path.shape)
+        found.append(uc.Demonstration(path, actions, times=time))
+    return found
+
+
+HINGE = np.array([1.0, 0.5])
+
+
+class TestHinge:
+    """All swing about one place: whoever was free to leave looks as who was not, though directions of motion turn."""
+
+    @pytest.mark.parametrize("dimensions", [2, 3])
+    @pytest.mark.parametrize("policy", [uc.LocallyLinearPolicy(), uc.ParametricPolicy()], ids=["local", "kernels"])
+    def test_a_door_is_never_free_and_what_points_to_its_hinge_is_open(self, policy, dimensions):
+        demos = swung(0, dimensions)
+        states = uc.stack(demos).states
+        believed = policy.fit_demonstrations(demos).solution_.believed
+        assert (believed.free_share, believed.told_together) == (0.0, 0.0)
+        outwards = states - np.pad(HINGE, (0, dimensions - 2), constant_values=0.8)
+        outwards /= np.linalg.norm(outwards, axis=1, keepdims=True)
+        open_ = np.sqrt(np.einsum("na,nab,nb->n", outwards, policy.covariances(states), outwards))
+        assert np.median(open_) > 0.5 * np.sqrt((uc.stack(demos).actions ** 2).sum(axis=1).mean())
+
+    def test_the_hinge_is_found_to_centimetres(self):
+        states, actions, _ = uc.stack(swung(1))
+        assert_allclose(pivot_of(states, actions), HINGE, atol=0.03)
+
+    def test_who_comes_nearer_too_is_no_door(self):
+        starts = np.random.default_rng(0).uniform(-1.5, 1.5, (10, 2))
+        demos = uc.rollout(lambda x: x @ [[-0.3, 2.0], [-2.0, -0.3]], starts, 300, 0.02)
+        assert pivot_of(*uc.stack(demos)[:2]) is None
+
+    def test_rounds_on_plates_of_other_tilts_are_no_door(self):
+        angle, tilts = np.linspace(0, 6, 200), [-0.3, 0.0, 0.3]
+        flat = np.column_stack([np.cos(angle), np.sin(angle)])
+        rounds = [flat @ [[1, 0, 0], [0, np.cos(tilt), np.sin(tilt)]] for tilt in tilts]
+        turned = [np.column_stack([-flat[:, 1], flat[:, 0]]) @ [[1, 0, 0], [0, np.cos(t), np.sin(t)]] for t in tilts]
+        assert pivot_of(np.vstack(rounds), np.vstack(turned)) is None
+        assert_allclose(pivot_of(rounds[2], turned[2]), [0.0, 0.0, 0.0], atol=1e-9)
+
+    def test_strokes_along_one_line_and_forces_of_other_sizes_have_no_hinge(self):
+        rng = np.random.default_rng(0)
+        along = rng.uniform(-1, 1, (300, 1)) * [[1.0, 0.5]]
+        assert pivot_of(rng.uniform(-1, 1, (300, 2)), along) is None
+        assert pivot_of(rng.uniform(-1, 1, (300, 3)), along) is None
+        assert pivot_of(rng.uniform(-1, 1, (300, 2)), np.zeros((300, 2))) is None
 
 
 class TestWords:

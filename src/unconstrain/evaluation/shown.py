@@ -78,6 +78,8 @@ def _about_rest(
         if goal or any((speed >= slow).mean() < LONG for speed in speeds):
             return found
         return found._replace(next=f"--still {slow} leaves out rest at an end. {found.next}".rstrip())
+    if found.mark is Mark.BAD and not goal and len(rests) >= max(ENOUGH, len(demos) / 2):
+        found = found._replace(next=f"--still {slow} leaves out rest at an end, as in most of these. {found.next}")
     if found.mark is Mark.GOOD or goal or not kept:
         return found
     said = f"{len(kept)} of {len(speeds)} demonstrations come to rest where no other moves on: whether something "

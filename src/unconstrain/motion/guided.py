@@ -363,7 +363,7 @@ def _found(demos: Sequence[Demonstration], policy: Any, wanted: Array) -> Array:
 
 
 def _proposed(policy: Any, ends: Array, demos: Sequence[Demonstration], wanted: Array) -> str:
-    """The one place in what was shown where a policy rests, sought from where demonstrations end, as far as it is told.
+    """The one place in what was shown to which a policy comes, sought from where demonstrations end, as far as told.
 
     Of 18 sets of movements to a goal that plates held off it, it rested at most 3.3 cm from there in the eight where
     what demonstrations leave open of it moves that place by less than a fifth of the extent; in the others, 2 to 13 cm.
@@ -378,8 +378,11 @@ def _proposed(policy: Any, ends: Array, demos: Sequence[Demonstration], wanted: 
     places = np.array([one.x for one in found])
     if max(one.cost for one in found) > _STILL**2 / 2.0 or _apart(demos, places) > _STILL:
         return ""
+    slope = usual * found[0].jac
+    if np.linalg.eigvals(slope).real.max() >= 0.0:  # it rests there, but nothing comes there
+        return ""
     with suppress(SettingError, np.linalg.LinAlgError):
-        back = np.linalg.inv(usual * found[0].jac)
+        back = np.linalg.inv(slope)
         off = float(np.sqrt(np.trace(back @ policy.covariances(places[:1])[0] @ back.T)))
         if off >= 2.0 * _TOGETHER * np.linalg.norm(high - low):
             return f" Where the policy rests is told to within {off:.2g} only: record more, held in other ways."

@@ -29,6 +29,7 @@ from .constants import (
 from .evidence import Evidence, shown, surely
 from .likelihood import free_probability, mixture_of
 from .noise import hides_sphere, noise_by_differences
+from .pivot import pointing
 from .posterior import Posterior, unit_information
 from .smoothness import Smoothness
 
@@ -55,7 +56,8 @@ def solution(
     evidence = shown(samples, policy, variance, free[everything.counts > 0.0])
     priors = _Priors(samples, evidence.seen, chosen.smoothness)
     models = counted_off(range(len(chosen.weights)), "uncertainty: local model")
-    told = [_Told(chosen, evidence, priors, samples, m) for m in models]
+    away = pointing(samples)
+    told = [_Told(chosen, evidence, priors, samples, away[m], m) for m in models]
     belief = Belief(
         noise=float(np.sqrt(variance)),
         misfit=float(np.sqrt(_misfit(samples, variance))),
@@ -124,7 +126,9 @@ def _along(matrices: Array, of_actions: Array, p: int) -> Array:
 class _Told:
     """What is known of one model's weights: in coordinates in which the weak prior's precision is one."""
 
-    def __init__(self, chosen: Candidate, evidence: Evidence, priors: _Priors, samples: Samples, m: int) -> None:
+    def __init__(
+        self, chosen: Candidate, evidence: Evidence, priors: _Priors, samples: Samples, away: Array, m: int
+    ) -> None:
         self._axes, self._back = priors.axes[m], priors.back[m]
         scale = max(samples.energy, 1e-300) * samples.sizes[m] / samples.regressors  # of Σ w φφᵀ ⊗ I
         self._least = 1.0 + float(evidence.error[m]) * scale
@@ -132,15 +136,15 @@ class _Told:
         claimed = self._whitened(chosen.posterior.evidence.hessian[m])
         self._known = _restricted(claimed, parts.sum(axis=0), surely(parts, self._least))
         shares, directions = np.linalg.eigh(self._known)
-        self.determined = int((shares > 1.0).sum())
-        self.open = self._axes @ directions[:, shares <= 1.0]
+        self.determined = max(int((shares > 1.0).sum()) - away.shape[1], 0)
+        self.open = np.hstack([self._axes @ directions[:, shares <= 1.0], away])
         prior = priors.precision[m]
         self._both = _inverse(self._known + prior)
         noise = self._both @ self._known @ self._both
         self.from_noise = self._axes @ self._inflated(noise, chosen, samples, m) @ self._axes.T
         alone = self._whitened(sum(one.hessian[m] for one in evidence.consistent))
         values, axes = np.linalg.eigh(alone)
-        off = self._axes @ self._disagreement(chosen, evidence, m, values, axes)
+        off = np.hstack([self._axes @ self._disagreement(chosen, evidence, m, values, axes), away])
         both = self._both, _inverse(_restricted(claimed, alone, axes[:, values > self._least]) + prior)
         self.undetermined, self.together = (self._axes @ (b @ prior @ b) @ self._axes.T + off @ off.T for b in both)
 
