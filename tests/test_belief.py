@@ -193,6 +193,10 @@ class TestHinge:
         demos = uc.rollout(lambda x: x @ [[-0.3, 2.0], [-2.0, -0.3]], starts, 300, 0.02)
         assert pivot_of(*uc.stack(demos)[:2]) is None
 
+    def test_who_turns_at_all_distances_is_no_door(self):
+        states = np.random.default_rng(0).uniform(-1, 1, (300, 2))
+        assert pivot_of(states, states @ [[0, 1], [-1, 0]]) is None
+
     def test_rounds_on_plates_of_other_tilts_are_no_door(self):
         angle, tilts = np.linspace(0, 6, 200), [-0.3, 0.0, 0.3]
         flat = np.column_stack([np.cos(angle), np.sin(angle)])

@@ -75,9 +75,9 @@ def _judgement(kinds: Sequence[Row]) -> html.Markup:
         for one in kinds
     ]
     note = (
-        "nUPE in geometric means. Safe is the better of direct and softened hybrid in each data set, in the local models "
-        f"that {DEFAULT} chose or in the widest: they look for nothing in the data. Worst is the data set in which "
-        f"{DEFAULT} is farthest behind it."
+        "nUPE in geometric means. Safe is the better of direct and softened hybrid in each data set, in the local "
+        f"models that {DEFAULT} chose or in the widest: they look for nothing in the data. Worst is the data set in "
+        f"which {DEFAULT} is farthest behind it."
     )
     return html.table(header, rows, note=note, rules=_rules(kinds))
 
