@@ -121,10 +121,10 @@ def javascript(driver: Any, folder: Path) -> Iterator[Row]:
     """An exported policy in a page, against Python."""
     policy, states, _ = test_ros2.learnt(3)
     policy.export_javascript(folder / "policy.js")
-    script = (folder / "policy.js").read_text("utf-8") + "\nwindow.found = states.map(policy);"
+    module = (folder / "policy.js").read_text("utf-8") + "\nwindow.found = states.map(policy);"
     given = f"const states = {json.dumps(states.tolist())};"
     page = folder / "module.html"
-    page.write_text(f'<!doctype html><meta charset="utf-8"><script type="module">{given}\n{script}</script>')
+    page.write_text(f'<!doctype html><meta charset="utf-8"><script type="module">{given}\n{module}</script>')
     driver.get(page.as_uri())
     expected = policy(states)
     off = np.abs(np.array(driver.execute_script("return window.found")) - expected).max() / np.abs(expected).max()

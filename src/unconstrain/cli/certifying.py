@@ -35,12 +35,10 @@ def certify(policy: str, seed: int) -> None:
         raise ModelFileError(f"{policy}: holds no policy that is fitted or guided. Learn one with 'unconstrain fit'.")
     found = uc.certify(stored, around, seed)
     click.echo(f"{policy}: {found.said}")
-    then = (
-        "unconstrain export {} -o policy.c" if found.holds else "unconstrain fit with --guided auto, and certify that"
-    )
-    click.echo(f"Next: {then.format(shlex.quote(policy))}")
     if not found.holds:
+        click.echo("Next: unconstrain fit with --guided auto, and certify that")
         raise SystemExit(1)
+    click.echo(f"Next: unconstrain export {shlex.quote(policy)} -o policy.c")
 
 
 def _learnt_at(policy: Any) -> Any:

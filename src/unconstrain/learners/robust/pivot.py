@@ -33,12 +33,13 @@ def pivot_of(states: Array, actions: Array) -> Array | None:
         return None
     middle = states.mean(axis=0)
     along = (actions * (states - middle)).sum(axis=1)
-    centre = np.linalg.solve(plane.T @ actions.T @ actions @ plane, plane.T @ actions.T @ along)
-    outwards = states - middle - plane @ centre
+    within = actions @ plane
+    pivot: Array = middle + plane @ np.linalg.solve(within.T @ within, within.T @ along)
+    outwards = states - pivot
     inwards, far = np.vecdot(actions, outwards), np.linalg.norm(outwards, axis=1)
     on_one = far.std() < ONE_PATH * far.mean()
     about_it = (inwards**2).sum() <= MOST_INWARDS**2 * (np.linalg.norm(actions, axis=1) ** 2 @ far**2)
-    return np.asarray(states[0] - outwards[0]) if on_one and about_it else None
+    return pivot if on_one and about_it else None
 
 
 def pointing(samples: Samples) -> Array:

@@ -87,9 +87,11 @@ def compare(outlines: Sequence[Outline | None]) -> list[tuple[Remark, ...]]:
     if known:
         several = [one for _, one in known]
         remarks[known[0][0]] += [*mixed_units(several), *different_places(several)]
-        for check in (clock_differs, unit_differs, smaller_than_others, columns_differ, reversed_among_others):
-            for place, remark in check(several):
-                remarks[known[place][0]].append(remark)
+        units = unit_differs(several)
+        columns = columns_differ(several, {place for place, _ in units})
+        against = reversed_among_others(several, {place for place, _ in (*units, *columns)})
+        for place, remark in (*clock_differs(several), *units, *smaller_than_others(several), *columns, *against):
+            remarks[known[place][0]].append(remark)
     return [tuple(each) for each in remarks]
 
 
@@ -227,25 +229,22 @@ def smaller_than_others(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]
     return [(int(place), Remark("at-rest", message)) for place in still]
 
 
-def columns_differ(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
-    """Demonstrations that are like the others once two columns are exchanged, or the sign of one is turned."""
+def columns_differ(outlines: Sequence[Outline], strange: Collection[int]) -> list[tuple[int, Remark]]:
+    """Demonstrations that are like the others, but for ``strange`` ones, with columns exchanged or a sign turned."""
     found = []
-    for places in _together(outlines, {place for place, _ in unit_differs(outlines)}):
+    for places in _together(outlines, strange):
         if told := exchanged([outlines[place] for place in places]):
             pairs = [[outlines[0].names[column] for column in pair] for pair in told[1]]
             ways = [f"the sign of {a!r} turned" if a == b else f"{a!r} and {b!r} exchanged" for a, b in pairs]
-            said = f"is like the others only with {' or '.join(ways)}; mend that, or leave it out with leave_out=."
+            said = f"is like the others only with {' or '.join(ways)}; correct that, or leave it out with leave_out=."
             found.append((places[told[0]], Remark("columns-differ", said, pairs[0][0])))
     return found
 
 
-def reversed_among_others(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
-    """Demonstrations that move against what all others say at their places."""
-    strange = {place for check in (unit_differs, columns_differ) for place, _ in check(outlines)}
-    message = (
-        "moves against the others at the same places; leave it out with leave_out=, or turn it round. If a column "
-    )
-    message += "has another sign in it, or two are exchanged, mend that."
+def reversed_among_others(outlines: Sequence[Outline], strange: Collection[int]) -> list[tuple[int, Remark]]:
+    """Demonstrations that move against what all others, but for ``strange`` ones, say at their places."""
+    message = "moves against the others at the same places; leave it out with leave_out=, or turn it round. If a "
+    message += "column has another sign in it, or two are exchanged, correct that."
     return [
         (places[index], Remark("reversed", message))
         for places in _together(outlines, strange)
