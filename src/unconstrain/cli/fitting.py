@@ -37,7 +37,7 @@ def options_for_model(command: Callable[..., Any]) -> Callable[..., Any]:
     command = click.option("--scale", type=scale_of, default="none", metavar=metavar, help=scale, callback=_levelled)(
         command
     )
-    variance = "Local: σ² of the fields, squared unit of the states; inf for one model; by default chosen of six."
+    variance = "Local: σ² of the fields, squared unit of the states; inf for one model; by default chosen."
     command = click.option("--centres", type=click.IntRange(1), help=f"RBF: number of kernels; {CENTRES} by default.")(
         command
     )

@@ -9,7 +9,7 @@ import sys
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from math import isfinite, isinf
+from math import inf, isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
@@ -219,8 +219,8 @@ def _least_known(policy: uc.Policy, demonstrations: Sequence[uc.Demonstration], 
 
 def models_of(policy: uc.Policy) -> str:
     """Number and width of the local models, or the features of the one."""
-    if isinstance(policy, uc.LocallyLinearPolicy) and isinf(policy.variance_):
-        return "one affine model for all states"
+    if isinstance(policy, uc.LocallyLinearPolicy) and policy.variance_ in (inf, "cubic"):
+        return f"one {'cubic' if policy.variance_ == 'cubic' else 'affine'} model for all states"
     if isinstance(policy, uc.LocallyLinearPolicy):
         return f"{counted(len(policy.solution_.weights), 'local model')} of σ² {policy.variance_:.4g}"
     return str(policy.features_)

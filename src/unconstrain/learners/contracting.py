@@ -71,6 +71,10 @@ class Contracting(Learner):
         """
         raise SettingError("scale: got one, and Contracting is about distances in the units of the data. Fit without.")
 
+    def takes(self, model: Model) -> bool:
+        """Whether it is affine."""
+        return isinstance(model.features, Affine)
+
     def learn(self, training: Training) -> Solution:
         """Learn from all folds, with a softness that is given or chosen by cross-validation."""
         folds, rate = training.folds, self.rate / training.action_unit
@@ -92,7 +96,7 @@ class Contracting(Learner):
             If models are not affine from flat states to their velocities, or local and there is no goal.
         """
         models, n, p = shape
-        flat = isinstance(model.features, Affine) and isinstance(model.embedding.space, spaces.Euclidean)
+        flat = self.takes(model) and isinstance(model.embedding.space, spaces.Euclidean)
         if not flat or p != n + 1:
             raise SettingError(
                 "learner: Contracting expects affine models of velocities of flat states, ParametricPolicy(Affine()) "

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from typing import ClassVar, Self
 
 from ..base.parameters import Parameters
-from ..models import Scale
+from ..models import Model, Scale
 from ..risks import inconsistency, vec
 from ..training import Training
 from .solution import Solution
@@ -57,6 +57,10 @@ class Learner(Parameters, ABC):
     def within(self, scale: Scale) -> Self:
         """The same learner for states and actions in such units of a policy's own."""
         return self
+
+    def takes(self, model: Model) -> bool:
+        """Whether it can learn in a model, of several that a policy has to choose from."""
+        return True
 
     def held_out_score(self, training: Training) -> float:
         """Cross-validated share of the squared motion explained: one minus the inconsistency over the energy.

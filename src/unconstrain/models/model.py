@@ -72,22 +72,24 @@ class Model(Shown):
     def local(
         cls,
         coordinates: Array,
-        variance: float | None = None,
+        variance: float | Literal["cubic"] | None = None,
         at_least: float = 0.7,
         centres: ArrayLike | None = None,
         embedding: Embedding = _STATES,
     ) -> Self:
         """Affine models in receptive fields over some coordinates, on regressors of one origin (section III-D).
 
-        A variance of infinity is one model everywhere.
+        A variance of infinity is one model everywhere, "cubic" one of third degree.
         """
-        width = variance if variance not in (None, np.inf) else choose_variance(coordinates, at_least)
+        everywhere = variance == "cubic" or variance == np.inf
+        width = choose_variance(coordinates, at_least) if variance is None or everywhere else float(variance)
         if centres is None:
             fields = cover(coordinates, width, at_least)
         else:
             fields = ReceptiveFields(embedding(as_matrix(centres, "centres")), width)
-        features = Affine(fields.centres.mean(axis=0), np.sqrt(width))
-        return cls(features, Everywhere(fields) if variance == np.inf else fields, embedding)
+        affine = Affine(fields.centres.mean(axis=0), np.sqrt(width))
+        features = Polynomial(3).place(coordinates) if variance == "cubic" else affine
+        return cls(features, Everywhere(fields) if everywhere else fields, embedding)
 
     @classmethod
     def to_choose_from(cls, coordinates: Array, actions: int, embedding: Embedding = _STATES) -> dict[str, Self]:
@@ -102,29 +104,37 @@ class Model(Shown):
             "rbf": KMeansRBF(),
         }
         placed = {name: cls(one.place(coordinates), Everywhere(), embedding) for name, one in every.items()}
-        most, typical = min(MOST_WEIGHTS, coordinates.shape[0] * actions // 2), coordinates[:1]
-        few = {name: one for name, one in placed.items() if actions * one.features(typical).shape[1] <= most}
+        few = {name: one for name, one in placed.items() if one._is_small(coordinates, actions)}
         return {"affine": placed["affine"]} | few | {"local": cls.local(coordinates, embedding=embedding)}
+
+    def _is_small(self, coordinates: Array, actions: int) -> bool:
+        """Whether it has at most :data:`MOST_WEIGHTS` weights, and half as many as there are numbers."""
+        most = min(MOST_WEIGHTS, coordinates.shape[0] * actions // 2)
+        return actions * self.features(coordinates[:1]).shape[1] <= most
 
     @classmethod
     def of_widths(
         cls,
         coordinates: Array,
-        variance: float | Literal["auto"] | None,
+        actions: int,
+        variance: float | Literal["auto", "cubic"] | None,
         at_least: float = 0.7,
         centres: ArrayLike | None = None,
         embedding: Embedding = _STATES,
     ) -> dict[str, Self]:
         """Local models of a variance, or for "auto" several by name, each finer than the one before.
 
-        One affine model for all states, unless centres are given; fields of the default variance, ``USUAL``; and
-        narrower ones, up to :data:`MOST_FIELDS`.
+        Unless centres are given, one affine and one cubic model for all states, the latter where its weights are at
+        most half as many as the numbers seen; fields of the default variance, ``USUAL``; and narrower ones, up to
+        :data:`MOST_FIELDS`.
         """
         if variance != "auto":
             return {"": cls.local(coordinates, variance, at_least, centres, embedding)}
         widest = choose_variance(coordinates, at_least)
-        everywhere = cls.local(coordinates, np.inf, at_least, embedding=embedding)
-        found = {"affine": everywhere} if centres is None else {}
+        found = {}
+        if centres is None:
+            affine, cubic = (cls.local(coordinates, one, at_least, embedding=embedding) for one in (np.inf, "cubic"))
+            found = {"affine": affine} | ({"cubic": cubic} if cubic._is_small(coordinates, actions) else {})
         for share in NARROWER:
             one = cls.local(coordinates, widest / share, at_least, centres, embedding)
             if share > 1 and one.fields.shares(coordinates[:1]).shape[1] > MOST_FIELDS:

@@ -397,7 +397,8 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         begun = {name: Training.begin(look, one, split, keep, more=more) for name, one in places}
         if len(begun) > 1:
             suited = getattr(learner, "suited", None) or Robust().suited
-            begun = {"": begun[suited(begun, seen, self._usual)]}
+            taken = {name: one for name, one in begun.items() if learner.takes(one.model)}
+            begun = {"": begun[suited(taken or begun, seen, self._usual)]}
         self.training_ = next(iter(begun.values()))
         return self
 

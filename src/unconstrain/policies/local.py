@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 
 from ..base.arrays import as_matrix
 from ..learners import Learner
-from ..models import Model, ReceptiveFields, spaces
+from ..models import Affine, Model, ReceptiveFields, spaces
 from ..training import FirstLook, Validation
 from .base import Asked, Policy
 
@@ -18,10 +18,10 @@ class LocallyLinearPolicy(Policy):
 
     Parameters
     ----------
-    variance : float, "auto" or None
-        The fields' σ². None is a quarter of the states' total variance, more where that takes over 100 fields. "auto"
-        takes infinity, one affine model for all states, then that, then halves, down to a sixteenth, until two in turn
-        are worse by estimated error, in four times as long.
+    variance : float, "cubic", "auto" or None
+        The fields' σ². None is a quarter of the states' total variance, more where that takes over 100 fields. Infinity
+        is one affine model for all states, "cubic" one of third degree. "auto" takes these two, then the default, then
+        halves of it, down to a sixteenth, until two in turn are worse by estimated error, in four times as long.
     at_least : float
         Fields are added until every sample has at least this weight in one.
     centres : array_like, shape (M, n), optional
@@ -32,11 +32,12 @@ class LocallyLinearPolicy(Policy):
     Attributes
     ----------
     solution_ : Solution
-        Weights (M, d, n + 1) over ``((x − origin) / σ, 1)``, with one origin, and what the data determined.
+        Weights (M, d, n + 1) over ``((x − origin) / σ, 1)``, with one origin, and what the data determined; of a cubic
+        model (1, d, p) over its monomials.
     fields_ : ReceptiveFields
-        The fields in use, among the coordinates of the state space; around one affine model for all, those of support.
-    variance_ : float
-        Their σ², infinity for one model.
+        The fields in use, among the coordinates of the state space; around one model for all, those of support.
+    variance_ : float or "cubic"
+        Their σ², infinity for one affine model.
 
     Examples
     --------
@@ -50,7 +51,7 @@ class LocallyLinearPolicy(Policy):
 
     def __init__(
         self,
-        variance: float | Literal["auto"] | None = "auto",
+        variance: float | Literal["auto", "cubic"] | None = "auto",
         at_least: float = 0.7,
         centres: ArrayLike | None = None,
         learner: Learner | str | None = None,
@@ -71,7 +72,7 @@ class LocallyLinearPolicy(Policy):
         centres = None if self.centres is None else as_matrix(self.centres, "centres")
         if centres is not None and self.scale_ is not None:
             centres = self.scale_.state(centres)
-        return Model.of_widths(look.states, self.variance, self.at_least, centres, look.embedding)
+        return Model.of_widths(look.states, look.actions, self.variance, self.at_least, centres, look.embedding)
 
     @property
     def fields_(self) -> ReceptiveFields:
@@ -80,6 +81,7 @@ class LocallyLinearPolicy(Policy):
         return cast(ReceptiveFields, getattr(fields, "around", fields))
 
     @property
-    def variance_(self) -> float:
-        """Their σ², infinity for one model."""
-        return self._fitted_model().fields.variance
+    def variance_(self) -> float | Literal["cubic"]:
+        """Their σ², infinity for one affine model."""
+        model = self._fitted_model()
+        return model.fields.variance if isinstance(model.features, Affine) else "cubic"

@@ -19,6 +19,7 @@ from ..solution import Belief, Solution
 from .candidate import Candidate
 from .constants import (
     JACKKNIFE_IN_INTERVALS,
+    LEAST_EXPLAINED,
     LEAST_MISFIT,
     LEAST_SMOOTH_MISFIT,
     LEFT_OUT,
@@ -57,7 +58,8 @@ def solution(
     priors = _Priors(samples, evidence.seen, chosen.smoothness)
     models = counted_off(range(len(chosen.weights)), "uncertainty: local model")
     away = pointing(samples)
-    told = [_Told(chosen, evidence, priors, samples, away[m], m) for m in models]
+    says = not more.get("held_out_score", np.nan) < LEAST_EXPLAINED
+    told = [_Told(chosen, evidence, priors, samples, away[m], m, says) for m in models]
     belief = Belief(
         noise=float(np.sqrt(variance)),
         misfit=float(np.sqrt(_misfit(samples, variance))),
@@ -124,17 +126,20 @@ def _along(matrices: Array, of_actions: Array, p: int) -> Array:
 
 
 class _Told:
-    """What is known of one model's weights: in coordinates in which the weak prior's precision is one."""
+    """What is known of one model's weights: in coordinates in which the weak prior's precision is one.
+
+    Nothing is, where the policy does not say (``says``) how those move that were held out.
+    """
 
     def __init__(
-        self, chosen: Candidate, evidence: Evidence, priors: _Priors, samples: Samples, away: Array, m: int
+        self, chosen: Candidate, evidence: Evidence, priors: _Priors, samples: Samples, away: Array, m: int, says: bool
     ) -> None:
         self._axes, self._back = priors.axes[m], priors.back[m]
         scale = max(samples.energy, 1e-300) * samples.sizes[m] / samples.regressors  # of Σ w φφᵀ ⊗ I
         self._least = 1.0 + float(evidence.error[m]) * scale
         parts = self._whitened(evidence.hessians[:, m])
         claimed = self._whitened(chosen.posterior.evidence.hessian[m])
-        self._known = _restricted(claimed, parts.sum(axis=0), surely(parts, self._least))
+        self._known = says * _restricted(claimed, parts.sum(axis=0), surely(parts, self._least))
         shares, directions = np.linalg.eigh(self._known)
         self.determined = max(int((shares > 1.0).sum()) - away.shape[1], 0)
         self.open = np.hstack([self._axes @ directions[:, shares <= 1.0], away])

@@ -31,6 +31,8 @@ class Candidate:
         Share of the standard risk that biases the policy towards the actions: that of a softened hybrid or of a prior,
         infinite for direct regression, zero where it has next to no information; −1 where more is known of the
         constraints than their actions.
+    spread : float, optional
+        Mean variance of the predictions, where refits do not tell it; see :mod:`.agreement`.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Candidate:
     smoothness: Smoothness
     refits: Array
     softness: float = 0.0
+    spread: float | None = None
 
 
 def scaled(posterior: Posterior, variance: Array) -> Posterior:

@@ -102,13 +102,15 @@ class Comparison:
         self._candidates, self.noise = candidates, noise
         self._views = [samples] * len(candidates) if isinstance(samples, Samples) else list(samples)
         self._samples = samples = self._views[0]
-        self._directions, self._lengths = unit_actions(samples.actions)
+        self._held, self._seen = held_throughout(samples.actions, samples.groups, beyond_misfit(noise, samples))
+        self._on_line = self._held & (np.einsum("naa->n", self._seen) < 1.5)
+        moved = np.einsum("nab,nb->na", self._seen, samples.actions)
+        self._directions, self._lengths = unit_actions(np.where(self._on_line[:, None], moved, samples.actions))
         self._held_out = np.stack([one.held_out for one in candidates])
         self._residuals = self._lengths - (self._held_out * self._directions).sum(axis=2)
         self._places = slice(None, None, -(-len(samples) // COMPARED_STATES))
         self._leverage = np.max([leverage(one) for one in dict.fromkeys(self._views)], axis=0)
         self._noise, self._variation = self._variances(noise)
-        self._held, self._seen = held_throughout(samples.actions, samples.groups, beyond_misfit(noise, samples))
 
     def judged(self) -> dict[str, Judged]:
         """Figures of each candidate, by name, as shares of the mean squared action."""
@@ -198,7 +200,8 @@ class Comparison:
     @property
     def _squares(self) -> Array:
         """Squared lengths of the actions (N,), of those at rest about that of rounding."""
-        return np.maximum(self._lengths**2, TINY * self._samples.energy)
+        found, usual = np.maximum(self._lengths**2, TINY * self._samples.energy), self._samples.energy
+        return np.where(self._on_line, np.maximum(found, usual), found)
 
     def _variances(self, noise: Array) -> tuple[Array, float]:
         """σ² of each sample and κ², by iteratively reweighted least squares on the squared residuals.
@@ -223,7 +226,9 @@ class Comparison:
     @cached_property
     def _variance(self) -> Array:
         """Jackknife variance of what motion does not show, shape (K,)."""
-        return np.array([_jackknife(refits - own) for own, refits in zip(*self._predictions, strict=True)])
+        found = [_jackknife(refits - own) for own, refits in zip(*self._predictions, strict=True)]
+        known = zip(self._candidates, found, strict=True)
+        return np.array([own if one.spread is None else one.spread for one, own in known])
 
     @cached_property
     def _bias(self) -> Array:

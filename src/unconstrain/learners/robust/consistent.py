@@ -15,6 +15,7 @@ from ...risks import NOISE, Moments, Quadratic, eigensystem, inconsistency, soft
 from ...training import Samples
 from ..hybrid import SOFTNESSES
 from ..thresholds import judged, within_errors
+from .agreement import where_agreed
 from .candidate import Candidate, scaled
 from .constants import (
     BALANCE_STEPS,
@@ -86,7 +87,7 @@ def by_segments(samples: Samples, projections: Array) -> Candidate:
     Predictions are cross-validated by fold, except for the projections: each is from all samples of its segment.
     """
     errors = [part.constrained(projections[samples.folds == fold]) for fold, part in enumerate(samples.by_fold())]
-    return least_error("segments", samples, errors)
+    return where_agreed(least_error("segments", samples, errors), samples, projections)
 
 
 def least_error(name: str, samples: Samples, errors: Sequence[Quadratic], odds: float = 1.0) -> Candidate:

@@ -106,6 +106,14 @@ CANDIDATE_SOFTNESSES = (1.0, 0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4, 1e-6, 1e-13)
 With five of them (0.3, 0.1, 0.01, 1e-4, 1e-11) the error was the same within a percent on 190 data sets of 20 kinds.
 """
 
+NOT_HELD_OUT = 0.2
+AGREED = 0.02
+MOST_FITTED = 2 / 3
+"""Demonstrations agree where held-out motion says nothing, more than the first share of the motion being missed there;
+where one policy misses less than the second share, as expected of what is new; and where it fits less than the third of
+what they tell.
+"""
+
 REFUTED = 1.0
 """Candidates that know the Jacobian are refuted by a held-out loss that is so many standard errors larger.
 
@@ -182,6 +190,9 @@ SHARE_OF_JACKKNIFE = 0.5
 The same mean over 18 kinds (88 data sets): 1.15 with all of it, 1.14 with 0.7, 1.12 with a half, 1.13 with none. Over
 32 kinds (330 data sets) 1.167 with a half and 1.162 with 0.75, but 2.0 and 2.2 without noise on the arm.
 """
+
+LEAST_EXPLAINED = 0.2
+"""Of a policy that explains less of held-out motion nothing counts as determined."""
 
 JACKKNIFE_IN_INTERVALS = 0.7
 """Of the jackknife's variance that counts in intervals.

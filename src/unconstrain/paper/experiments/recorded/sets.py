@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from inspect import getdoc
+from typing import Any
 from zlib import crc32
 
 import numpy as np
@@ -106,7 +107,7 @@ class _Kind:
     """How a simulated kind is drawn, from ``variants`` in turn."""
 
     draw: Callable[..., simulated.Simulated]
-    variants: Mapping[str, tuple[float, ...]] = field(default_factory=lambda: {"": ()})
+    variants: Mapping[str, tuple[Any, ...]] = field(default_factory=lambda: {"": ()})
     policy: Callable[[], uc.Policy] = uc.LocallyLinearPolicy
     grouped: bool = True
 
@@ -129,6 +130,7 @@ SIMULATED = {
     "correlated noise": _Kind(simulated.correlated_noise),
     "Student noise": _Kind(simulated.student_noise),
     "partly at rest": _Kind(simulated.partly_at_rest, {f"{share:.0%}": (share,) for share in (0.02, 0.1, 0.3)}),
+    "along rulers": _Kind(simulated.along_rulers, {"cubic": ("cubic",), "round": ("round",)}),
     "one-sided contact": _Kind(simulated.one_sided),
     "one plane for all": _Kind(simulated.one_plane, policy=_affine_policy),
     "near-parallel planes": _Kind(simulated.parallel_planes),

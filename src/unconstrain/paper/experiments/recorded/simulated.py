@@ -57,6 +57,30 @@ def come_to_rest(states: Array) -> Array:
     return np.column_stack([LimitCycle()(states[:, :2]), -2.0 * states[:, 2:]])
 
 
+@dataclass(frozen=True, eq=False)
+class Oval:
+    """Round an oval at some rad/s, and onto it: velocities (N, 2) at positions (N, 2).
+
+    Parameters
+    ----------
+    radii : ndarray, shape (2,)
+    turn : float
+    form : {"cubic", "round"}
+        How it is driven onto the oval: as a polynomial, or ever faster towards the centre.
+    """
+
+    radii: Array
+    turn: float
+    form: str
+
+    def __call__(self, states: Array) -> Array:
+        """Velocities at some positions."""
+        x, y = (states / self.radii).T
+        size = np.hypot(x, y)
+        inward = 1.0 - size**2 if self.form == "cubic" else 1.2 * (1.0 / (size + 1e-9) - 1.0)
+        return self.radii * np.column_stack([inward * x - self.turn * y, inward * y + self.turn * x])
+
+
 FOCUS = LimitCycle(rho=-0.5)
 """The stable focus of CaPL, github.com/joaomoura24/CaPL (gen_data_2d_notask)."""
 
@@ -202,6 +226,21 @@ def student_noise(rng: np.random.Generator) -> Simulated:
     return Simulated([_moved(demo, size * rng.standard_t(3, demo.actions.shape)) for demo in demos])
 
 
+def along_rulers(rng: np.random.Generator, form: str) -> Simulated:
+    """Ten strokes along rulers across an oval that is driven round: each soon rests where its ruler takes all motion.
+
+    At 50 Hz for 4 s, as velocities of positions recorded to 0.3 mm. Tested on ten further strokes where they move.
+    """
+    oval = Oval(
+        rng.uniform(0.2, 0.4) * np.array([1.0, rng.uniform(0.5, 1.0)]), rng.choice([-1, 1]) * rng.uniform(1, 2), form
+    )
+    learnt, test = (_strokes(oval, 10, rng) for _ in range(2))
+    speeds = [np.linalg.norm(demo.actions, axis=1) for demo in test]
+    least = 0.1 * np.sqrt(np.mean(np.concatenate(speeds) ** 2))
+    moving = [demo[speed > least] for demo, speed in zip(test, speeds, strict=True) if (speed > least).any()]
+    return Simulated([_differentiated(demo, 3e-4, rng) for demo in learnt], moving)
+
+
 def partly_at_rest(rng: np.random.Generator, share: float) -> Simulated:
     """Noise of so much, and demonstrators who hesitate: a third of the samples are at rest."""
     demos = []
@@ -341,6 +380,14 @@ def _differentiated(demo: uc.Demonstration, error: float, rng: np.random.Generat
     """As it is recorded by its positions alone, each with an error of such a standard deviation."""
     recorded = demo.states + error * rng.standard_normal(demo.states.shape)
     return replace(demo, states=recorded, actions=uc.preparation.differentiate(np.asarray(demo.times), recorded))
+
+
+def _strokes(oval: Oval, count: int, rng: np.random.Generator) -> list[uc.Demonstration]:
+    """Four seconds at 50 Hz along lines in any direction, from starts in and about an oval."""
+    angles = rng.uniform(0, np.pi, count)
+    rulers = [uc.constraints.Plane(np.array([np.sin(angle), np.cos(angle)])) for angle in angles]
+    starts = rng.uniform(-1.3, 1.3, (count, 2)) * oval.radii
+    return [demo[::4] for demo in _rolled(oval, starts, 800, 0.005, rulers)]
 
 
 def _spoiled(
