@@ -12,6 +12,7 @@ from selenium.webdriver import ActionChains, Keys
 import unconstrain as uc
 from seen import on_a_phone, unnamed_canvases, width_of
 from test_cli import call, refused, run
+from test_one_model import FEATURES, of_one_model
 from unconstrain.pages.look import look_page, marks_of
 
 NAMES = ("x", "y", "z")
@@ -158,7 +159,18 @@ def test_the_roll_out_in_the_page_is_that_of_python(folder, page):
 def test_what_no_recording_tells_is_what_python_says(browser, tmp_path, policy):
     demos = [uc.Demonstration(one[:, 1:], np.gradient(one[:, 1:], one[:, 0], axis=0), one[:, 0]) for one in bent()]
     policy.learner = uc.NoiseCorrected()
-    policy.fit_demonstrations(demos)
+    assert_untold(policy.fit_demonstrations(demos), demos, browser, tmp_path)
+
+
+@pytest.mark.parametrize("kind", FEATURES)
+def test_what_no_recording_tells_of_one_model_is_what_python_says(browser, tmp_path, kind):
+    demos = [uc.Demonstration(one[:, 1:], np.gradient(one[:, 1:], one[:, 0], axis=0), one[:, 0]) for one in bent()]
+    with of_one_model(FEATURES[kind]):
+        policy = uc.LocallyLinearPolicy(learner=uc.NoiseCorrected()).fit_demonstrations(demos)
+    assert_untold(policy, demos, browser, tmp_path)
+
+
+def assert_untold(policy, demos, browser, tmp_path):
     path, states = tmp_path / "look.html", demos[0].states[::20] * 1.3
     path.write_text(look_page(demos, NAMES, "told", policy=policy), "utf-8")
     way = np.array([0.6, 0.0, 0.8])

@@ -162,4 +162,5 @@ def test_one_model_for_all_states_is_that_of_affine_features_and_knows_where_dat
     assert_allclose(one(far), uc.ParametricPolicy(uc.Affine(), "hybrid").fit(states, actions)(far), rtol=1e-6)
     assert_allclose(one.support(far), uc.LocallyLinearPolicy(None, learner="hybrid").fit(states, actions).support(far))
     assert_allclose([one.step(state) for state in states], one(states), atol=1e-12)
-    assert one.closed_form().sizes == (2, 2, len(one.fields_.centres))
+    assert one.closed_form().sizes == (2, 2, 1)
+    assert one.closed_form().exponents.shape == (len(one.fields_.centres), 3)

@@ -101,13 +101,15 @@ def c_source(
 
 def _parts(form: ClosedForm) -> tuple[str, ...]:
     """Names of the templates that the source consists of."""
-    relative = ("straight",) if form.embedding.frame is None else ("rotation", "coordinates")
-    if form.exponents is not None:
+    turns = any(isinstance(factor, spaces.Sphere) for factor in form.embedding.space.factors)
+    relative = ("straight",) if form.embedding.frame is None else (*["rotation"][:turns], "coordinates")
+    kernels = () if form.exponents is None else ("kernels",)
+    if form.blending is not None:
         body: tuple[str, ...] = ("shares", "maps" if form.is_affine else "constants")
     else:
         body = ("affine",) if form.monomials is None else ("polynomial",)
     guided = () if form.correction is None else ("potential", form.correction.kind, "guided")
-    return "head", *relative, *body, *guided, "within" if form.precisions is None else "support", "self_test"
+    return "head", *relative, *kernels, *body, *guided, "within" if form.precisions is None else "support", "self_test"
 
 
 def _correction(form: ClosedForm, name: str, said: Callable[[Any], str]) -> dict[str, str]:
@@ -137,6 +139,7 @@ def _sizes(form: ClosedForm, described: Description) -> dict[str, str]:
         "d": str(d),
         "m": str(m),
         "models": str(models),
+        "kernels": "" if form.exponents is None else str(len(form.exponents)),
         "terms": str(form.maps.shape[2]),
         "degree": str(form.degree),
     }

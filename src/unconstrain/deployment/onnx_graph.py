@@ -28,8 +28,8 @@ def onnx_model(form: ClosedForm, described: Description, *, single: bool) -> byt
     to = "actions" if form.correction is None else "wanted"
     graph = _Graph(np.float32 if single else np.float64)
     relative = graph.add("Sub", _coordinates(graph, form), graph.constant("origin", form.origin))
-    if form.exponents is not None:
-        exponents = graph.affine(relative, form.exponents[:, :n].T, form.exponents[:, n], "exponents")
+    if form.blending is not None:
+        exponents = graph.affine(relative, form.blending[:, :n].T, form.blending[:, n], "exponents")
         _blended(graph, form, relative, graph.add("Softmax", exponents, axis=-1), to)
     elif form.monomials is not None:
         _polynomial(graph, form, relative, form.monomials, to)

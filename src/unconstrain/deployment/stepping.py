@@ -42,8 +42,8 @@ def stepper(model: Model, weights: Array, n: int, scale: Scale | None = None) ->
         units = scale or Scale(np.ones(n), np.ones(weights.shape[1]))
         return _without_formula(model, units.actions[:, None] * weights[0], units.states)
     form = replace(form, embedding=model.embedding) if scale is None else scale.form(form)
-    if form.exponents is not None:
-        return _blended(form, form.exponents)
+    if form.blending is not None:
+        return _blended(form, form.blending)
     return _affine(form) if form.monomials is None else _polynomial(form, form.monomials)
 
 

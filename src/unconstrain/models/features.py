@@ -181,7 +181,7 @@ class Kernels(Shown):
         return gaussian(namespace(distances).min(distances, axis=1), self.variance)
 
     def blend_of(self, origin: Array, maps: Array) -> ClosedForm:
-        """Closed form of maps, one for each kernel, that are blended by these."""
+        """Closed form of maps, one for each kernel, that are blended by these; or of one map in their midst."""
         reach = np.abs(self.centres - origin).max(axis=0) + np.sqrt(self.variance)
         slopes = exponents(self.centres, self.variance, origin)
         return ClosedForm(origin, maps, slopes, reach, precisions=np.full(len(origin), 1.0 / self.variance))

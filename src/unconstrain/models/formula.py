@@ -49,7 +49,7 @@ class Correction:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ClosedForm(Shown):
-    """Affine maps blended by normalised Gaussian kernels.
+    """Affine maps blended by normalised Gaussian kernels, or one map, affine or a polynomial.
 
     With ``z = x − origin`` in the coordinates of the state space, which are the states where those are Euclidean,
 
@@ -57,8 +57,8 @@ class ClosedForm(Shown):
 
     where ``e_m = slope_mᵀ z + offset_m`` is the logarithm of a Gaussian
     kernel without ``−‖z‖² / 2σ²``, which is common to all and cancels.
-    An affine policy has M = 1, a parametric policy on normalised RBFs A = 0.
-    A polynomial policy has M = 1 and products of entries of ``(z, 1)`` in place of these.
+    A parametric policy on normalised RBFs has A = 0. Of one map, M = 1, no kernel has a share: if there are any,
+    they only measure support. That of a polynomial policy takes products of entries of ``(z, 1)`` in place of these.
     All of :mod:`~unconstrain.deployment` is generated from it.
 
     Parameters
@@ -66,12 +66,12 @@ class ClosedForm(Shown):
     origin : ndarray, shape (m,)
     maps : ndarray, shape (M, d, m + 1), (M, d, 1) or (1, d, p)
         ``(A_m, b_m)``, or ``b_m`` alone, or factors of the monomials.
-    exponents : ndarray, shape (M, m + 1), optional
+    exponents : ndarray, shape (M, m + 1), or (K, m + 1) with M = 1, optional
         ``(slope_m, offset_m)``; see :func:`exponents`. Without it M is 1.
     reach : ndarray, shape (m,)
         Extent of the data from the origin along each axis; the range of self-tests.
     monomials : ndarray of int, shape (p, degree), optional
-        Monomial j is the product of the entries ``monomials[j]`` of ``(z, 1)``. Without exponents only.
+        Monomial j is the product of the entries ``monomials[j]`` of ``(z, 1)``. With one map only.
     embedding : Embedding
         States (n,) to coordinates (m,).
     precisions : ndarray, shape (m,), optional
@@ -115,6 +115,11 @@ class ClosedForm(Shown):
     def is_affine(self) -> bool:
         """Whether the models are affine maps rather than constants."""
         return self.maps.shape[2] > 1
+
+    @property
+    def blending(self) -> Array | None:
+        """The exponents where they blend the maps, (M, m + 1); None of one map."""
+        return self.exponents if len(self.maps) > 1 or not self.is_affine else None
 
     @property
     def degree(self) -> int:

@@ -181,7 +181,7 @@ class Model(Shown):
         SettingError
             If neither fields nor features offer it.
         """
-        measure = getattr(self.fields, "support", None) or getattr(self.features, "support", None)
+        measure = getattr(self.features, "support", None) or getattr(self.fields, "support", None)
         if measure is None:
             raise SettingError(f"support: {type(self.features).__name__} has no support(states).")
         return np.asarray(measure(self.embedding(states)))

@@ -1,7 +1,7 @@
 """Receptive fields: membership of states in local models (section III-D), or in a single one."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -76,7 +76,7 @@ class Everywhere:
     Parameters
     ----------
     around : ReceptiveFields, optional
-        Fields over the data, which measure support.
+        Fields over the data, which measure support where features do not.
     """
 
     around: ReceptiveFields | None = None
@@ -84,7 +84,7 @@ class Everywhere:
 
     @property
     def support(self) -> Callable[[Array], Array] | None:
-        """Support of states by the data; None where features have to tell it."""
+        """Support of states by the data; None where only features can tell it."""
         return None if self.around is None else self.around.support
 
     def weights(self, states: Array) -> Array:
@@ -101,11 +101,12 @@ class Everywhere:
         """Features of a single model stay as they are."""
 
     def formula(self, features: FeatureMap, weights: Array) -> ClosedForm | None:
-        """Closed form of the features with weights (1, d, p), where they offer one; of affine ones in each field."""
-        if self.around is not None:
-            return self.around.formula(features, np.repeat(weights, len(self.around.centres), axis=0))
-        closed = getattr(features, "closed_form", None)
-        return None if closed is None else closed(weights[0])
+        """Closed form of the features with weights (1, d, p), where they offer one; with the fields for support."""
+        closed_form = getattr(features, "closed_form", None)
+        form: ClosedForm | None = None if closed_form is None else closed_form(weights[0])
+        if form is None or form.exponents is not None or self.around is None:
+            return form
+        return replace(self.around.blend_of(form.origin, form.maps), monomials=form.monomials)
 
 
 def cover(states: Array, variance: float, at_least: float = 0.7) -> ReceptiveFields:

@@ -1,5 +1,6 @@
 /**
- * A policy from its formula: affine maps blended by normalised Gaussian kernels, or a polynomial.
+ * A policy from its formula: affine maps blended by normalised Gaussian kernels, or one map, affine or a
+ * polynomial, whose kernels, if any, only measure support.
  *
  * With z = x - origin, in coordinates x of the state,
  *
@@ -60,7 +61,7 @@ function policyOf({ origin, maps, exponents, monomials, precision, reach, frame,
   /** Share and values of each map. */
   function parts(state) {
     const z = relative(state), regressor = regressors(z);
-    const logs = exponents ? exponents.map((slopes) => dot(slopes, z)) : [0];
+    const logs = maps.length > 1 ? exponents.map((slopes) => dot(slopes, z)) : [0];
     const largest = Math.max(...logs), sizes = logs.map((log) => Math.exp(log - largest));
     const total = sizes.reduce((sum, size) => sum + size, 0);
     return maps.map((map, m) => [sizes[m] / total, sizes[m] === 0 ? [] : map.map((row) => dot(row, regressor))]);
