@@ -26,6 +26,7 @@ import unconstrain as uc
 from recorded import needs_rim
 from seen import below
 from unconstrain import cli, storage
+from unconstrain.base.display import percent
 from unconstrain.base.errors import MissingExtraError
 from unconstrain.cli import fitting, rolling
 from unconstrain.paper import experiments
@@ -593,9 +594,23 @@ def test_score_prints_a_line_for_each_demonstration_and_all(policy, files):
     assert said.startswith("! The policy explains 100% of the motion, but it learnt from 2 of 2\n")
     lines = below(said).splitlines()
     assert lines[0].split("  ")[0] == "demonstration"
-    assert [line.split()[0] for line in lines[1:]] == ["swing_0", "swing_1", "all"]
-    assert [line.split()[1] for line in lines[1:]] == ["40", "40", "80"]
-    assert max(float(line.split()[2]) for line in lines[1:]) < 1e-12
+    assert [line.split()[:3] for line in lines[1:4]] == [
+        ["swing_0", "40", "100%"], ["swing_1", "40", "100%"], ["all", "80", "100%"]
+    ]  # fmt: skip
+    assert max(float(line.split()[3]) for line in lines[1:4]) < 1e-12
+    assert [line.split(":")[0] for line in lines[4:]] == ["explains", "normalised inconsistency"]  # what each is
+
+
+def test_the_table_of_score_says_the_share_of_its_verdict_where_slow_samples_count_less(tmp_path):
+    rows = record((0.3, 0.5), free=True)
+    write(tmp_path / "free.csv", "t,x,y,vx,vy", rows)
+    run("fit", tmp_path / "free.csv", "--model", "linear", "--learner", "direct", "-o", tmp_path / "p.npz")
+    rows[-10:, 3:] = 1e-6 * np.random.default_rng(0).normal(size=(10, 2))  # noise, as it rests
+    write(tmp_path / "rests.csv", "t,x,y,vx,vy", rows)
+    found = json.loads(run("score", tmp_path / "p.npz", tmp_path / "rests.csv", "--json"))
+    [row] = found["rows"]
+    assert f"explains {percent(row['explains'])} of" in found["verdict"]["said"]
+    assert row["explains"] > 1 - row["ninc"] + 0.05
 
 
 def test_score_is_the_inconsistency_by_hand(files, tmp_path):
@@ -609,7 +624,9 @@ def test_score_is_the_inconsistency_by_hand(files, tmp_path):
         length = np.linalg.norm(action)
         missed += (length - action @ (found_A @ state + found_b) / length) ** 2
     variance = len(rows) * rows[:, 3:].var(axis=0).sum()
-    assert found["rows"] == [{"demonstration": "swing_0", "samples": 40, "ninc": pytest.approx(missed / variance)}]
+    assert found["rows"][0] | {"explains": 1} == {
+        "demonstration": "swing_0", "samples": 40, "explains": 1, "ninc": pytest.approx(missed / variance)
+    }  # fmt: skip
     assert found["all"]["ninc"] == pytest.approx(missed / variance)
     assert found["policy"] == str(tmp_path / "p.npz")
 

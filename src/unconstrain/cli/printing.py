@@ -34,9 +34,13 @@ OTHER_UNITS = {"unit-differs", "clock-differs"}
 """Codes of recordings in another unit than others."""
 
 MEANINGS = {
-    "nUPE": "squared error of the whole policy, over the variance of the actions",
-    "nCPE": "squared error along what the constraint leaves free, over the variance of the actions",
-    "nPOE": "recorded motion that the constraint would forbid, over the variance of the actions",
+    "explains": "share of the motion that the policy explains; go by this, as the verdict does: slow samples, whose "
+    "direction is mostly noise, count less",
+    "normalised inconsistency": "the paper's squared error along the motion, over the variance of the actions; slow "
+    "samples count as much as fast ones, so it may look worse; 0 is perfect",
+    "nUPE": "squared error of the whole policy, over the variance of the actions; 0 is perfect",
+    "nCPE": "squared error along what the constraint leaves free, over the variance of the actions; 0 is perfect",
+    "nPOE": "recorded motion that the constraint would forbid, over the variance of the actions; 0 is perfect",
 }
 """What the heads of tables stand for."""
 
@@ -248,7 +252,7 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
     elif learner != "direct":
         _say_determined(solution, learner)
     click.echo(
-        "share of the observed motion left unexplained, where slow samples count less: "
+        "share of the motion left unexplained, where slow samples count less, as in the verdict: "
         + (f"{1.0 - judged.training:.4g} on the training data, " if known else "")
         + (
             f"{1.0 - judged.held_out:.4g} where held out."
@@ -352,7 +356,7 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[str]], piped: int =
     Console(width=width, markup=False, emoji=False, highlight=False, color_system=None).print(table)
     for name, meaning in MEANINGS.items():
         if any(name in title for title in head):
-            click.echo(f"{name}: {meaning}; 0 is perfect.")
+            click.echo(f"{name}: {meaning}.")
 
 
 def show_warning(message: Warning | str, *_: Any) -> None:
