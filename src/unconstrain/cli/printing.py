@@ -33,6 +33,9 @@ CODES = "unconstrain.codes"
 OTHER_UNITS = {"unit-differs", "clock-differs"}
 """Codes of recordings in another unit than others."""
 
+SPOILING = {*OTHER_UNITS, "missing", "refused"}
+"""Codes of recordings that spoil what is learnt with others, or end it."""
+
 MEANINGS = {
     "explains": "share of the motion that the policy explains; go by this, as the verdict does: slow samples, whose "
     "direction is mostly noise, count less",
@@ -111,7 +114,7 @@ def say_surveys(surveys: Sequence[Any], needed: str, then: str) -> None:
     rows = [
         [
             found.name,
-            str(found.samples),
+            str(found.samples) if found.left is None else f"{found.left} of {found.samples}",
             number(found.duration_s, "{:.2f} s"),
             number(found.rate_hz, "{:.1f} Hz"),
             number(found.jitter, "{:.1%}"),
@@ -123,7 +126,8 @@ def say_surveys(surveys: Sequence[Any], needed: str, then: str) -> None:
         ]
         for found in surveys
     ]
-    print_table(["demonstration", "samples", "length", "rate", "jitter", "gaps", "missing", "zero actions"], rows)
+    samples = "samples" if surveys[0].left is None else "left by --still"
+    print_table(["demonstration", samples, "length", "rate", "jitter", "gaps", "missing", "zero actions"], rows)
     for columns in dict.fromkeys(found.columns for found in surveys):
         click.echo(f"columns: {', '.join(columns)}")
     for words in dict.fromkeys(found.words for found in surveys if found.words):
