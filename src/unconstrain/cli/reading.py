@@ -268,7 +268,7 @@ def of_files(recordings: Iterable[uc.Recording]) -> Iterator[None]:
             if named and files:
                 own = any(stem(file) == named[1] for file in files)
                 title = " or ".join(files) if own else f"{named[0]} of {' or '.join(files)}"
-                others = len(came) > len(files) and isinstance(error, InvalidDataError)
+                others = len(came) > len(files) and str(error)[named.end()] in ",:"  # all may lack what it has not
                 left_out = ",".join([*click.get_current_context().params["leave_out"], named[1]])
                 cure = f" Or leave it out: --leave-out {shlex.quote(left_out)}" if others else ""
                 error.args = (f"{title}{str(error)[named.end() :]}{cure}", *error.args[1:])
