@@ -32,6 +32,8 @@ def test_a_first_column_that_rises_as_a_clock_is_told_and_the_command_that_follo
     assert "clock-untold" not in text(call("inspect", bare, "--time", "column1"))
     write(bare / "w0.csv", "x,y,z", stroke(0)[:, [1, 2, 0]])  # neither is what rises elsewhere
     assert "clock-untold" not in text(call("inspect", bare / "w0.csv"))
+    grid = np.column_stack([np.linspace(0, 1, 40), *np.random.default_rng(0).normal(size=(3, 40))])
+    assert "clock-untold" not in text(call("inspect", write(bare / "w0.csv", "x,y,vx,vy", grid)))  # one that is named
 
 
 def test_that_nothing_tells_the_time_is_said_before_fit_refuses(tmp_path):

@@ -94,8 +94,18 @@ def clock_untold(subject: Subject) -> Remark | None:
     """A first column that rises as a clock does, where none is known."""
     recording = subject.recording
     name, steps = recording.columns[0], np.diff(recording.values[:, 0])
-    known = recording.times is not None or (subject.recipe.rate and name not in (subject.recipe.states or (name,)))
-    if known or len(recording.columns) < 2 or len(steps) < LEAST_ROWS or not (steps > 0).all():
+    used, titled = (
+        name in (subject.recipe.states or (name,)),
+        "no-header" not in [one.code for one in recording.remarks],
+    )
+    meant = (titled and subject.recipe.actions) if used else subject.recipe.rate
+    if (
+        meant
+        or recording.times is not None
+        or len(recording.columns) < 2
+        or len(steps) < LEAST_ROWS
+        or not (steps > 0).all()
+    ):
         return None
     if np.quantile(np.abs(steps / np.median(steps) - 1.0), 0.9) > STEADY:
         return None
