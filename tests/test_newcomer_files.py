@@ -60,6 +60,18 @@ def test_rows_without_numbers_are_no_gap_of_the_clock(tmp_path):
     assert "clock-gap" in [one["code"] for one in found["warnings"]]
 
 
+def test_a_row_without_its_time_is_named_as_any_other(tmp_path):
+    rows = stroke(0)
+    rows[12, 0] = np.nan
+    file, other = write(tmp_path / "w.csv", "t,x,y", rows), write(tmp_path / "v.csv", "t,x,y", stroke(1))
+    said = text(call("inspect", file, *READ))
+    assert "missing: 'w', row 12 (line 14): 1 row without numbers in time" in said
+    assert "does not increase" not in said
+    said = refused("fit", file, other, *READ, "-o", tmp_path / "p.npz")
+    assert said.startswith(f"{file}, row 12 (line 14), column 'time': found nan")
+    assert said.endswith("Or leave it out: --leave-out w")
+
+
 def test_one_row_without_numbers_makes_no_clock_irregular(tmp_path):
     rows = stroke(0)
     rows[12, 1] = np.nan

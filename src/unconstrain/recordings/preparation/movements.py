@@ -278,6 +278,7 @@ def _prepare(recording: Recording, recipe: Recipe) -> tuple[Demonstration, list[
     states = _finite(recording, recipe.states or (), recipe)
     actions = None if recipe.actions is None else _finite(recording, recipe.actions, recipe)
     times = stamps(recording, recipe)
+    _check_finite(recording, np.empty((0, 0)) if times is None else times[:, None], ("time",))
     notes: list[Remark] = []
     noise = None
     if times is None:
@@ -315,7 +316,10 @@ def _about_centre(states: Array) -> list[Remark]:
 
 
 def _finite(recording: Recording, names: Sequence[str], recipe: Recipe) -> Array:
-    values = select(recording, names, recipe)
+    return _check_finite(recording, select(recording, names, recipe), names)
+
+
+def _check_finite(recording: Recording, values: Array, names: Sequence[str]) -> Array:
     bad = np.argwhere(~np.isfinite(values))
     if len(bad):
         row, column = bad[0].tolist()

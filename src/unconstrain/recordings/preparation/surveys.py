@@ -147,8 +147,10 @@ def _prepared(subject: Subject) -> tuple[int | None, tuple[Remark, ...]]:
     recording, recipe = subject.recording, subject.recipe
     used, trimmed = (*(recipe.states or ()), *(recipe.actions or ())), (recipe.trim, recipe.still) != (None, None)
     missing = ~np.isfinite(recording.select(used))
+    if subject.times is not None:
+        missing = np.column_stack([missing, ~np.isfinite(subject.times)])
     if rows := np.flatnonzero(missing.any(axis=1)).tolist():
-        lacking = listed([name for name, cells in zip(used, missing.T, strict=True) if cells.any()], 8)
+        lacking = listed([name for name, cells in zip((*used, "time"), missing.T, strict=False) if cells.any()], 8)
         said = (
             f"{counted(len(rows), 'row')} without numbers in {lacking}, empty or NaN, cannot be learnt from: remove or "
         )

@@ -65,12 +65,8 @@ class Parser:
     def parse(self, lines: Lines) -> Cells:
         """Some lines as numbers.
 
-        Raises
-        ------
-        ReadError
-            If a line has too many or too few cells, or a word where numbers are; it names the line and the column.
-        UnicodeDecodeError, csv.Error
-            If they are no text or their quotes do not match.
+        Raises a ReadError that names line and column where cells are too many, too few or words instead of numbers, and
+        a UnicodeDecodeError or csv.Error where it is no text or quotes do not match.
         """
         return self._parse_numbers(*lines) or self._parse_any(lines)
 
