@@ -272,10 +272,39 @@ def columns_differ(rng):
     return Fault(*recorded(tables, 0.01), "columns-differ", which, None)
 
 
+def clock_untold(rng):
+    recordings, recipe = recorded(*movements(rng))
+    unit, rate = float(rng.choice([1.0, 1e3, 1e9])), 10.0 ** rng.uniform(0, 3)
+    for number, one in enumerate(recordings):
+        count = np.arange(len(one)) + 0.01 * rng.uniform(-1, 1, len(one))
+        values = np.column_stack([unit / rate * count, one.values])
+        recordings[number] = replace(one, columns=("column1", *one.columns), values=values, times=None)
+    return Fault(recordings, recipe, "clock-untold", int(rng.integers(len(recordings))), None)
+
+
+def missing(rng):
+    recordings, recipe = recorded(*movements(rng))
+    which = int(rng.integers(len(recordings)))
+    steps, n = recordings[which].values.shape
+    at = int(rng.integers(steps - 1))
+    values = recordings[which].values.copy()
+    values[at : at + int(rng.choice([1, 5, 20])), rng.integers(n)] = np.nan
+    recordings[which] = replace(recordings[which], values=values)
+    return Fault(recordings, recipe, "missing", which, at)
+
+
+def refused(rng):
+    recordings, recipe = recorded(*movements(rng))
+    which = int(rng.integers(len(recordings)))
+    one, rows = recordings[which], int(rng.integers(1, 5))
+    recordings[which] = replace(one, values=one.values[:rows], times=one.times[:rows])
+    return Fault(recordings, recipe, "refused", which, None)
+
+
 FAULTS = (
     nothing, nothing_with_actions, angle_wrap, quaternion_flip, rotation_vector_flip, seam, glitch, clock_unit,
     clock_gap, targets, mixed_units, unit_differs, pause, backwards, at_rest, all_zero, few_demonstrations, row_order,
-    other_topic, clock_differs, columns_differ,
+    other_topic, clock_differs, columns_differ, clock_untold, missing, refused,
 )  # fmt: skip
 
 

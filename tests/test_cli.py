@@ -26,6 +26,7 @@ import unconstrain as uc
 from recorded import needs_rim
 from seen import below
 from unconstrain import cli, storage
+from unconstrain.base.display import percent
 from unconstrain.base.errors import MissingExtraError
 from unconstrain.cli import fitting, rolling
 from unconstrain.paper import experiments
@@ -288,7 +289,9 @@ def test_inspect_shows_columns_that_fit_cannot_guess(tmp_path):
     told = " ".join(said.split())
     assert "fit needs to know more: 'odd': cannot tell states and actions from its columns left, right, up." in told
     assert "Say which with --state and --action, or take" in told
-    assert re.search(r"\n    unconstrain fit \S+odd\.csv --state left,right,up --differentiate -o policy\.npz\n", said)
+    assert re.search(
+        r"\n    unconstrain fit \S+odd\.csv --state left,right,up --rate HZ --differentiate -o policy\.npz\n", said
+    )
 
 
 def test_inspect_counts_many_gaps(tmp_path):
@@ -317,7 +320,7 @@ def test_fit_says_what_it_did(files, tmp_path):
         "8 demonstrations, 320 samples.",
         "The inconsistency determined 100% of 6 weight directions.",
     ]
-    missed = re.fullmatch(r"share of the observed .*: (\S+) on the training data, (\S+) where held out\.", lines[3])
+    missed = re.fullmatch(r"share of the motion left .*: (\S+) on the training data, (\S+) where held out\.", lines[3])
     assert float(missed[1]) < 1e-12
     assert float(missed[2]) < 1e-12
     assert lines[4] == f"policy: {tmp_path / 'p.npz'}"
@@ -467,7 +470,7 @@ def test_one_file_can_hold_many_demonstrations(tmp_path, column, option):
     )
     assert_learnt_the_policy(tmp_path / "p.npz")
     lines = below(run("score", tmp_path / "p.npz", tmp_path / "all.csv")).splitlines()
-    assert [line.split("  ")[0] for line in lines[1:]] == [*(f"no {k}" for k in range(8)), "all"]
+    assert [line.split("  ")[0] for line in lines[1:10]] == [*(f"no {k}" for k in range(8)), "all"]
 
 
 def test_columns_can_be_named(tmp_path):
@@ -529,7 +532,9 @@ def test_what_was_repaired_is_said_in_a_note(tmp_path):
     ran = call("fit", pattern, "--model", "linear", "-o", tmp_path / "p.npz")
     assert ran.code == 0
     [note] = ran.err.splitlines()
-    said = "Note: clock-gap: 'circle_0', row 600: 1 gap in the time stamps, the longest 3.01 s after 5.99 s; "
+    said = (
+        "Note: clock-gap: 'circle_0', row 600 (line 602): 1 gap in the time stamps, the longest 3.01 s after 5.99 s; "
+    )
     assert note.startswith(said)
 
 
@@ -593,9 +598,23 @@ def test_score_prints_a_line_for_each_demonstration_and_all(policy, files):
     assert said.startswith("! The policy explains 100% of the motion, but it learnt from 2 of 2\n")
     lines = below(said).splitlines()
     assert lines[0].split("  ")[0] == "demonstration"
-    assert [line.split()[0] for line in lines[1:]] == ["swing_0", "swing_1", "all"]
-    assert [line.split()[1] for line in lines[1:]] == ["40", "40", "80"]
-    assert max(float(line.split()[2]) for line in lines[1:]) < 1e-12
+    assert [line.split()[:3] for line in lines[1:4]] == [
+        ["swing_0", "40", "100%"], ["swing_1", "40", "100%"], ["all", "80", "100%"]
+    ]  # fmt: skip
+    assert max(float(line.split()[3]) for line in lines[1:4]) < 1e-12
+    assert [line.split(":")[0] for line in lines[4:]] == ["explains", "normalised inconsistency"]  # what each is
+
+
+def test_the_table_of_score_says_the_share_of_its_verdict_where_slow_samples_count_less(tmp_path):
+    rows = record((0.3, 0.5), free=True)
+    write(tmp_path / "free.csv", "t,x,y,vx,vy", rows)
+    run("fit", tmp_path / "free.csv", "--model", "linear", "--learner", "direct", "-o", tmp_path / "p.npz")
+    rows[-10:, 3:] = 1e-6 * np.random.default_rng(0).normal(size=(10, 2))  # noise, as it rests
+    write(tmp_path / "rests.csv", "t,x,y,vx,vy", rows)
+    found = json.loads(run("score", tmp_path / "p.npz", tmp_path / "rests.csv", "--json"))
+    [row] = found["rows"]
+    assert f"explains {percent(row['explains'])} of" in found["verdict"]["said"]
+    assert row["explains"] > 1 - row["ninc"] + 0.05
 
 
 def test_score_is_the_inconsistency_by_hand(files, tmp_path):
@@ -609,7 +628,9 @@ def test_score_is_the_inconsistency_by_hand(files, tmp_path):
         length = np.linalg.norm(action)
         missed += (length - action @ (found_A @ state + found_b) / length) ** 2
     variance = len(rows) * rows[:, 3:].var(axis=0).sum()
-    assert found["rows"] == [{"demonstration": "swing_0", "samples": 40, "ninc": pytest.approx(missed / variance)}]
+    assert found["rows"][0] | {"explains": 1} == {
+        "demonstration": "swing_0", "samples": 40, "explains": 1, "ninc": pytest.approx(missed / variance)
+    }  # fmt: skip
     assert found["all"]["ninc"] == pytest.approx(missed / variance)
     assert found["policy"] == str(tmp_path / "p.npz")
 
@@ -847,15 +868,15 @@ def bad(folder, what):
         (
             lambda at: bad(at, "hole"),
             (
-                "{at}/hole.csv, row 7, column 'y': found nan (1 such cell in the selected columns), expected finite "
-                "numbers. Remove or repair these rows first."
+                "{at}/hole.csv, row 7 (line 9), column 'y': found nan (1 such cell in the selected columns), "
+                "expected finite numbers. Remove or repair these rows first."
             ),
         ),
         (
             lambda at: bad(at, "nan"),
             (
-                "{at}/nan.csv, row 7, column 'y': found nan (1 such cell in the selected columns), expected finite "
-                "numbers. Remove or repair these rows first."
+                "{at}/nan.csv, row 7 (line 9), column 'y': found nan (1 such cell in the selected columns), "
+                "expected finite numbers. Remove or repair these rows first."
             ),
         ),
         (
@@ -865,7 +886,7 @@ def bad(folder, what):
         (
             lambda at: bad(at, "backwards"),
             (
-                "{at}/backwards.csv, row 7: got time -1 s after 0.3 s, expected later ones. "
+                "{at}/backwards.csv, row 7 (line 9): got time -1 s after 0.3 s, expected later ones. "
                 "Sort the rows (--sort), or split the file where a new recording begins."
             ),
         ),

@@ -213,7 +213,7 @@ class TestCommand:
     @pytest.mark.parametrize(
         ("demos", "d", "words"),
         [
-            ([uc.Demonstration(np.ones((1, 2)), np.ones((1, 2)), name="one")], 2, "too little could be held out"),
+            ([uc.Demonstration(np.ones((1, 2)), np.ones((1, 2)), name="one")], 2, "got 1 sample in all, expected at"),
             (movements(), 1, "got one action column"),
             ([replace(one, actions=0 * one.actions) for one in movements()], 2, "all actions are zero"),
         ],

@@ -416,7 +416,7 @@ def test_what_is_wrong_with_one_of_several_files_names_it(folder, policy, tmp_pa
         bad = write(tmp_path / "w1.csv", HEAD, [*stroke(1)[:9], [0.45, np.nan, 1.0], *stroke(1)[10:]])
     states = ("--state", "X,Y") + (() if command == "convert" else ("--differentiate",))
     said = refused(command, *before, folder / "w0.csv", bad, *after, *states, *model, *output)
-    assert said.startswith(f"{bad}, row 9, column 'X" if command == "fit" else f"{bad} has no column ")
+    assert said.startswith(f"{bad}, row 9 (line 11), column 'X" if command == "fit" else f"{bad} has no column ")
 
 
 def test_a_stroke_of_a_table_is_named_with_its_table(tmp_path):
@@ -425,7 +425,7 @@ def test_a_stroke_of_a_table_is_named_with_its_table(tmp_path):
     rows[50][2] = np.nan
     bad = write(tmp_path / "b.csv", f"Strich,{HEAD}", rows)
     said = refused("fit", good, bad, "--group", "Strich", *MANY, "-o", tmp_path / "p.npz")
-    assert said.startswith(f"'Strich 1' of {bad}, row 10, column 'X")
+    assert said.startswith(f"'Strich 1' of {bad}, row 10 (line 52), column 'X")
 
 
 @pytest.mark.parametrize(

@@ -158,6 +158,16 @@ def test_a_score_says_that_what_was_learnt_is_too_slow(folder):
     assert found["verdict"]["mark"] != "good"
 
 
+@pytest.mark.parametrize(("head", "unit"), [("t,x,y,z", "(unit of the states)"), (HEAD, "mm")])
+def test_how_far_off_a_policy_runs_says_of_what_and_in_which_unit(tmp_path, head, unit):
+    file = write(tmp_path / "oval.csv", head, oval(3))
+    run("fit", file, "--state", "x,y,z", "--by", "savgol", "--model", "affine", "-o", tmp_path / "p.npz")
+    assert (
+        f" {unit} from the recorded path"
+        in json.loads(run("score", tmp_path / "p.npz", file, "--json"))["verdict"]["said"]
+    )
+
+
 @pytest.mark.parametrize(
     ("model", "advice"),
     [("local", "another --model: 'auto' tries"), ("affine", "a --model that bends: 'local', or"), ("auto", None)],
@@ -239,10 +249,8 @@ def test_what_is_poor_anyway_is_not_excepted_by_but():
 
 def test_of_one_that_was_run_no_share_is_said():
     found = added([0.79], 0.5)
-    assert (
-        found.said
-        == "Good. But run from the same starts: size 0.79 times, pace 0.50 times the demonstrated, typically 3 mm away."
-    )
+    said = "Good. But run from the same starts: size 0.79 times, pace 0.50 times the demonstrated, typically 3 mm from "
+    assert found.said == f"{said}the recorded path."
     assert found.doubt == "Its size and pace over time."
 
 

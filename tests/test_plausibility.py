@@ -570,8 +570,8 @@ def test_every_line_names_what_cures_it(fault):
 
 
 @pytest.mark.parametrize("rows", [0, 1, 2, 9, 12])
-def test_short_and_empty_recordings_are_looked_at_without_harm(rows):
-    assert codes([recording(TRACK[:rows], TIMES[:rows])], MOVED) == [[]]
+def test_short_and_empty_recordings_are_looked_at_without_harm_and_called_too_short_to_differentiate(rows):
+    assert codes([recording(TRACK[:rows], TIMES[:rows])], MOVED) == [["refused"]]
     assert survey(recording(np.full((rows, 2), np.nan), TIMES[:rows]), MOVED).samples == rows
 
 
@@ -605,7 +605,7 @@ def test_inspect_fit_and_diagnose_say_the_same(wrapped):
     [first] = [one for one in shown[0]["warnings"] if one["code"] == "angle-wrap"]
     assert set(first) == {"code", "message", "column", "row"}
     assert (first["column"], first["row"]) == ("yaw", 25)
-    line = f"angle-wrap: 'crank_0', row 25, column 'yaw': {first['message']}"
+    line = f"angle-wrap: 'crank_0', row 25 (line 27), column 'yaw': {first['message']}"
     assert line in run("inspect", *options).splitlines()
     assert f"Note: {line}" in call("fit", *options, "--model", "linear", "-o", wrapped / "p.npz").err.splitlines()
     assert f"Note: {line}" in call("diagnose", *options).err.splitlines()

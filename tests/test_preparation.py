@@ -384,7 +384,7 @@ def test_rows_are_put_in_the_order_of_time_where_asked() -> None:
 def test_stamps_that_are_missing_are_refused_with_their_row() -> None:
     times = STEADY.copy()
     times[7] = np.nan
-    with pytest.raises(InvalidDataError, match=r"times of 'wipe': found nan at row 7"):
+    with pytest.raises(InvalidDataError, match=r"'wipe', row 7, column 'time': found nan"):
         prepare(Recording(("x", "y"), circle(STEADY), times, "wipe"))
 
 

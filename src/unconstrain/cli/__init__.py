@@ -13,7 +13,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import has_no_column
+from ..base.display import has_no_column, listed
 from ..base.errors import NOTHING_LEFT, ReadError, UnconstrainError
 from ..base.files import write
 from ..paper import experiments
@@ -26,7 +26,7 @@ from .fitting import alpha_of, default_learner, guide_of, guided, learn, learner
 from .informing import LOST, MARK, RAN, TOLD, info, provenance
 from .looking import look, play
 from .printing import (
-    OTHER_UNITS,
+    SPOILING,
     Group,
     Judged,
     judge_fit,
@@ -45,6 +45,7 @@ from .reading import (
     next_command,
     numbers,
     of_files,
+    of_words,
     options_for_reading,
     reading_of,
     recipe_of,
@@ -107,8 +108,8 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     if not first:
         raise ReadError(NOTHING_LEFT)
     own = [found.name for found in surveys]
-    units = {found.name for found in surveys if OTHER_UNITS & {one.code for one in found.warnings}}
-    differ = [name for name in own if name in units and own.count(name) == 1] if len(units) < len({*own}) else []
+    spoil = {found.name for found in surveys if SPOILING & {one.code for one in found.warnings}}
+    differ = [name for name in own if name in spoil and own.count(name) == 1] if len(spoil) < len({*own}) else []
     names = uc.readers.unique_names(own)
     surveys = [replace(found, name=name) for found, name in zip(surveys, names, strict=True)]
     keep_codes(remark.code for found in surveys for remark in found.warnings)
@@ -116,7 +117,10 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
         plain = [
             asdict(found)
             | {
-                kind: [one._replace(message=as_typed(one.message))._asdict() for one in getattr(found, kind)]
+                kind: [
+                    {"code": one.code, "message": as_typed(one.message), "column": one.column, "row": one.row}
+                    for one in getattr(found, kind)
+                ]
                 for kind in ("warnings", "notes")
             }
             for found in surveys
@@ -125,7 +129,7 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     else:
         used, needed, lacking = _used(recipe, first[0], surveys)
         left_out = [*reading["leave_out"], *dict.fromkeys([*differ, *lacking])] if differ or lacking else []
-        say_surveys(surveys, needed, _to_fit(recipe, first[0], bool(needed and not lacking), left_out))
+        say_surveys(surveys, needed, _to_fit(recipe, first[0], surveys, bool(needed and not lacking), left_out))
         click.echo(used, nl=False)
     refuse_warnings(reading["strict"])
 
@@ -139,13 +143,30 @@ def _used(recipe: uc.Recipe, first: uc.Recording, surveys: Sequence[Any]) -> tup
     wanted = [*(decided.states or ()), *(decided.actions or ())]
     lacking = [(one, sorted({*wanted} - {*one.columns}, key=wanted.index)) for one in surveys]
     said = {one.name: has_no_column(one.name, names, one.columns, one.words) for one, names in lacking if names}
-    return f"fit uses {said_recipe(decided, first)}.\n", as_typed(next(iter(said.values()), "")), list(said)
+    needed, left_out = as_typed(next(iter(said.values()), "")), list(said)
+    if recipe.states is None and 2 * len(said) >= len(surveys):
+        other = next(one for one in surveys if one.name in said)
+        needed = (
+            f"'{surveys[0].name}' has columns {listed(first.columns, 8)}, '{other.name}' {listed(other.columns, 8)}, "
+        )
+        needed += "and which are right cannot be told: name with --state what all have, or rename those that are wrong."
+        left_out = []
+    elif decided.actions is None and decided.rate is None and first.times is None:
+        needed = "Nothing tells the time, which velocities take: name its column with --time, or give --rate."
+    return f"fit uses {said_recipe(decided, first)}.\n", needed, left_out
 
 
-def _to_fit(recipe: uc.Recipe, first: uc.Recording, guess: bool, left_out: Sequence[str]) -> str:
+def _to_fit(
+    recipe: uc.Recipe, first: uc.Recording, surveys: Sequence[Any], guess: bool, left_out: Sequence[str]
+) -> str:
     """The command that comes next; with what may be meant, where columns are not named or not there."""
     states, actions = (not guess or _are_there(names, first) for names in (recipe.states, recipe.actions))
-    more = [] if states else ["--state", ",".join(likely_states(first.columns))]
+    clock = [one.column for one in surveys[0].warnings if one.code == "clock-untold" and one.column]
+    states = states and not {*clock} & {*(recipe.states or ())}
+    common = [name for name in first.columns if name not in clock and all(name in one.columns for one in surveys)]
+    more = [] if states else ["--state", ",".join(likely_states(common or first.columns))]
+    timeless = guess and first.times is None and not recipe.rate and not recipe.actions
+    more += ["--time", *clock] if clock else ["--rate", "HZ"] * timeless
     more += [] if actions or recipe.differentiate else ["--differentiate"]
     more += ["--leave-out", ",".join(left_out)] if left_out else []
     wrong = [name for name, right in (("state", states), ("action", actions), ("leave_out", not left_out)) if not right]
@@ -181,11 +202,11 @@ def _are_there(names: Sequence[str] | None, recording: uc.Recording) -> bool:
     help="Weight samples by this power of their speed; 2 for noisy recordings.",
 )
 @click.option("--folds", type=click.IntRange(2), default=10, help="Folds to choose the threshold on.")
-@click.option(
+@of_words(
     "--hold-out",
-    type=click.Choice(["auto", "demonstration", "sample"]),
-    default="auto",
-    help="What a fold holds out together; auto: demonstrations, or samples of a single one.",
+    "auto demonstration sample",
+    "What a fold holds out together; auto: demonstrations, or samples of a single one.",
+    "auto",
 )
 @click.option(
     "--guided",

@@ -18,7 +18,7 @@ from ..base.files import write
 from .informing import HELD_BY, OF, SHOWN, WHERE, WOUND, provenance
 from .printing import of_option, option_for_json, print_table, refuse_warnings, say_verdict, say_written
 from .progress import shown
-from .reading import loaded, numbers, options_for_reading, prepared, said_recipe
+from .reading import loaded, numbers, of_words, options_for_reading, prepared, said_recipe, with_options
 from .writing import check_name, check_outputs, option_for_force
 
 RESTS = 0.1
@@ -45,13 +45,7 @@ FEATURES = ("auto", "constant", "affine", "quadratic", "rbf")
     type=click.Path(dir_okay=False),
     help="File for the constraint (.npz); where each demonstration has its own, the stem of theirs.",
 )
-@click.option(
-    "--features",
-    type=click.Choice(FEATURES),
-    default="auto",
-    show_default=True,
-    help="How the held directions may vary with the state.",
-)
+@of_words("--features", " ".join(FEATURES), "How the held directions may vary with the state.", "auto")
 @click.option("--jacobian", metavar="URDF", help="States are joint angles of this robot: what is held is its hand.")
 @click.option("--tip", help="With --jacobian: the link that is its hand.")
 @click.option(
@@ -204,11 +198,9 @@ def _numbers(learnt: uc.LearntConstraint) -> dict[str, Any]:
 
 def options_for_held(what: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Add the options that name a constraint."""
-    plane = click.option(
-        "--plane", type=numbers, help=f"Normal of a plane {what}; one number for each action, such as 0,0.3,1."
-    )
+    plane = f"Normal of a plane {what}; one number for each action, such as 0,0.3,1."
     learnt = click.option("--constraint", type=click.Path(), help=f"Learnt constraint {what} (.npz).")
-    return lambda command: plane(learnt(command))
+    return with_options(click.option("--plane", type=numbers, help=plane), learnt)
 
 
 def held_of(

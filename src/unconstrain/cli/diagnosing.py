@@ -16,7 +16,7 @@ from ..base.files import write
 from .fitting import options_for_model, policy_of
 from .printing import as_noted, explained, option_for_json, print_table, refuse_warnings, say, say_scale, say_verdict
 from .progress import shown
-from .reading import options_for_reading, prepared, said_recipe
+from .reading import check_enough, options_for_reading, prepared, said_recipe
 from .writing import check_outputs, option_for_force
 
 MOST_ROWS = 8
@@ -50,6 +50,7 @@ def diagnose(
     with shown("reading, placing, learning"):
         policy = policy_of(model, variance, centres, scale, learner=uc.Robust())
         demonstrations, recipe, (first, *_) = prepared(paths, reading)
+        check_enough(demonstrations)
         policy.fit_demonstrations(demonstrations)
         found = uc.evaluation.diagnose(policy, demonstrations)
     say(uc.preparation.doubts(len(demonstrations), 1.0 - explained(policy, demonstrations)))

@@ -12,7 +12,7 @@ import unconstrain as uc
 from ..base.errors import SettingError
 from .informing import verdict_of
 from .printing import option_for_json, say_verdict, say_written
-from .reading import fitted_policy
+from .reading import fitted_policy, of_words
 from .writing import check_outputs, option_for_force
 
 
@@ -49,11 +49,7 @@ TARGETS = {
 @click.option("--ros2", type=click.Path(file_okay=False), help="Folder for a ROS 2 package with a node.")
 @click.option("--name", help="C, ROS 2: what all names begin with; by default as the file or folder is called.")
 @click.option("--float", "single", is_flag=True, help="Compute in single precision.")
-@click.option(
-    "--messages",
-    type=click.Choice(["joints", "pose"]),
-    help="ROS 2: what states are; by default a pose where they are called x, y, z.",
-)
+@of_words("--messages", "joints pose", "ROS 2: what states are; by default a pose where they are called x, y, z.")
 @option_for_force
 @option_for_json
 def export(

@@ -14,7 +14,7 @@ import unconstrain as uc
 from ..base.errors import SettingError
 from ..base.files import stem
 from .printing import of_option
-from .reading import numbers, recordings_of
+from .reading import check_enough, numbers, of_words, recordings_of, with_options
 
 CENTRES = 25
 
@@ -30,34 +30,6 @@ MODELS: dict[str, Callable[..., uc.Policy]] = {
 """Policies by name, of settings of their own and of what every policy has: learner and validation."""
 
 
-def options_for_model(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options that choose the model of the policy."""
-    scale = "What counts as one of each state, such as 1000,1 for mm beside rad; auto finds it."
-    metavar = "AUTO|NONE|A,B,..."
-    command = click.option("--scale", type=scale_of, default="none", metavar=metavar, help=scale, callback=_levelled)(
-        command
-    )
-    variance = "Local: σ² of the fields, squared unit of the states; inf for one model; by default chosen."
-    command = click.option("--centres", type=click.IntRange(1), help=f"RBF: number of kernels; {CENTRES} by default.")(
-        command
-    )
-    command = click.option("--variance", type=float, help=variance)(command)
-    return click.option(
-        "--model",
-        type=click.Choice(MODELS),
-        default="local",
-        help="Model of the policy; auto takes the one of least estimated error.",
-    )(command)
-
-
-def alpha_of(text: str) -> float | Literal["auto"]:
-    """A number, or auto."""
-    try:
-        return "auto" if text == "auto" else float(text)
-    except ValueError:
-        raise click.BadParameter(f"got {text!r}, expected a number or auto.") from None
-
-
 def scale_of(text: str) -> str | tuple[float, ...] | None:
     """Numbers, auto, or None."""
     with suppress(click.BadParameter):
@@ -70,6 +42,31 @@ def _levelled(_: click.Context, __: click.Parameter, scale: Any) -> Any:
     if scale is not None:
         warnings.filterwarnings("ignore", "mixed-units", UserWarning)
     return scale
+
+
+LEVELS: dict[str, Any] = {"type": scale_of, "default": "none", "metavar": "AUTO|NONE|A,B,...", "callback": _levelled}
+
+options_for_model = with_options(
+    of_words("--model", " ".join(MODELS), "Model of the policy; auto takes the one of least estimated error.", "local"),
+    click.option(
+        "--variance",
+        type=float,
+        help="Local: σ² of the fields, squared unit of the states; inf for one model; by default chosen.",
+    ),
+    click.option("--centres", type=click.IntRange(1), help=f"RBF: number of kernels; {CENTRES} by default."),
+    click.option(
+        "--scale", **LEVELS, help="What counts as one of each state, such as 1000,1 for mm beside rad; auto finds it."
+    ),
+)
+"""Options that choose the model of the policy."""
+
+
+def alpha_of(text: str) -> float | Literal["auto"]:
+    """A number, or auto."""
+    try:
+        return "auto" if text == "auto" else float(text)
+    except ValueError:
+        raise click.BadParameter(f"got {text!r}, expected a number or auto.") from None
 
 
 def default_learner(
@@ -131,6 +128,7 @@ def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None, to: str |
             uc.Guided.goes_round(stream.beginning(), *_aim(to))
     if scheduler is None:
         policy.fit_batches(stream)
+        check_enough(stream.beginning())
         return
     uc.cluster.check_learner(policy.learner)  # before anybody is waited for
     if stream.leave_out - {stem(path) for path in stream.paths}:  # workers know their own files only

@@ -33,10 +33,17 @@ CODES = "unconstrain.codes"
 OTHER_UNITS = {"unit-differs", "clock-differs"}
 """Codes of recordings in another unit than others."""
 
+SPOILING = {*OTHER_UNITS, "missing", "refused"}
+"""Codes of recordings that spoil what is learnt with others, or end it."""
+
 MEANINGS = {
-    "nUPE": "squared error of the whole policy, over the variance of the actions",
-    "nCPE": "squared error along what the constraint leaves free, over the variance of the actions",
-    "nPOE": "recorded motion that the constraint would forbid, over the variance of the actions",
+    "explains": "share of the motion that the policy explains; go by this, as the verdict does: slow samples, whose "
+    "direction is mostly noise, count less",
+    "normalised inconsistency": "the paper's squared error along the motion, over the variance of the actions; slow "
+    "samples count as much as fast ones, so it may look worse; 0 is perfect",
+    "nUPE": "squared error of the whole policy, over the variance of the actions; 0 is perfect",
+    "nCPE": "squared error along what the constraint leaves free, over the variance of the actions; 0 is perfect",
+    "nPOE": "recorded motion that the constraint would forbid, over the variance of the actions; 0 is perfect",
 }
 """What the heads of tables stand for."""
 
@@ -107,7 +114,7 @@ def say_surveys(surveys: Sequence[Any], needed: str, then: str) -> None:
     rows = [
         [
             found.name,
-            str(found.samples),
+            str(found.samples) if found.left is None else f"{found.left} of {found.samples}",
             number(found.duration_s, "{:.2f} s"),
             number(found.rate_hz, "{:.1f} Hz"),
             number(found.jitter, "{:.1%}"),
@@ -119,13 +126,14 @@ def say_surveys(surveys: Sequence[Any], needed: str, then: str) -> None:
         ]
         for found in surveys
     ]
-    print_table(["demonstration", "samples", "length", "rate", "jitter", "gaps", "missing", "zero actions"], rows)
+    samples = "samples" if surveys[0].left is None else "left by --still"
+    print_table(["demonstration", samples, "length", "rate", "jitter", "gaps", "missing", "zero actions"], rows)
     for columns in dict.fromkeys(found.columns for found in surveys):
         click.echo(f"columns: {', '.join(columns)}")
     for words in dict.fromkeys(found.words for found in surveys if found.words):
         click.echo(f"columns of words, which --group can take demonstrations apart by: {', '.join(words)}")
     for found in surveys:
-        if found.non_increasing:
+        if found.non_increasing and "missing" not in {one.code for one in found.warnings}:
             click.echo(f"{found.title}: time does not increase at row {found.non_increasing[0]}.")
     each = [(found.title, remark) for found in surveys for remark in (*found.warnings, *found.notes)]
     several = {title for title, remark in each if remark.code == "several-in-one"}
@@ -248,7 +256,7 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
     elif learner != "direct":
         _say_determined(solution, learner)
     click.echo(
-        "share of the observed motion left unexplained, where slow samples count less: "
+        "share of the motion left unexplained, where slow samples count less, as in the verdict: "
         + (f"{1.0 - judged.training:.4g} on the training data, " if known else "")
         + (
             f"{1.0 - judged.held_out:.4g} where held out."
@@ -352,7 +360,7 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[str]], piped: int =
     Console(width=width, markup=False, emoji=False, highlight=False, color_system=None).print(table)
     for name, meaning in MEANINGS.items():
         if any(name in title for title in head):
-            click.echo(f"{name}: {meaning}; 0 is perfect.")
+            click.echo(f"{name}: {meaning}.")
 
 
 def show_warning(message: Warning | str, *_: Any) -> None:

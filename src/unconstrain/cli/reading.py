@@ -9,7 +9,7 @@ import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, fields, replace
-from functools import wraps
+from functools import reduce, wraps
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +17,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import bare, innermost
+from ..base.display import bare, counted, innermost
 from ..base.errors import NOTHING_LEFT, InvalidDataError, ModelFileError, ReadError, SettingError, UnconstrainError
 from ..base.files import stem
 from .progress import Progress
@@ -47,6 +47,16 @@ def numbers(text: str) -> tuple[float, ...]:
     return values
 
 
+def with_options(*options: Callable[..., Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Add options to a command, the first first."""
+    return lambda command: reduce(lambda done, option: option(done), reversed(options), command)
+
+
+def of_words(name: str, words: str, told: str, default: str | None = None) -> Callable[[Callable[..., Any]], Any]:
+    """An option that is one of some words."""
+    return click.option(name, type=click.Choice(words.split()), default=default, help=told)
+
+
 CURES = (
     click.option("--angle", type=names, help="State columns that are angles, such as roll,yaw."),
     click.option("--degrees", type=names, help="Columns in degrees, by default as their units or jumps say; or none."),
@@ -62,27 +72,17 @@ CURES = (
         multiple=True,
         help="Three state columns of a rotation vector, such as rx,ry,rz; again for another.",
     ),
-    click.option(
+    of_words(
         "--action-is",
-        type=click.Choice(["auto", "velocity", "target", "delta"]),
-        default="auto",
-        help="What action columns hold: velocities, states to come, or changes to the next sample.",
+        "auto velocity target delta",
+        "What action columns hold: velocities, states to come, or changes to the next sample.",
+        "auto",
     ),
-    click.option(
-        "--pauses", type=click.Choice(["drop", "keep"]), default="drop", help="Rows that stand still in the middle."
+    of_words("--pauses", "drop keep", "Rows that stand still in the middle.", "drop"),
+    of_words(
+        "--glitches", "keep repair drop", "Samples far off their neighbours: repair puts a straight line there.", "keep"
     ),
-    click.option(
-        "--glitches",
-        type=click.Choice(["keep", "repair", "drop"]),
-        default="keep",
-        help="Samples far off their neighbours: repair puts a straight line there.",
-    ),
-    click.option(
-        "--seams",
-        type=click.Choice(["keep", "cut"]),
-        default="keep",
-        help="Jumps to another place: cut smooths nothing across.",
-    ),
+    of_words("--seams", "keep cut", "Jumps to another place: cut smooths nothing across.", "keep"),
     click.option(
         "--max-gap",
         type=float,
@@ -101,44 +101,31 @@ CURES = (
 """Options for what is not what it seems."""
 
 
+READING = (
+    click.argument("files", nargs=-1, required=True, metavar="FILE..."),
+    click.option("--state", type=names, help="Columns that make the state, such as x,y,z."),
+    click.option("--action", type=names, help="Columns that make the action, such as vx,vy,vz."),
+    click.option("--differentiate", is_flag=True, help="Take the velocity of the state as the action."),
+    of_words("--by", "savgol kalman central", "How to differentiate, savgol by default; implies --differentiate."),
+    click.option("--window", type=float, help="Smoothing window of savgol, seconds; 0.25 by default."),
+    click.option("--still", type=float, help="Trim what is slower than this at start and end, unit of the actions."),
+    click.option("--rate", type=float, help="Resample to this many samples a second; without time stamps, their rate."),
+    click.option("--centre", is_flag=True, help="States relative to the mean of each demonstration."),
+    *CURES,
+    click.option("--group", help="Column that tells demonstrations apart; none: each file is one."),
+    click.option("--time", help="Column with the time stamps; by default one called t, time or so."),
+    of_words("--time-unit", "s ms us ns", "Unit of the time stamps; by default as their name or size says."),
+    click.option("--columns", type=names, help="Names of the columns, in order, for files without a header."),
+    click.option("--topic", help="ROS: topic to read. Excel: sheet."),
+    click.option("--episodes", type=names, help="Demonstrations to read, such as 0-9,12 or train."),
+    click.option("--task", help="Read only demonstrations of this task."),
+)
+"""Options for reading and preparing files."""
+
+
 def options_for_reading(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options for reading and preparing files."""
-    command = _without_broken(command)
-    for option in reversed(
-        [
-            click.argument("files", nargs=-1, required=True, metavar="FILE..."),
-            click.option("--state", type=names, help="Columns that make the state, such as x,y,z."),
-            click.option("--action", type=names, help="Columns that make the action, such as vx,vy,vz."),
-            click.option("--differentiate", is_flag=True, help="Take the velocity of the state as the action."),
-            click.option(
-                "--by",
-                type=click.Choice(["savgol", "kalman", "central"]),
-                help="How to differentiate, savgol by default; implies --differentiate.",
-            ),
-            click.option("--window", type=float, help="Smoothing window of savgol, seconds; 0.25 by default."),
-            click.option(
-                "--still", type=float, help="Trim what is slower than this at start and end, unit of the actions."
-            ),
-            click.option(
-                "--rate", type=float, help="Resample to this many samples a second; without time stamps, their rate."
-            ),
-            click.option("--centre", is_flag=True, help="States relative to the mean of each demonstration."),
-            *CURES,
-            click.option("--group", help="Column that tells demonstrations apart; none: each file is one."),
-            click.option("--time", help="Column with the time stamps; by default one called t, time or so."),
-            click.option(
-                "--time-unit",
-                type=click.Choice(["s", "ms", "us", "ns"]),
-                help="Unit of the time stamps; by default as their name or size says.",
-            ),
-            click.option("--columns", type=names, help="Names of the columns, in order, for files without a header."),
-            click.option("--topic", help="ROS: topic to read. Excel: sheet."),
-            click.option("--episodes", type=names, help="Demonstrations to read, such as 0-9,12 or train."),
-            click.option("--task", help="Read only demonstrations of this task."),
-        ]
-    ):
-        command = option(command)
-    return command
+    return with_options(*READING)(_without_broken(command))
 
 
 def _without_broken(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -276,11 +263,15 @@ def of_files(recordings: Iterable[uc.Recording]) -> Iterator[None]:
     except (InvalidDataError, SettingError) as error:
         named = re.match(r"'(.+?)'(?=,|:| has )", str(error))
         with suppress(UnconstrainError):
-            files = {one.file: None for one in recordings if named and one.name == named[1] and one.file}
+            came = {(one.name, one.file): None for one in recordings}
+            files = {file: None for name, file in came if named and name == named[1] and file}
             if named and files:
                 own = any(stem(file) == named[1] for file in files)
                 title = " or ".join(files) if own else f"{named[0]} of {' or '.join(files)}"
-                error.args = (f"{title}{str(error)[named.end() :]}", *error.args[1:])
+                others = len(came) > len(files) and str(error)[named.end()] in ",:"  # all may lack what it has not
+                left_out = ",".join([*click.get_current_context().params["leave_out"], named[1]])
+                cure = f" Or leave it out: --leave-out {shlex.quote(left_out)}" if others else ""
+                error.args = (f"{title}{str(error)[named.end() :]}{cure}", *error.args[1:])
         raise
 
 
@@ -366,6 +357,16 @@ def prepared(paths: Sequence[Any], reading: dict[str, Any], notes: Mapping[str, 
         found = Prepared(uc.prepare(recordings, asked), uc.preparation.decide(asked, recordings[0])[0], recordings)
     say_left(found.demonstrations, found.recipe)
     return found
+
+
+def check_enough(demonstrations: Sequence[uc.Demonstration]) -> None:
+    """Refuse fewer samples than tell any policy: the simplest takes one more than there are states."""
+    count, n = uc.stack(demonstrations).states.shape
+    if count <= n:
+        raise InvalidDataError(
+            f"got {counted(count, 'sample')} in all, expected at least {n + 1}, one more than there are states: fewer "
+            "tell no policy. Record longer, or give more files."
+        )
 
 
 def _but(kept: Any, asked: Any) -> Any:

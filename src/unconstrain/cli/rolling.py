@@ -20,7 +20,7 @@ from ..base.files import write
 from .constraining import held_of, options_for_held
 from .informing import TOLD, doubted
 from .printing import of_option, option_for_json, say_verdict, say_written, show_warning
-from .reading import fitted_policy, numbers
+from .reading import fitted_policy, numbers, of_words
 from .scoring import support_of
 from .writing import check_outputs, option_for_force
 
@@ -38,10 +38,10 @@ from .writing import check_outputs, option_for_force
     multiple=True,
     help="Centre of a ball to go round, and its radius; or of an ellipsoid, and its radii. More than once for several.",
 )
-@click.option(
+@of_words(
     "--method",
-    type=click.Choice(["euler", "rk4", "adaptive"]),
-    help="How a step is taken: Runge-Kutta by default, or by euler as the loop of a controller does.",
+    "euler rk4 adaptive",
+    "How a step is taken: Runge-Kutta by default, or by euler as the loop of a controller does.",
 )
 @click.option(
     "--order",

@@ -11,7 +11,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import innermost
+from ..base.display import innermost, percent
 from ..base.errors import SettingError
 from .constraining import held_of, options_for_held
 from .informing import TOLD, learnt_from
@@ -54,8 +54,8 @@ def score(
         whole = _scores(moving, held, demonstrations, "all")
     known, under = learnt_from(learnt, notes, recordings), None if held is None else 1.0 - whole["ncpe"]
     more = under, None if known is None else len(known), notes.get(TOLD)
-    judged = verdicts.of_score(explained(moving, demonstrations), len(demonstrations), *more)
-    judged = verdicts.of_worst(judged, {demo.name: explained(moving, [demo]) for demo in demonstrations})
+    judged = verdicts.of_score(whole["explains"], len(demonstrations), *more)
+    judged = verdicts.of_worst(judged, {row["demonstration"]: row["explains"] for row in rows})
     with shown("running it from the same starts"):
         found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units)
     verdict = verdicts.of_unit(verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0)), _times(learnt, states))
@@ -64,13 +64,16 @@ def score(
         click.echo(json.dumps({**told, "replayed": found.medians, "verdict": verdict.to_json()}, indent=2))
         return
     say_verdict(verdict)
-    head = ["demonstration", "samples", "normalised inconsistency", "nPOE", "nCPE"][: len(whole)]
-    cells = [[f"{v:.4g}" if isinstance(v, float) else str(v) for v in one.values()] for one in (*rows, whole)]
-    print_table(head, cells)
+    head = ["demonstration", "samples", "explains", "normalised inconsistency", "nPOE", "nCPE"][: len(whole)]
+    each = [[*one.values()] for one in (*rows, whole)]
+    print_table(
+        head, [[name, str(size), percent(share), *map("{:.4g}".format, rest)] for name, size, share, *rest in each]
+    )
 
 
 def _scores(moving: Any, held: Any, of: Sequence[uc.Demonstration], name: str) -> dict[str, Any]:
-    found = {"demonstration": name, "samples": sum(map(len, of)), "ninc": uc.ninconsistency(moving, of)}
+    found = {"demonstration": name, "samples": sum(map(len, of)), "explains": explained(moving, of)}
+    found["ninc"] = uc.ninconsistency(moving, of)
     return found if held is None else found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(moving, of, held)}
 
 

@@ -29,14 +29,7 @@ MOST_NAMED = 8
 
 
 def sentences(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> list[str]:
-    """The diagnosis in sentences.
-
-    Parameters
-    ----------
-    found : Diagnosis
-    states, actions : sequence of str
-        Names of the columns.
-    """
+    """The diagnosis in sentences, with the names of the columns."""
     return [
         _about_noise(found),
         about_choice(found.method, found.candidates),
@@ -89,15 +82,7 @@ def in_words(method: str) -> str:
 
 
 def about_choice(method: str, candidates: Mapping[str, float]) -> str:
-    """Which candidate was taken and how much worse the others are, in two sentences; see :class:`~unconstrain.Robust`.
-
-    Parameters
-    ----------
-    method : str
-        Name of the candidate that was taken.
-    candidates : mapping
-        Estimated squared error of each, by name.
-    """
+    """Which candidate was taken, and the estimated squared errors of the others over its, in two sentences."""
     way, _, softness = method.partition(", ")
     said = f"Learnt as {way}{f' (softness {softness})' * bool(softness)}: {in_words(way) or 'as asked for'}."
     if len(candidates) < 2:

@@ -190,9 +190,11 @@ def of_score(
         said += f"{_count(demonstrations)}: a score on what was learnt from is too good."
         return Verdict(Mark.DOUBTFUL, said, next="Hold some out of the fit (--leave-out, --episodes), and score these.")
     unknown = ", if none of it was learnt from" if learnt is None else ""
-    across = "What constraints hid in these recordings, too: --plane or --constraint tells it."
+    across = "What constraints hid in these recordings, too"
     if told is not None and told < MOSTLY:
-        across = f"Across the motion: {of_untold(1 - told)}. --plane or --constraint tells more."
+        across = f"Across the motion: {of_untold(1 - told)}"
+    across += ". What held these recordings, given with --plane or --constraint, tells how far the policy is off in "
+    across += "all directions that this leaves free."
     return Verdict(
         mark,
         f"The policy {_explains(share)}{known}{unknown}: {word}.",
@@ -385,13 +387,14 @@ def of_replays(found: Verdict, extents: Array, paces: Array, apart: str, lasts: 
     """Add to a verdict how a policy moves from the starts of demonstrations, held as they were.
 
     ``extents`` and ``paces`` are size and turns of each run over those of its demonstration, NaN where there are none,
-    and ``lasts`` the size of the last round over that of the first, over the same; ``apart`` is how far the runs stray.
+    and ``lasts`` the size of the last round over that of the first, over the same; ``apart`` is how far the runs stray
+    from the nearest recorded states, with its unit.
     Half of them may be off by :data:`OTHERWISE` either way, whatever the mean is, and none by :data:`FAR_OFF`.
     """
     measured = _measured(extents, paces, lasts)
     if not measured:
         return found
-    ran = f"un from the same starts: {size_and_pace(extents, paces, lasts)}, typically {apart} away"
+    ran = f"un from the same starts: {size_and_pace(extents, paces, lasts)}, typically {apart} from the recorded path"
     off = {name: np.abs(np.log(np.maximum(ratios, 1e-9))) for name, ratios in measured.items()}
     strays = {
         name: int((many > np.log(OTHERWISE)).sum())

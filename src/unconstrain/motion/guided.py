@@ -160,7 +160,7 @@ class Guided(Exportable, Shown):
             return False
         rests, around = _resting(demos), turns(demos)
         if orbit is not None and around < _HALF and 2 * sum(rests) > len(demos):
-            raise SettingError(f"orbit: demonstrations make {around:.2f} turns in the mean, and no cycle is near them.")
+            raise _no_cycle(demos)
         if orbit is not None or (2 * sum(rests) <= len(demos) and around >= _ROUND):
             return True
         if not any(rests):
@@ -273,8 +273,14 @@ def _encircled(demos: Sequence[Demonstration], policy: Callable[[Array], Array])
         with np.errstate(divide="ignore", invalid="ignore"):
             return encircled(demos, policy)
     except InvalidDataError as error:
-        made = f"{turns(demos):.2f} turns in the mean"
-        raise SettingError(f"orbit: demonstrations make {made}, and no cycle is near them.") from error
+        raise _no_cycle(demos) from error
+
+
+def _no_cycle(demos: Sequence[Demonstration]) -> SettingError:
+    return SettingError(
+        f"orbit: demonstrations make {turns(demos):.2f} turns in the mean, and no cycle is near them. At least "
+        f"{_HALF:g} is needed, and {_ROUND:g} to be sure: record whole rounds; or guide it to a goal, or not at all."
+    )
 
 
 def _descent(

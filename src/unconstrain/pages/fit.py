@@ -127,7 +127,10 @@ def _summary(policy: Policy, demos: list[Demonstration]) -> html.Markup:
             (f"{sum(map(len, demos)):,}".replace(",", " "), "samples"),
             (shape, "local models × features" if models > 1 else "features"),
             (percent(solution.determined_share), f"of {models * d * p} weight directions determined"),
-            (html.number(_or_nan(ninconsistency, policy, demos)), "normalised inconsistency"),
+            (
+                html.number(_or_nan(ninconsistency, policy, demos)),
+                "normalised inconsistency, in which slow samples count as much",
+            ),
         ]
     )
 

@@ -119,16 +119,7 @@ def look_page(
 
 
 def marks_of(recording: Recording, survey: Any, demonstration: Demonstration) -> list[Mark]:
-    """Warnings, gaps and pauses of one demonstration, in seconds from its first sample.
-
-    Parameters
-    ----------
-    recording : Recording
-    survey : Survey
-        What :func:`unconstrain.preparation.survey_set` found in it.
-    demonstration : Demonstration
-        What was made of it.
-    """
+    """Warnings, gaps and pauses that a survey found, in seconds from the first sample of what was made of it."""
     stamps, kept = recording.times, demonstration.times
     begin = 0.0 if kept is None or not len(kept) else float(kept[0])
     first = 0.0 if stamps is None else float(stamps[np.isfinite(stamps)][:1].sum())

@@ -85,7 +85,7 @@ def replayed(
         return Replayed(found._replace(doubt=(found.doubt + unknown).strip()) if runs else found, None, runs)
     extents, paces, lasts, apart = np.array([one[:4] for one in known]).T
     unit = {units.get(name, "") for name in recipe.states or ()}
-    said = f"{np.median(apart):.3g} {unit.pop() if len(unit) == 1 else ''}".rstrip()
+    said = f"{np.median(apart):.3g} {(len(unit) == 1 and unit.pop()) or '(unit of the states)'}"
     measured = {"extent": extents, "pace": paces, "last_round": lasts, "apart": apart}
     finite = {name: values[np.isfinite(values)] for name, values in measured.items()}
     told = {name: float(np.median(values)) if len(values) else None for name, values in finite.items()}

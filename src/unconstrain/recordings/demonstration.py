@@ -42,6 +42,8 @@ class Recording(Shown):
         Path of the file, for messages; empty where it came from none.
     words : tuple of str
         Columns of the file that hold no numbers, by which it may be taken apart.
+    lines : ndarray, shape (T,), optional
+        Line of the file that each row is in, from 1, where its format has lines.
 
     Examples
     --------
@@ -60,6 +62,7 @@ class Recording(Shown):
     attributes: Mapping[str, Any] = field(default_factory=dict)
     file: str = ""
     words: tuple[str, ...] = ()
+    lines: NDArray[np.integer] | None = None
 
     def __len__(self) -> int:
         return len(self.values)
@@ -68,6 +71,10 @@ class Recording(Shown):
     def title(self) -> str:
         """What it is called in messages."""
         return titled(self.name, self.file)
+
+    def place(self, row: int) -> str:
+        """Where a row, from 0, is, for people: with its line, from 1, where the format of its file has lines."""
+        return f"row {row}" if self.lines is None or row >= len(self.lines) else f"row {row} (line {self.lines[row]})"
 
     def select(self, names: Sequence[str]) -> Array:
         """Pick columns by name, shape (T, len(names)).

@@ -13,6 +13,8 @@ WARNINGS = (
     "clock-unit",
     "clock-differs",
     "clock-gap",
+    "clock-untold",
+    "missing",
     "targets-as-velocities",
     "mixed-units",
     "unit-differs",
@@ -20,6 +22,7 @@ WARNINGS = (
     "pause",
     "reversed",
     "at-rest",
+    "refused",
     "all-zero",
     "few-demonstrations",
     "several-in-one",
@@ -34,13 +37,15 @@ WARNINGS = (
 class Remark(NamedTuple):
     """One thing to know about a recording.
 
-    ``code`` is a word for programs, ``message`` a sentence for people; ``column`` and ``row`` (from 0) say where.
+    ``code`` is a word for programs, ``message`` a sentence for people; ``column``, ``row`` (from 0), and for people
+    ``place`` say where.
     """
 
     code: str
     message: str
     column: str | None = None
     row: int | None = None
+    place: str = ""
 
     @property
     def warns(self) -> bool:
@@ -49,7 +54,7 @@ class Remark(NamedTuple):
 
     def about(self, title: str = "") -> str:
         """One line on a recording of some title, or on several: the code, the place, and the message."""
-        row = "" if self.row is None else f"row {self.row}"
+        row = "" if self.row is None else self.place or f"row {self.row}"
         column = "" if self.column is None else f"column {self.column!r}"
         return ": ".join(filter(None, (self.code, ", ".join(filter(None, (title, row, column))), self.message)))
 

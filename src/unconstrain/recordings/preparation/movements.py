@@ -249,9 +249,10 @@ def trim(
         keep &= np.linalg.norm(demonstration.actions, axis=1) >= still
     rows = np.flatnonzero(keep)
     if not rows.size:
+        ends = f"{start_s:g} s at the start and {end_s:g} s at the end" if start_s or end_s else ""
+        said = " and ".join(filter(None, (ends, "" if still is None else f"all that is slower than {still:g}")))
         raise InvalidDataError(
-            f"'{demonstration.name}': nothing is left after trimming {start_s} s at the start, {end_s} s at the end"
-            f"{'' if still is None else f' and all that is slower than {still}'}. Trim less, or compare units."
+            f"'{demonstration.name}': nothing is left after trimming {said}. Trim less, or compare units."
         )
     return demonstration[rows[0] : rows[-1] + 1]
 
@@ -277,13 +278,14 @@ def _prepare(recording: Recording, recipe: Recipe) -> tuple[Demonstration, list[
     states = _finite(recording, recipe.states or (), recipe)
     actions = None if recipe.actions is None else _finite(recording, recipe.actions, recipe)
     times = stamps(recording, recipe)
+    _check_finite(recording, np.empty((0, 0)) if times is None else times[:, None], ("time",))
     notes: list[Remark] = []
     noise = None
     if times is None:
         at, states, actions = _in_rows(states, actions, recipe)
     else:
         stamped = times
-        piece, notes = _without_repeats(_Piece(*_sorted(times, states, actions, recipe)), recording.name)
+        piece, notes = _without_repeats(_Piece(*_sorted(times, states, actions, recipe)), recording)
         pieces = _split(_without_glitches(piece._replace(states=continuous(piece.states, recipe)), recipe), recipe)
         (times, states, actions, noise), more = _repair(pieces, recipe, recording.name)
         notes += more
@@ -314,27 +316,30 @@ def _about_centre(states: Array) -> list[Remark]:
 
 
 def _finite(recording: Recording, names: Sequence[str], recipe: Recipe) -> Array:
-    values = select(recording, names, recipe)
+    return _check_finite(recording, select(recording, names, recipe), names)
+
+
+def _check_finite(recording: Recording, values: Array, names: Sequence[str]) -> Array:
     bad = np.argwhere(~np.isfinite(values))
     if len(bad):
-        row, column = bad[0]
+        row, column = bad[0].tolist()
         raise InvalidDataError(
-            f"'{recording.name}', row {row}, column {names[column]!r}: found {values[row, column]} "
-            f"({counted(len(bad), 'such cell')} in the selected columns), expected finite numbers. "
-            "Remove or repair these rows first."
+            f"'{recording.name}', {recording.place(row)}, column {names[column]!r}: "
+            f"found {values[row, column]} ({counted(len(bad), 'such cell')} in the selected columns), "
+            "expected finite numbers. Remove or repair these rows first."
         )
     return values
 
 
-def _without_repeats(piece: _Piece, name: str) -> tuple[_Piece, list[Remark]]:
-    times = as_vector(piece.times, f"times of '{name}'", len(piece.states))
+def _without_repeats(piece: _Piece, of: Recording) -> tuple[_Piece, list[Remark]]:
+    times = as_vector(piece.times, f"times of '{of.name}'", len(piece.states))
     piece = piece._replace(times=times)
     intervals = np.diff(times)
     if (intervals < 0).any():
         row = int(np.argmax(intervals < 0)) + 1
         raise InvalidDataError(
-            f"'{name}', row {row}: got time {times[row]:.6g} s after {times[row - 1]:.6g} s, expected later ones. "
-            "Sort the rows (sort=True), or split the file where a new recording begins."
+            f"'{of.name}', {of.place(row)}: got time {times[row]:.6g} s after {times[row - 1]:.6g} s, "
+            "expected later ones. Sort the rows (sort=True), or split the file where a new recording begins."
         )
     fresh = np.append(True, intervals > 0)
     if fresh.all():

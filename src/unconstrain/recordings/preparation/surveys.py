@@ -1,16 +1,18 @@
 """What is in a recording, before anything is done to it."""
 
+import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...base.arrays import Array
-from ...base.errors import UnconstrainError
+from ...base.display import counted, listed
+from ...base.errors import InvalidDataError, UnconstrainError
 from ..demonstration import Recording
 from ..remarks import Remark, titled
 from .decisions import in_radians, may_be_degrees
-from .movements import Gap, find_gaps
+from .movements import Gap, find_gaps, prepare_one, window_used
 from .plausibility.checks import examine, once
 from .plausibility.sets import compare, outline, too_few
 from .plausibility.subject import Subject
@@ -49,6 +51,8 @@ class Survey:
         Path of the file; empty where it came from none.
     words : tuple of str
         Columns that hold no numbers.
+    left : int, optional
+        Samples that ``trim`` and ``still`` of the recipe leave; None where nothing is trimmed.
     """
 
     name: str
@@ -65,6 +69,7 @@ class Survey:
     notes: tuple[Remark, ...] = ()
     file: str = ""
     words: tuple[str, ...] = ()
+    left: int | None = None
 
     @property
     def title(self) -> str:
@@ -113,7 +118,8 @@ def _survey(subject: Subject, asked: Recipe) -> Survey:
     times = stamps(recording, asked)
     known = np.empty(0) if times is None else times[np.isfinite(times)]
     gaps = find_gaps(known - known[:1], asked.max_gap_s)
-    remarks = (*examine(subject), *may_be_degrees(asked, subject.recipe, recording))
+    left, refused = _prepared(subject)
+    remarks = (*examine(subject), *may_be_degrees(asked, subject.recipe, recording), *refused)
     steady = _steady_intervals(known, gaps)
     typical = float(np.median(steady)) if steady.size else None
     bad_cells = len(recording) - np.count_nonzero(np.isfinite(recording.values), axis=0)
@@ -132,7 +138,37 @@ def _survey(subject: Subject, asked: Recipe) -> Survey:
         notes=tuple(remark for remark in remarks if not remark.warns),
         file=recording.file,
         words=recording.words,
+        left=left,
     )
+
+
+def _prepared(subject: Subject) -> tuple[int | None, tuple[Remark, ...]]:
+    """How many samples are left where it is trimmed, and why it is refused; what is long is prepared for no other."""
+    recording, recipe = subject.recording, subject.recipe
+    used, trimmed = (*(recipe.states or ()), *(recipe.actions or ())), (recipe.trim, recipe.still) != (None, None)
+    missing = ~np.isfinite(recording.select(used))
+    if subject.times is not None:
+        missing = np.column_stack([missing, ~np.isfinite(subject.times)])
+    if rows := np.flatnonzero(missing.any(axis=1)).tolist():
+        lacking = listed([name for name, cells in zip((*used, "time"), missing.T, strict=False) if cells.any()], 8)
+        said = (
+            f"{counted(len(rows), 'row')} without numbers in {lacking}, empty or NaN, cannot be learnt from: remove or "
+        )
+        said += "repair them, or leave it out with leave_out=."
+        return None, (Remark("missing", said, row=rows[0], place=recording.place(rows[0])),)
+    stamps = subject.stamps
+    long = stamps is None or (len(stamps) > 0 and np.ptp(stamps) >= window_used(recipe, recording))
+    if not used or (long and not trimmed):
+        return None, ()
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            left = len(prepare_one(subject))
+        return left if trimmed else None, ()
+    except InvalidDataError as error:
+        said = f"cannot be learnt from: {str(error).partition(': ')[2]} Or leave it out with leave_out=."
+        return 0 if trimmed else None, (Remark("refused", said),)
+    except UnconstrainError:  # what the options lack is said elsewhere
+        return None, ()
 
 
 def subject_of(recording: Recording, recipe: Recipe) -> Subject:

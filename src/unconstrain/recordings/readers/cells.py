@@ -30,27 +30,16 @@ ROWS_AT_ONCE = 20_000
 
 
 class Cells(NamedTuple):
-    """Rows as numbers (r, c), the cells of columns of words, and the rows before which the text makes a break."""
+    """Rows as numbers (r, c) and their lines (r,), the cells of columns of words, and rows after a break."""
 
     numbers: Array
     words: Mapping[int, Sequence[str]]
     breaks: tuple[int, ...]
+    lines: NDArray[np.int32]
 
 
 class Parser:
-    """Turns lines into numbers.
-
-    Parameters
-    ----------
-    layout : Layout
-    names : sequence of str
-        What the columns are called, for messages.
-    words : sequence of int
-        Columns whose cells are wanted as they are.
-    group : int, optional
-        The one of them that may not be empty.
-    path : Path
-    """
+    """Turns lines of some layout into numbers, but for columns of ``words``; that of ``group`` may not be empty."""
 
     def __init__(
         self, layout: Layout, names: Sequence[str], words: Sequence[int], group: int | None, path: Path
@@ -76,16 +65,12 @@ class Parser:
     def parse(self, lines: Lines) -> Cells:
         """Some lines as numbers.
 
-        Raises
-        ------
-        ReadError
-            If a line has too many or too few cells, or a word where numbers are; it names the line and the column.
-        UnicodeDecodeError, csv.Error
-            If they are no text or their quotes do not match.
+        Raises a ReadError that names line and column where cells are too many, too few or words instead of numbers, and
+        a UnicodeDecodeError or csv.Error where it is no text or quotes do not match.
         """
-        return self._parse_numbers(lines.text) or self._parse_any(lines)
+        return self._parse_numbers(*lines) or self._parse_any(lines)
 
-    def _parse_numbers(self, text: bytes) -> Cells | None:
+    def _parse_numbers(self, first: int, text: bytes) -> Cells | None:
         """Lines that are nothing but cells, by pyarrow; None where there is anything else."""
         if self._arrow is None or text.startswith((b"\n", b" ")) or any(mark in text for mark in self._not_plain):
             return None
@@ -97,7 +82,7 @@ class Parser:
             return None
         numbers = numbers_of(table.select([str(at) for at in self.numbers]))
         self._has_number[self.numbers] |= np.isfinite(numbers).any(axis=0)
-        return Cells(numbers, words, ())
+        return Cells(numbers, words, (), np.arange(first + 1, first + 1 + len(numbers), dtype=np.int32))
 
     def _parse_any(self, lines: Lines) -> Cells:
         """Lines by Python: slower, but it knows the line of what is wrong, and passes over what is no row."""
@@ -109,7 +94,7 @@ class Parser:
                 said = f"line {row}, column {self.names[self.group or 0]!r}"
                 raise ReadError(f"{self.path}, {said}: empty, expected the name of a demonstration.")
         numbers = np.concatenate(parts) if parts else np.empty((0, len(self.columns)))
-        return Cells(numbers, words, tuple(breaks))
+        return Cells(numbers, words, tuple(breaks), np.array([line for line, _ in rows], dtype=np.int32))
 
     def _rows(self, lines: Lines) -> tuple[list[Row], list[int]]:
         """Rows of cells, and before which of them there is a blank line or the header once more."""

@@ -89,17 +89,7 @@ def find_pair(names: Sequence[str]) -> ClockColumns | None:
 
 
 def find_clock_of(stamps: Array, name: str, unit: str | None = None) -> Clock:
-    """What a clock counts: as told, else as its name says, else by the size of its numbers.
-
-    Parameters
-    ----------
-    stamps : ndarray, shape (T,)
-        May hold NaN.
-    name : str
-        Name of the column; may end in a unit (``t_ms``, ``time[ns]``, ``Time (Seconds)``, ``TimeMs``).
-    unit : {"s", "ms", "us", "ns"}, optional
-        Overrides all else.
-    """
+    """What a clock counts: as told, else as its name says (``t_ms``, ``time[ns]``), else by the size of its numbers."""
     known = stamps[np.isfinite(stamps)]
     if not known.size:
         return Clock(0.0, 1.0)

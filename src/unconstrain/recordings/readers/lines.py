@@ -45,13 +45,7 @@ class Lines(NamedTuple):
 
 
 def lines_of(file: BinaryIO, path: Path) -> Iterator[Lines]:
-    """Go through a text, a short block first.
-
-    Raises
-    ------
-    ReadError
-        If a line has no end.
-    """
+    """Go through a text, a short block first; a ReadError where a line has no end."""
     first, rest = 0, b""
     for text, is_last in _chunks(file):
         rest += text

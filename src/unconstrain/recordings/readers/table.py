@@ -102,7 +102,7 @@ class Table:
         Rows a second, where the file says so; used where it has no clock.
     labels : tuple of str
         Lists that the file keeps of demonstrations, such as ``train``, in which this one is.
-    units, attributes, remarks
+    units, attributes, remarks, lines
         As in :class:`~unconstrain.recordings.demonstration.Recording`.
     """
 
@@ -116,6 +116,7 @@ class Table:
     units: Mapping[str, str] = field(default_factory=dict)
     attributes: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[Remark, ...] = ()
+    lines: NDArray[np.integer] | None = None
 
 
 def numbers_of(table: Any) -> Array:
@@ -142,13 +143,7 @@ class Roles(NamedTuple):
 
 
 def find_roles(names: Sequence[str], reading: Reading, path: Path) -> Roles:
-    """What the columns are for: as told, else by their names.
-
-    Raises
-    ------
-    ReadError
-        If a column that was told does not exist.
-    """
+    """What the columns are for: as told, else by their names; a ReadError where one that was told does not exist."""
     for name, role in ((reading.group, "group"), (reading.time, "time")):
         if name is not None and name not in names and (role, name) != ("group", NO_GROUP):
             none = f" Give another, or group={NO_GROUP!r} where each file is one." if role == "group" else ""
@@ -206,6 +201,7 @@ class Assembly:
             attributes=table.attributes,
             file=legible(str(self.path)),
             words=tuple(name for name in table.words if name not in taken),
+            lines=table.lines,
         )
         groups = _groups(table, roles.group)
         tasks = table.words.get("task")
@@ -262,8 +258,8 @@ class Assembly:
             bounds, where = _restarts(counts, start), "where the clock or the count of rows begins anew"
         self._parts[whole.name] = part + len(bounds)
         self._latest[whole.name] = None if counts is None or not len(counts) else float(counts[-1])
-        said = f"{len(bounds) + 1} demonstrations in one table, taken apart at {where}, the first time at row {{}}."
-        notes = tuple(Remark("split", said.format(row), row=row) for row in bounds[:1])
+        said = f"{len(bounds) + 1} demonstrations in one table, taken apart at {where}, the first time at {{}}."
+        notes = tuple(Remark("split", said.format(whole.place(row)), row=row) for row in bounds[:1])
         return [
             replace(
                 rows_of(whole, slice(begin, end)),
@@ -314,7 +310,8 @@ def split_by_group(whole: Recording, groups: Sequence[str], tasks: Sequence[str]
 def rows_of(recording: Recording, rows: slice | NDArray[np.intp]) -> Recording:
     """Some rows of a recording."""
     times = None if recording.times is None else recording.times[rows]
-    return replace(recording, values=recording.values[rows], times=times)
+    lines = None if recording.lines is None else recording.lines[rows]
+    return replace(recording, values=recording.values[rows], times=times, lines=lines)
 
 
 def unique_names(names: Iterable[str]) -> tuple[str, ...]:
@@ -333,13 +330,7 @@ def unique_names(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def named_by(names: Sequence[str] | None, held: Sequence[str], path: Path) -> tuple[str, ...]:
-    """Names of columns: as told, else those that the file has.
-
-    Raises
-    ------
-    ReadError
-        If the names that were told are too many or too few.
-    """
+    """Names of columns: as told, else those that the file has; a ReadError where they are too many or too few."""
     if names is None:
         return tuple(held)
     if len(names) != len(held):

@@ -62,9 +62,10 @@ def joined(tables: Iterator[Table]) -> Table:
     width = first.values.shape[1]
     values = np.empty((RESERVED // (8 * max(width, 1)), width))
     words: dict[str, list[Any]] = {name: [] for name in first.words}
-    breaks, rows = list[int](), 0
+    breaks, lines, rows = list[int](), list[Any](), 0
     for table in chain([first], tables):
         breaks += [rows + at for at in table.breaks]
+        lines.append(table.lines)
         stop = rows + len(table.values)
         if stop > len(values):
             values.resize((stop, width), refcheck=False)
@@ -72,7 +73,7 @@ def joined(tables: Iterator[Table]) -> Table:
         for name, cells in table.words.items():
             words[name] += cells
     values.resize((rows, width), refcheck=False)
-    return replace(first, values=values, words=words, breaks=tuple(breaks))
+    return replace(first, values=values, words=words, breaks=tuple(breaks), lines=np.concatenate(lines))
 
 
 def tables_of_text(layout: Layout, blocks: Iterator[Lines], path: Path, reading: Reading, name: str) -> Iterator[Table]:
@@ -118,6 +119,7 @@ def _table(cells: Cells, kept: list[int], names: Sequence[str], parser: Parser, 
         layout.rate,
         units={renamed[name]: unit for name, unit in layout.units.items()},
         attributes=layout.attributes,
+        lines=cells.lines,
     )
 
 

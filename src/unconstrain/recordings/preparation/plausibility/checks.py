@@ -30,10 +30,16 @@ SHORTEST_STOP_S, STOP_ROWS = 0.3, 6
 SHORTEST_PIECE = 5
 """Rows before and after a gap; fewer are a stray row at an end."""
 
+STEADY = 0.05
+"""Steps of a clock, nine of ten, are within this share of the median one: those of 226 of 237 recorded clocks, and of
+none of 1781 recorded columns that are no clock."""
+
 
 def examine(subject: Subject) -> tuple[Remark, ...]:
     """What is worth saying about one recording, at most once for each code, but for what its recipe cures."""
-    return once([*subject.recording.remarks, *(remark for check in CHECKS if (remark := check(subject)) is not None)])
+    found = [*subject.recording.remarks, *(remark for check in CHECKS if (remark := check(subject)) is not None)]
+    place = subject.recording.place
+    return once(one if one.row is None else one._replace(place=place(one.row)) for one in found)
 
 
 def once(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
@@ -65,9 +71,10 @@ def clock_unit(subject: Subject) -> Remark | None:
 
 def clock_gap(subject: Subject) -> Remark | None:
     """Time without samples in the middle of a recording."""
-    stamps = subject.stamps
-    if stamps is None or len(stamps) < LEAST_ROWS or not subject.is_in_order:
+    if subject.times is None or len(subject.rows) < LEAST_ROWS or not subject.is_in_order:
         return None
+    at = np.flatnonzero(np.isfinite(subject.times))  # rows without other cells have their time
+    stamps = subject.times[at]
     intervals = np.diff(stamps)
     longest = subject.recipe.max_gap_s or max(GAP_INTERVALS * usual(intervals), SHORTEST_GAP_S)
     rows = np.flatnonzero(intervals > longest) + 1
@@ -79,16 +86,40 @@ def clock_gap(subject: Subject) -> Remark | None:
         "clock-gap",
         f"{rows.size} gap{'s' * (rows.size > 1)} in the time stamps, the longest {intervals[worst - 1]:.3g} s after "
         f"{stamps[worst - 1] - stamps[0]:.6g} s; nothing is smoothed or interpolated across (max_gap_s=).",
-        row=subject.row(int(rows[0])),
+        row=int(at[rows[0]]),
     )
+
+
+def clock_untold(subject: Subject) -> Remark | None:
+    """A first column that rises as a clock does, where none is known."""
+    recording = subject.recording
+    name, steps = recording.columns[0], np.diff(recording.values[:, 0])
+    used, titled = (
+        name in (subject.recipe.states or (name,)),
+        "no-header" not in [one.code for one in recording.remarks],
+    )
+    meant = (titled and subject.recipe.actions) if used else subject.recipe.rate
+    if (
+        meant
+        or recording.times is not None
+        or len(recording.columns) < 2
+        or len(steps) < LEAST_ROWS
+        or not (steps > 0).all()
+    ):
+        return None
+    if np.quantile(np.abs(steps / np.median(steps) - 1.0), 0.9) > STEADY:
+        return None
+    said = f"rises steadily, as a clock: if it is one, say time={name!r}; no clock and no count of rows is a state."
+    return Remark("clock-untold", said, name)
 
 
 def irregular(subject: Subject) -> Remark | None:
     """Stamps that have to be made uniform before they are differentiated."""
-    recipe, stamps = subject.recipe, subject.stamps
-    if subject.times is None or stamps is None or not np.isfinite(subject.times).all():
+    recipe = subject.recipe
+    if subject.times is None or not np.isfinite(subject.times).all():
         return None
-    intervals = np.diff(np.sort(stamps) if recipe.sort else stamps)
+    intervals = np.diff(np.sort(subject.times) if recipe.sort else subject.times)
+    intervals = intervals[intervals != 0.0]
     typical = float(np.median(intervals)) if recipe.differentiate == "savgol" and intervals.size else 0.0
     steady = intervals[intervals <= (recipe.max_gap_s or GAP_INTERVALS * typical)]
     asked = recipe.rate is not None and abs(recipe.rate * typical - 1.0) <= IRREGULAR
@@ -253,6 +284,7 @@ def all_zero(subject: Subject) -> Remark | None:
 CHECKS: tuple[Callable[[Subject], Remark | None], ...] = (
     clock_unit,
     clock_gap,
+    clock_untold,
     irregular,
     row_order,
     reversed_in_time,

@@ -50,13 +50,7 @@ class _Others:
 
 
 def turned_round(outlines: Sequence[Outline]) -> list[int]:
-    """Demonstrations that agree with all others once they are turned round, and not before.
-
-    Parameters
-    ----------
-    outlines : sequence of Outline
-        With steps, of one number of columns.
-    """
+    """Demonstrations, with steps, that agree with all others once they are turned round, and not before."""
     if len(outlines) < 4:
         return []
     others, signs = _Others(outlines), np.ones(len(outlines))

@@ -1,0 +1,202 @@
+"""What somebody meets whose files are not as they seem: what is said, of which line, and what to type."""
+
+import json
+
+import numpy as np
+import pytest
+
+import unconstrain as uc
+from test_cli import call, refused, run, write
+from test_formats import workbook
+from test_newcomer import stroke, text
+
+READ = ("--state", "x,y", "--by", "savgol")
+
+
+@pytest.fixture
+def bare(tmp_path):
+    """Four strokes without a header."""
+    for k in range(4):
+        np.savetxt(tmp_path / f"w{k}.csv", stroke(k), delimiter=",")
+    return tmp_path
+
+
+# The clock
+
+
+def test_a_first_column_that_rises_as_a_clock_is_told_and_the_command_that_follows_takes_it_for_one(bare):
+    said = text(call("inspect", bare))
+    assert "column 'column1': rises steadily, as a clock: if it is one, say --time column1;" in said
+    assert "--state column2,column3 --time column1 --differentiate" in said
+    assert "--state column2,column3" in text(call("inspect", bare, "--state", "column1,column2"))
+    assert "clock-untold" not in text(call("inspect", bare, "--time", "column1"))
+    write(bare / "w0.csv", "x,y,z", stroke(0)[:, [1, 2, 0]])  # neither is what rises elsewhere
+    assert "clock-untold" not in text(call("inspect", bare / "w0.csv"))
+    grid = np.column_stack([np.linspace(0, 1, 40), *np.random.default_rng(0).normal(size=(3, 40))])
+    assert "clock-untold" not in text(call("inspect", write(bare / "w0.csv", "x,y,vx,vy", grid)))  # one that is named
+
+
+def test_that_nothing_tells_the_time_is_said_before_fit_refuses(tmp_path):
+    file = write(tmp_path / "w.csv", "x,y", stroke(0)[:, 1:])
+    said = text(call("inspect", file))
+    assert "fit needs to know more" in said or "Nothing tells the time, which velocities take" in said
+    assert "--rate HZ" in said
+    assert "Nothing tells the time" not in text(call("inspect", file, "--rate", 20))
+
+
+# Rows without numbers
+
+
+def test_rows_without_numbers_are_no_gap_of_the_clock(tmp_path):
+    rows = stroke(0)
+    rows[12:22, 1:] = np.nan
+    [found] = json.loads(run("inspect", write(tmp_path / "w.csv", "t,x,y", rows), *READ, "--json"))
+    told = {one["code"]: one for one in found["warnings"]}
+    assert set(told) == {"missing", "few-demonstrations"}
+    assert told["missing"]["row"] == 12
+    assert told["missing"]["message"].startswith("10 rows without numbers in x, y, empty or NaN,")
+    late = np.delete(stroke(0), slice(12, 22), axis=0)  # they are not there at all
+    [found] = json.loads(run("inspect", write(tmp_path / "w.csv", "t,x,y", late), *READ, "--json"))
+    assert "clock-gap" in [one["code"] for one in found["warnings"]]
+
+
+def test_a_row_without_its_time_is_named_as_any_other(tmp_path):
+    rows = stroke(0)
+    rows[12, 0] = np.nan
+    file, other = write(tmp_path / "w.csv", "t,x,y", rows), write(tmp_path / "v.csv", "t,x,y", stroke(1))
+    said = text(call("inspect", file, *READ))
+    assert "missing: 'w', row 12 (line 14): 1 row without numbers in time" in said
+    assert "does not increase" not in said
+    said = refused("fit", file, other, *READ, "-o", tmp_path / "p.npz")
+    assert said.startswith(f"{file}, row 12 (line 14), column 'time': found nan")
+    assert said.endswith("Or leave it out: --leave-out w")
+
+
+def test_one_row_without_numbers_makes_no_clock_irregular(tmp_path):
+    rows = stroke(0)
+    rows[12, 1] = np.nan
+    assert "irregular" not in text(call("inspect", write(tmp_path / "w.csv", "t,x,y", rows), *READ))
+
+
+# Lines
+
+
+@pytest.mark.parametrize("kind", ["comments", "groups", "blank lines", "Excel"])
+def test_messages_name_the_line_of_the_file(tmp_path, kind):
+    rows = stroke(0).tolist()
+    table = [[*map(str, row)] for row in rows]
+    lines = ["t,x,y", *map(",".join, table)]
+    if kind == "comments":
+        lines[5:5] = ["# looked away", "# and back"]
+        lines = ["# today", *lines]
+    elif kind == "groups":
+        lines = ["demo,t,x,y", *(f"{name},{line}" for name in "ab" for line in lines[1:])]
+    elif kind == "blank lines":
+        lines = [*lines, "", *lines[1:]]
+    at = len(lines) - 3
+    lines[at] = lines[at].rpartition(",")[0] + ","
+    file = tmp_path / "w.csv"
+    file.write_text("\n".join(lines) + "\n")
+    if kind == "Excel":
+        cells = [line.split(",") for line in lines]
+        typed = [[float(cell) if cell else None for cell in line] for line in cells[1:]]
+        file = workbook(tmp_path / "w.xlsx", Messung=[cells[0], *typed])
+    assert f"(line {at + 1}), column 'y': found nan" in refused("fit", file, *READ, "-o", tmp_path / "p.npz")
+    assert f"(line {at + 1}): 1 row without numbers in y" in text(call("inspect", file, *READ))
+
+
+def test_lines_are_those_of_each_row_however_a_text_is_read(tmp_path):
+    rows = np.column_stack([np.arange(200_000) * 0.01, np.random.default_rng(0).normal(size=200_000)])
+    np.savetxt(tmp_path / "plain.csv", rows, fmt="%.6f", delimiter=",", header="t,x", comments="")
+    text_ = (tmp_path / "plain.csv").read_text()
+    (tmp_path / "odd.csv").write_text(text_.replace("\n1999.5", "\n# here\n1999.5", 1))
+    [plain] = uc.read(tmp_path / "plain.csv")
+    [odd] = uc.read(tmp_path / "odd.csv")
+    assert plain.lines.tolist() == list(range(2, 200_002))
+    assert odd.lines.tolist() == [*range(2, 199_952), *range(199_953, 200_003)]
+
+
+# What cannot be learnt from, and files that differ
+
+
+def resting(number):
+    """A stroke that does not begin."""
+    return np.column_stack([stroke(0)[:, 0], np.tile(stroke(number)[0, 1:], (40, 1))])
+
+
+@pytest.mark.parametrize("how", ["at rest", "short", "empty cells"])
+def test_a_recording_that_ends_a_fit_is_named_with_what_leaves_it_out_and_then_fit_goes_on(tmp_path, how):
+    for k in range(4):
+        write(tmp_path / f"w{k}.csv", "t,x,y", stroke(k))
+    odd = {"at rest": resting(5), "short": stroke(5)[:3], "empty cells": stroke(5)}[how]
+    odd[2:, 1] = np.nan if how == "empty cells" else odd[2:, 1]
+    write(tmp_path / "odd one.csv", "t,x,y", odd)
+    asked = (tmp_path, *READ, "--still", "0.5")
+    fit = (*asked, "--model", "affine", "-o", tmp_path / "p.npz")
+    assert refused("fit", *fit).endswith(" Or leave it out: --leave-out 'odd one'")
+    assert refused("fit", *fit, "--leave-out", "w1").endswith(" --leave-out 'w1,odd one'")
+    said = text(call("inspect", *asked))
+    assert "--leave-out 'odd one' -o policy.npz" in said
+    run("fit", *fit, "--leave-out", "odd one")
+
+
+def test_inspect_counts_what_still_leaves(tmp_path):
+    rows = stroke(0)
+    begins = np.vstack([np.tile(rows[0], (20, 1)), rows])
+    begins[:, 0] = 0.05 * np.arange(60)
+    write(tmp_path / "a.csv", "t,x,y", begins)
+    write(tmp_path / "b.csv", "t,x,y", resting(5))
+    demonstration = uc.prepare(uc.read(tmp_path / "a.csv"), uc.Recipe(("x", "y"), differentiate="savgol", still=0.5))
+    left = len(demonstration[0])
+    assert 35 < left < 55
+    found = json.loads(run("inspect", tmp_path, *READ, "--still", "0.5", "--json"))
+    assert [one["left"] for one in found] == [left, 0]
+    said = run("inspect", tmp_path, *READ, "--still", "0.5")
+    assert "left by --still" in said
+    assert f"{left} of 60" in said
+    assert [one["left"] for one in json.loads(run("inspect", tmp_path, *READ, "--json"))] == [None, None]
+
+
+@pytest.mark.parametrize("odd", ["columns", "clock", "size"])
+def test_of_two_files_that_differ_both_are_named_and_none_is_left_out(tmp_path, odd):
+    rows = stroke(1) * {"columns": [1, 1, 1], "clock": [1000, 1, 1], "size": [1, 1000, 1000]}[odd]
+    write(tmp_path / "a.csv", "t,x,y", stroke(0))
+    write(tmp_path / "b.csv", "t,x,yy" if odd == "columns" else "t,x,y", rows)
+    said = text(call("inspect", tmp_path))
+    assert "--leave-out" not in said
+    told = {
+        "columns": "'a' has columns x, y, 'b' x, yy, and which are right cannot be told",
+        "clock": "'b' have 0.02 samples a second, 'a' 20, as in another unit of time, and as many",
+        "size": "times larger than 'a', as in another unit, and as many: convert those that are wrong",
+    }[odd]
+    assert told in said
+
+
+def test_one_of_several_files_with_another_column_is_left_out_and_compared_with_none(tmp_path):
+    for k in range(4):
+        write(
+            tmp_path / f"w{k}.csv",
+            "t,x,y" if k < 3 else "t,x,y1,z",
+            np.hstack([stroke(k), stroke(k)[:, 1 : 1 + k // 3]]),
+        )
+    assert "--leave-out w3" in text(call("inspect", tmp_path))
+
+
+@pytest.mark.parametrize(("command", "code"), [("fit", 2), ("diagnose", 2), ("inspect", 0), ("look", 0)])
+def test_fewer_samples_than_tell_any_policy_are_refused(tmp_path, command, code):
+    file = write(tmp_path / "w.csv", "t,x,y,vx,vy", np.hstack([stroke(0)[:2], stroke(0)[:2, 1:]]))
+    output = {"fit": ("-o", tmp_path / "p.npz"), "look": ("-o", tmp_path / "l.html")}.get(command, ())
+    ran = call(command, file, "--state", "x,y", "--action", "vx,vy", *output)
+    assert ran.code == code
+    assert ("got 2 samples in all, expected at least 3" in ran.err) == bool(code)
+    assert not (tmp_path / "p.npz").exists()
+
+
+def test_a_cycle_that_was_not_shown_is_refused_with_what_shows_one(tmp_path):
+    for k in range(3):
+        t = np.linspace(0, 4, 81)
+        at = np.exp(-1.5 * t)[:, None] * [100.0, 30.0 * (k + 1)]
+        write(tmp_path / f"w{k}.csv", "t,x,y", np.column_stack([t, at]))
+    said = refused("fit", tmp_path, *READ, "--guided", "cycle", "-o", tmp_path / "p.npz")
+    assert said.startswith("--guided: demonstrations make 0.16 turns in the mean, and no cycle is near them.")
+    assert "record whole rounds; or guide it to a goal, or not at all" in said
