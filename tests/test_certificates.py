@@ -113,6 +113,22 @@ def test_nothing_is_promised_of_a_policy_that_only_seems_to_arrive():
     assert "movements end in one place" in found.said
 
 
+def test_ends_a_full_turn_apart_are_one_place(tmp_path):
+    rng = np.random.default_rng(0)
+    angles = rng.uniform(-3.0, 3.0, (200, 1))
+    turns = uc.spaces.Circle()
+    back = uc.LocallyLinearPolicy(None, learner="direct", space=turns).fit(angles, -np.sin(angles))
+    found = uc.certify(back, np.array([[2.0], [8.0], [-7.0]]))
+    assert "movements end in one place" in found.said
+    halves = uc.LocallyLinearPolicy(None, learner="direct", space=turns).fit(angles, -np.sin(2 * angles))
+    assert not uc.certify(halves, np.array([[2.0], [8.0]])).holds
+    assert uc.certify(halves, np.array([[2.0], [8.0]])).start is not None
+    uc.save(back, tmp_path / "turning.npz")
+    told = CliRunner().invoke(main, ["certify", str(tmp_path / "turning.npz")])
+    assert told.exit_code == 1
+    assert "movements end in one place" in told.output
+
+
 def test_on_the_command_line_the_exit_code_says_it(tmp_path):
     uc.save(uc.Guided(POLICY, demonstrations=SHOWN), tmp_path / "guided.npz")
     uc.save(POLICY, tmp_path / "plain.npz")

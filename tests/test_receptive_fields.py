@@ -13,6 +13,7 @@ import unconstrain as uc
 from unconstrain import ReceptiveFields, cover
 from unconstrain.base.errors import InvalidDataError, SettingError
 from unconstrain.models.receptive_fields import choose_variance
+from unconstrain.paper.experiments.recorded.sets import data_sets
 
 
 def states(seed=0, samples=60, n=2):
@@ -124,9 +125,9 @@ def test_the_variance_is_chosen_by_what_is_held_out(monkeypatch):
     compared, tried = uc.Robust.compared, list[int]()
     monkeypatch.setattr(uc.Robust, "compared", lambda self, *of: tried.append(1) or compared(self, *of))
     winds = uc.LocallyLinearPolicy("auto", learner="direct").fit(states, winding, groups=groups)
-    assert len(tried) == 6
+    assert len(tried) == 7
     runs = uc.LocallyLinearPolicy("auto", learner="direct").fit(states, straight, groups=groups)
-    assert len(tried) == 6 + 4  # two that are worse in turn
+    assert len(tried) == 7 + 5  # two that are worse in turn
     assert winds.variance_ == winds.fields_.variance <= usual / 4
     assert runs.variance_ == usual  # many samples: that of one model for all is not much better
     given = uc.LocallyLinearPolicy(centres=winds.fields_.centres, learner="direct").fit(states, straight, groups=groups)
@@ -150,6 +151,34 @@ def test_few_noisy_strokes_of_a_simple_policy_are_not_learnt_in_pieces():
             policy = uc.LocallyLinearPolicy(variance).fit_demonstrations(runs)
             found.append(((policy(states) - wanted) ** 2).sum() / (wanted**2).sum())
     assert np.median(errors["auto"]) < 0.02 < 0.1 < np.median(errors[None])
+
+
+def test_ten_strokes_along_rulers_that_come_to_rest_tell_a_cubic_policy():
+    """Without three of them the others tell next to nothing, so that every candidate misses what is held out."""
+    errors, said = [], []
+    for data in data_sets(1, ["along rulers"], 6):
+        if data.name.startswith("cubic"):
+            policy = data.fit(uc.Robust())
+            errors.append(uc.nupe(policy, data.test))
+            said.append(policy.held_out_score())
+            assert policy.variance_ == "cubic" or said[-1] < 0.3, "where it is not found, that is said"
+    assert np.median(errors) < 0.01
+    assert np.median(said) > 0.9
+
+
+def test_a_cubic_model_is_that_of_cubic_features_and_knows_where_data_is():
+    rng = np.random.default_rng(0)
+    states = rng.normal(size=(200, 2))
+    actions = states**3 @ [[-1.0, 0.5], [-0.5, -1.0]] * np.eye(2)[np.arange(200) % 2]
+    one = uc.LocallyLinearPolicy("cubic", learner="hybrid").fit(states, actions)
+    assert one.variance_ == "cubic"
+    same = uc.ParametricPolicy(uc.Polynomial(3), "hybrid").fit(states, actions)
+    assert_allclose(one(states), same(states), rtol=1e-6)
+    assert_allclose(
+        one.support(states), uc.LocallyLinearPolicy(None, learner="hybrid").fit(states, actions).support(states)
+    )
+    local = uc.LocallyLinearPolicy(learner=uc.Contracting(0.1, [0.0, 0.0])).fit(states, actions)
+    assert local.variance_ != "cubic", "no model that contracts"
 
 
 def test_one_model_for_all_states_is_that_of_affine_features_and_knows_where_data_is():

@@ -48,5 +48,5 @@ def _learnt_at(policy: Any) -> Any:
     n = policy.n_features_in_
     held = getattr(policy, "fields_", None) or policy.features_
     centres = getattr(held, "centres", None)
-    places = np.vstack([np.eye(n), -np.eye(n)]) if centres is None else np.asarray(centres)
+    places = np.vstack([np.eye(n), -np.eye(n)]) if centres is None else policy.space_.states(np.asarray(centres))
     return places if policy.scale_ is None else places * policy.scale_.states

@@ -1,7 +1,7 @@
 """Model of a policy: features and receptive fields, without weights."""
 
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -82,7 +82,7 @@ class Model(Shown):
         A variance of infinity is one model everywhere, "cubic" one of third degree.
         """
         everywhere = variance == "cubic" or variance == np.inf
-        width = choose_variance(coordinates, at_least) if variance is None or everywhere else float(variance)
+        width = choose_variance(coordinates, at_least) if variance is None or everywhere else cast(float, variance)
         if centres is None:
             fields = cover(coordinates, width, at_least)
         else:

@@ -164,12 +164,14 @@ def _refuted(policy: Callable[[Array], Array], starts: Array, normals: Array, ne
         return np.where(np.linalg.norm(states - middle, axis=1, keepdims=True) < far, policy(states), 0.0)
 
     runs = rollout(stopped, starts[free[:, 0]], STEPS, dt, method="euler")
-    goal = np.median([run.states[-1] for run in runs], axis=0)
+    space = getattr(policy, "space_", spaces.Euclidean(starts.shape[1]))  # ends that are turns apart may be one place
+    last = np.stack([run.states[-1] for run in runs])
+    goal = last[0] + np.median(space.difference(last, last[:1]), axis=0)
     units = normals / np.where(free, 1.0, np.linalg.norm(normals, axis=1, keepdims=True))
     starts = starts - units * np.vecdot(units, starts - goal)[:, None]
     runs = rollout(stopped, starts, STEPS, dt, lambda states, _: units[: len(states), None], method="euler")
     ends = np.stack([run.states[-1] for run in runs])
-    away = np.linalg.norm(ends - goal, axis=1) > near
+    away = np.linalg.norm(space.difference(ends, goal[None]), axis=1) > near
     if not away.any():
         return Certificate(False, f"nothing is guaranteed (see uc.Guided), but {TRIES} movements end in one place.")
     at = int(away.argmax())

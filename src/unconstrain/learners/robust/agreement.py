@@ -18,10 +18,10 @@ from .candidate import Candidate
 from .constants import AGREED, MOST_FITTED, NOT_HELD_OUT
 
 
-def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Candidate:
-    """The candidate, judged by agreement where that says that it is right and what was held out says nothing.
+def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Candidate | None:
+    """The candidate, judged by agreement; None unless that says that it is right and what was held out says nothing.
 
-    Its held-out predictions then are such that they miss what is new by as much as agreement says, its refits are all
+    Its held-out predictions are such that they miss what is new by as much as agreement says, its refits are all
     alike, and its variance is that of the posterior.
 
     Parameters
@@ -36,13 +36,13 @@ def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Cand
     residuals = np.einsum("nab,nb->na", projections, samples.actions - policy)
     held_out = np.einsum("nab,nb->na", projections, samples.actions - found.held_out)
     if _square(samples, held_out) < NOT_HELD_OUT * motion or _square(samples, residuals) > AGREED * motion:
-        return found
+        return None
     told, fitted = _numbers(found, samples, projections)
     factors = told / np.maximum(told - fitted, (1.0 - MOST_FITTED) * told)
     idle = samples.shares @ (fitted > MOST_FITTED * told)  # share of models in each prediction that fit anything
     missed = residuals * (samples.shares @ factors)[:, None]
     if _square(samples, missed) + samples.mean(idle * np.vecdot(samples.actions, samples.actions)) > AGREED * motion:
-        return found
+        return None
     from_noise, undetermined = found.posterior.covariances()
     covariances = factors[:, None, None] * from_noise + undetermined
     return replace(

@@ -87,7 +87,8 @@ def by_segments(samples: Samples, projections: Array) -> Candidate:
     Predictions are cross-validated by fold, except for the projections: each is from all samples of its segment.
     """
     errors = [part.constrained(projections[samples.folds == fold]) for fold, part in enumerate(samples.by_fold())]
-    return where_agreed(least_error("segments", samples, errors), samples, projections)
+    found = least_error("segments", samples, errors)
+    return where_agreed(found, samples, projections) or found
 
 
 def least_error(name: str, samples: Samples, errors: Sequence[Quadratic], odds: float = 1.0) -> Candidate:

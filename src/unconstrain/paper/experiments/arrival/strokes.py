@@ -221,9 +221,10 @@ def followed(
 
 
 def _contracting(demos: Demos, goal: Array, policy: uc.LocallyLinearPolicy, softness: float) -> uc.Policy:
-    """In the same fields."""
+    """In the same fields, or usual ones where a cubic model was chosen."""
     learner = uc.Contracting(RATE / _longest(demos), goal, softness)
-    return uc.LocallyLinearPolicy(policy.variance_, learner=learner).fit_demonstrations(demos)
+    width = None if policy.variance_ == "cubic" else policy.variance_
+    return uc.LocallyLinearPolicy(width, learner=learner).fit_demonstrations(demos)
 
 
 def _likeness(paths: Sequence[Array], there: NDArray[np.bool_], strokes: Sequence[Array]) -> dict[str, float | None]:

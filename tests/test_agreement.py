@@ -1,0 +1,102 @@
+"""Few demonstrations that agree on one policy, each of them needed; and those that do not, or tell too little."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import unconstrain as uc
+from unconstrain.learners.robust.agreement import where_agreed
+from unconstrain.learners.robust.consistent import least_error
+from unconstrain.learners.robust.segments import projections_of
+from unconstrain.paper.experiments.recorded.judging import knowledge
+from unconstrain.paper.experiments.recorded.sets import data_sets
+
+STROKES, TIMES = 8, np.linspace(-1.0, 1.0, 40)
+
+
+@cache
+def strokes(policies=1, count=STROKES, noise=1e-3):
+    """Along lines in all directions, (states, actions, groups); each under one of so many cubic policies."""
+    rng = np.random.default_rng(3)
+    cubic = rng.standard_normal((policies, 10, 2))
+    states, actions = [], []
+    for stroke in range(count):
+        along = np.array([np.cos(angle := np.pi * stroke / count), np.sin(angle)])
+        at = rng.uniform(-0.5, 0.5, 2) + TIMES[:, None] * along
+        moves = uc.Polynomial(3)(at) @ cubic[stroke % policies] @ along
+        states.append(at)
+        actions.append(moves[:, None] * along)
+    found = np.concatenate(actions)
+    return np.concatenate(states), found + noise * rng.standard_normal(found.shape), np.repeat(range(count), len(TIMES))
+
+
+@cache
+def candidate(folds=2, **drawn):
+    """By segments, with so many folds of neighbouring directions; its samples and projections."""
+    states, actions, groups = strokes(**drawn)
+    policy = uc.ParametricPolicy(uc.Polynomial(3), uc.NoiseCorrected()).fit(states, actions, groups=groups)
+    samples = policy.training_.samples
+    samples = replace(samples, folds=groups * folds // (groups.max() + 1))
+    projections = projections_of(samples.actions, samples.groups, np.full(len(samples), 1e-6))
+    errors = [part.constrained(projections[samples.folds == fold]) for fold, part in enumerate(samples.by_fold())]
+    return least_error("segments", samples, errors), samples, projections
+
+
+def missed(found, samples, projections):
+    """Share of the motion that held-out predictions miss along the strokes."""
+    off = np.einsum("nab,nb->na", projections, samples.actions - found.held_out)
+    return samples.mean((off**2).sum(axis=1)) / samples.energy
+
+
+def test_what_is_new_is_missed_by_as_much_as_the_naive_formula_says():
+    found, samples, projections = candidate()
+    assert missed(found, samples, projections) > 0.2, "without half of the strokes the others tell too little"
+    judged = where_agreed(found, samples, projections)
+    told, prior = 0.0, found.posterior.floored_prior()[0]
+    whole = sum(
+        samples[samples.groups == g].constrained(projections[samples.groups == g]).hessian[0] for g in range(STROKES)
+    )
+    unit = np.trace(found.posterior.evidence.hessian[0]) / np.trace(whole)
+    for group in range(STROKES):
+        rows = samples.groups == group
+        own = unit * samples[rows].constrained(projections[rows]).hessian[0]
+        told += np.trace(own @ np.linalg.inv(own + prior))
+    fitted = np.trace(unit * whole @ np.linalg.inv(unit * whole + prior))
+    assert 1.5 * fitted < told < 2 * STROKES * 4
+    off = np.einsum("nab,nb->na", projections, samples.actions - samples.predict(found.weights))
+    expected = (told / (told - fitted)) ** 2 * samples.mean((off**2).sum(axis=1)) / samples.energy
+    assert_allclose(missed(judged, samples, projections), expected, rtol=1e-6)
+    assert missed(judged, samples, projections) < 0.02
+    assert_allclose(judged.refits, np.broadcast_to(found.weights, found.refits.shape))
+    assert judged.spread > 0.0
+
+
+@pytest.mark.parametrize(
+    ("drawn", "why"),
+    [
+        ({"policies": 4}, "they do not agree"),
+        ({"count": 5}, "they tell no more than is fitted"),
+        ({"count": 30}, "what is held out says enough"),
+        ({"noise": 2.0}, "noise hides whether they agree"),
+    ],
+)
+def test_nothing_changes_where(drawn, why):
+    found, samples, projections = candidate(**drawn)
+    assert where_agreed(found, samples, projections) is None, why
+
+
+@pytest.mark.slow
+def test_a_policy_that_explains_next_to_nothing_of_what_is_held_out_knows_nothing():
+    known = []
+    for data in data_sets(3, ["along rulers"], 12):
+        policy = data.fit(uc.Robust())
+        if policy.held_out_score() < 0.2:
+            assert policy.solution_.determined_share == 0.0
+            assert knowledge(policy, data, policy)["known"] < 0.1
+        else:
+            known.append(policy.solution_.determined_share)
+    assert 0 < len(known) < 12
+    assert max(known) > 0.3
