@@ -331,7 +331,7 @@ def test_there_is_no_held_out_score_of_a_single_sample():
 def test_speed_power_is_a_sample_weight():
     demos = uc.rollout(LimitCycle(), [[0.1, 0.9], [0.5, -0.5], [-1.0, 0.2]], 30, 0.05)
     states, actions, groups = uc.stack(demos)
-    weighted = uc.LocallyLinearPolicy().fit_demonstrations(demos, speed_power=2.0)
+    weighted = uc.LocallyLinearPolicy(None).fit_demonstrations(demos, speed_power=2.0)
     by_hand = uc.LocallyLinearPolicy(None, learner=uc.Hybrid()).fit(states, actions, (actions**2).sum(axis=1), groups)
     assert_allclose(weighted.predict(states), by_hand.predict(states), rtol=1e-6, atol=1e-9)
 

@@ -507,7 +507,7 @@ def test_what_takes_minutes_is_said_with_what_takes_seconds(monkeypatch):
     states, actions, groups, *_ = draw()
     uc.LocallyLinearPolicy().fit(states, actions, groups=groups)
     monkeypatch.setattr("unconstrain.learners.robust.learner.LONG", 1e3)
-    with pytest.warns(UserWarning, match=r"learners of \d+ models with \d+ weights takes minutes\. An affine policy"):
+    with pytest.warns(UserWarning, match=r"learners of \d+ models? with \d+ weights takes minutes\. An affine policy"):
         uc.LocallyLinearPolicy().fit(states, actions, groups=groups)
 
 

@@ -109,8 +109,11 @@ class Model(Shown):
 
     def _is_small(self, coordinates: Array, actions: int) -> bool:
         """Whether it has at most :data:`MOST_WEIGHTS` weights, and half as many as there are numbers."""
-        most = min(MOST_WEIGHTS, coordinates.shape[0] * actions // 2)
-        return actions * self.features(coordinates[:1]).shape[1] <= most
+        try:
+            weights = actions * self.features(coordinates[:1]).shape[1]
+        except SettingError:  # more monomials than there may be
+            return False
+        return weights <= min(MOST_WEIGHTS, coordinates.shape[0] * actions // 2)
 
     @classmethod
     def of_widths(

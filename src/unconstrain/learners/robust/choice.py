@@ -12,7 +12,9 @@ variance and bias there can be estimated:
 loss_k is the mean square of what held-out motion shows to be missed: the
 residual ``r = ‖u‖ − ûᵀπ̃`` along the action, or ``‖N̂ (u − π̃)‖`` where N̂ is
 known; N̂ is not known exactly, so differences aside from the action that are
-less than the least misfit do not count. variance_k is the jackknife's, from
+less than the least misfit do not count. Where N̂ is one line, û is along it,
+also of samples at rest. Where each of few demonstrations is needed, policies by
+segments are judged by :mod:`.agreement`. variance_k is the jackknife's, from
 the policies learnt without each fold. bias_k compares the candidate with
 others of less bias, j, as Goldenshluger and Lepski do (*Annals of Statistics*
 39(3), 2011):
@@ -199,7 +201,10 @@ class Comparison:
 
     @property
     def _squares(self) -> Array:
-        """Squared lengths of the actions (N,), of those at rest about that of rounding."""
+        """Squared lengths of the actions (N,), of those at rest about that of rounding.
+
+        Usual ones at least where noise does not turn the action: along the line of a demonstration that kept to one.
+        """
         found, usual = np.maximum(self._lengths**2, TINY * self._samples.energy), self._samples.energy
         return np.where(self._on_line, np.maximum(found, usual), found)
 

@@ -112,6 +112,11 @@ MOST_FITTED = 2 / 3
 """Demonstrations agree where held-out motion says nothing, more than the first share of the motion being missed there;
 where one policy misses less than the second share, as expected of what is new; and where it fits less than the third of
 what they tell.
+
+On 24 sets of ten strokes along rulers (seeds that are not reported), cubic features miss 0.06 to 1.5 % of what is new
+by this, and 4 to 6,000 times the motion of what is held out, with nUPE .0000 to .01 in 11 of 12 sets of cubic policies;
+of others 4 to 100 %, but for one (.8 %, nUPE 1.1). On 60 recorded movements nothing changed by it, and with 40
+demonstrations, where held-out motion says enough, local models were chosen wrongly without the first condition.
 """
 
 REFUTED = 1.0
@@ -192,7 +197,11 @@ The same mean over 18 kinds (88 data sets): 1.15 with all of it, 1.14 with 0.7, 
 """
 
 LEAST_EXPLAINED = 0.2
-"""Of a policy that explains less of held-out motion nothing counts as determined."""
+"""Of a policy that explains less of held-out motion nothing counts as determined.
+
+Ordinary regression explains -10 to 16 % on strokes along rulers where it is chosen, and 95 % intervals held the truth
+at 37 to 47 % of what counted as determined. The least share explained on other kinds, right or wrong, was 48 %.
+"""
 
 JACKKNIFE_IN_INTERVALS = 0.7
 """Of the jackknife's variance that counts in intervals.

@@ -351,8 +351,10 @@ class Robust(_Maximising):
                 best = {one: best[one] for one in best if one not in worse}
                 found = _compared(best, views)
             chosen = found.best.name
-            if usual is not None and chosen not in list(best)[-2:]:
-                break
+            if usual is not None and usual in best:
+                finer = {one: best[one] for one in list(best)[list(best).index(usual) :]}
+                if (chosen if chosen in finer else _compared(finer, views).best.name) not in list(finer)[-2:]:
+                    break
         return chosen
 
 
