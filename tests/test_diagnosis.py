@@ -305,7 +305,8 @@ def test_what_fit_and_diagnose_call_told_is_told(variance, kind, seed):
     assert ("as all lie on one plane" in whole.said) == (kind == "one plane")
     if kind == "own planes":
         assert missed < 0.3
-        assert told > 0.5 or np.isinf(policy.variance_)  # which is too stiff for a cycle, and its misfit says so
+        widest = uc.LocallyLinearPolicy(None, learner="direct").fit_demonstrations(demos).variance_
+        assert told > 0.5 or policy.variance_ != widest, "one model is too stiff, and one or two are in narrow fields"
         assert fit.mark is not verdicts.Mark.BAD
         assert ("across" in fit.said) == (told < verdicts.PARTLY and policy.held_out_score() >= verdicts.GOOD)
         assert whole.mark is not verdicts.Mark.BAD
