@@ -205,8 +205,10 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
 
 
 def as_noted(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.Verdict:
-    """The same with what was noted: rest before a start is doubted, and where units differ, it is at best doubtful."""
+    """The same with what was noted: rest before a start, glitches, and units that differ; at best doubtful by these."""
     told = click.get_current_context().meta
+    if jumps := told.get(TITLES, {}).get("glitch"):
+        verdict = uc.evaluation.verdicts.of_glitches(verdict, listed([*jumps], 4))
     if rest := told.get(TITLES, {}).get("rest"):
         said = f"Where {listed([*rest], 4)} stood still before the start: rest is learnt there; --still trims it."
         verdict = verdict._replace(doubt=f"{verdict.doubt} {said}".lstrip())

@@ -26,6 +26,7 @@ OBJECTS = {
     "a smaller dt": "a smaller --dt",
     "goal=, or orbit='shown' for a cycle": "--guided its place, such as --guided 0.1,0, or --guided cycle",
     "Take Hybrid()": "Take --learner hybrid",
+    "the warnings of a survey": "what 'unconstrain inspect' warns of",
 }
 """What is made in Python, and the options that make it."""
 

@@ -257,6 +257,12 @@ def of_units_apart(found: Verdict) -> Verdict:
     return _doubted(found, "recordings are not all in one unit, as the notes say")._replace(next=then)
 
 
+def of_glitches(found: Verdict, names: str) -> Verdict:
+    """Add to a verdict that samples of some demonstrations, by name, are far off their neighbours."""
+    said = f"samples of {names} jump far off their neighbours and back (glitches), and velocities about them are wrong"
+    return _doubted(found, said)._replace(next=f"Add --glitches repair, or drop where many are in a row. {found.next}")
+
+
 def of_forbidden(found: Verdict, share: float) -> Verdict:
     """Add to a score under a constraint that it would not allow some share of the recorded motion, nPOE, if much."""
     said = f"The constraint given forbids {percent(share)} of this motion (nPOE): likely another held it. {found.said}"

@@ -15,7 +15,7 @@ import numpy as np
 from ...base.arrays import Array
 from ...training import Samples
 from .candidate import Candidate
-from .constants import AGREED, MOST_FITTED, NOT_HELD_OUT
+from .constants import AGREED, AGREED_OF_HELD_OUT, MOST_FITTED
 
 
 def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Candidate | None:
@@ -35,13 +35,14 @@ def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Cand
     policy, motion = samples.predict(found.weights), samples.energy
     residuals = np.einsum("nab,nb->na", projections, samples.actions - policy)
     held_out = np.einsum("nab,nb->na", projections, samples.actions - found.held_out)
-    if _square(samples, held_out) < NOT_HELD_OUT * motion or _square(samples, residuals) > AGREED * motion:
+    most = min(AGREED * motion, AGREED_OF_HELD_OUT * _square(samples, held_out))
+    if _square(samples, residuals) > most:
         return None
     told, fitted = _numbers(found, samples, projections)
     factors = told / np.maximum(told - fitted, (1.0 - MOST_FITTED) * told)
     idle = samples.shares @ (fitted > MOST_FITTED * told)  # share of models in each prediction that fit anything
     missed = residuals * (samples.shares @ factors)[:, None]
-    if _square(samples, missed) + samples.mean(idle * np.vecdot(samples.actions, samples.actions)) > AGREED * motion:
+    if _square(samples, missed) + samples.mean(idle * np.vecdot(samples.actions, samples.actions)) > most:
         return None
     from_noise, undetermined = found.posterior.covariances()
     covariances = factors[:, None, None] * from_noise + undetermined

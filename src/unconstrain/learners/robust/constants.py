@@ -106,8 +106,8 @@ CANDIDATE_SOFTNESSES = (1.0, 0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4, 1e-6, 1e-13)
 With five of them (0.3, 0.1, 0.01, 1e-4, 1e-11) the error was the same within a percent on 190 data sets of 20 kinds.
 """
 
-NOT_HELD_OUT = 0.2
 AGREED = 0.02
+AGREED_OF_HELD_OUT = 0.1
 MOST_FITTED = 2 / 3
 """Demonstrations agree where held-out motion says nothing, more than the first share of the motion being missed there;
 where one policy misses less than the second share, as expected of what is new; and where it fits less than the third of
