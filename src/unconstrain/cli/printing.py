@@ -133,7 +133,7 @@ def say_surveys(surveys: Sequence[Any], needed: str, then: str) -> None:
     for words in dict.fromkeys(found.words for found in surveys if found.words):
         click.echo(f"columns of words, which --group can take demonstrations apart by: {', '.join(words)}")
     for found in surveys:
-        if found.non_increasing and "missing" not in {one.code for one in found.warnings}:
+        if found.non_increasing and not any(one.row == found.non_increasing[0] for one in found.warnings):
             click.echo(f"{found.title}: time does not increase at row {found.non_increasing[0]}.")
     each = [(found.title, remark) for found in surveys for remark in (*found.warnings, *found.notes)]
     several = {title for title, remark in each if remark.code == "several-in-one"}

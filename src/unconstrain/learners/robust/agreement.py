@@ -39,8 +39,8 @@ def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Cand
     if _square(samples, residuals) > most:
         return None
     told, fitted = _numbers(found, samples, projections)
-    factors = told / np.maximum(told - fitted, (1.0 - MOST_FITTED) * told)
-    idle = samples.shares @ (fitted > MOST_FITTED * told)  # share of models in each prediction that fit anything
+    factors = told / np.maximum(told - fitted, np.maximum((1.0 - MOST_FITTED) * told, 1e-300))
+    idle = samples.shares @ (fitted >= MOST_FITTED * told)  # share of models in each prediction that fit anything
     missed = residuals * (samples.shares @ factors)[:, None]
     if _square(samples, missed) + samples.mean(idle * np.vecdot(samples.actions, samples.actions)) > most:
         return None

@@ -105,8 +105,9 @@ class Comparison:
         self._views = [samples] * len(candidates) if isinstance(samples, Samples) else list(samples)
         self._samples = samples = self._views[0]
         self._held, self._seen = held_throughout(samples.actions, samples.groups, beyond_misfit(noise, samples))
-        self._on_line = self._held & (np.einsum("naa->n", self._seen) < 1.5)
-        moved = np.einsum("nab,nb->na", self._seen, samples.actions)
+        held, seen = held_throughout(samples.actions, samples.groups, noise)  # as far as noise tells, not misfit
+        self._on_line = held & (np.einsum("naa->n", seen) < 1.5)
+        moved = np.einsum("nab,nb->na", seen, samples.actions)
         self._directions, self._lengths = unit_actions(np.where(self._on_line[:, None], moved, samples.actions))
         self._held_out = np.stack([one.held_out for one in candidates])
         self._residuals = self._lengths - (self._held_out * self._directions).sum(axis=2)

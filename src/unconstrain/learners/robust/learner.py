@@ -2,7 +2,7 @@
 
 import warnings
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal, Self
 
@@ -347,8 +347,8 @@ class Robust(_Maximising):
                 break
             best[name] = replace(Robust().compared(views[name], training).best, name=name, softness=0.0)
             found = _compared(best, views)
-            if name == usual and (worse := [one for one in best if one != name and not found.refutes(one, name)]):
-                best = {one: best[one] for one in best if one not in worse}
+            if name == usual:
+                best = {one: best[one] for one in (*_simplest(found, list(best)), name)}
                 found = _compared(best, views)
             chosen = found.best.name
             if usual is not None and usual in best:
@@ -356,6 +356,15 @@ class Robust(_Maximising):
                 if (chosen if chosen in finer else _compared(finer, views).best.name) not in list(finer)[-2:]:
                     break
         return chosen
+
+
+def _simplest(found: Comparison, names: Sequence[str]) -> list[str]:
+    """Of models that refute the last: the first that none of the others refutes, if any."""
+    kept: list[str] = []
+    for one in names[:-1]:
+        if found.refutes(one, names[-1]) and (not kept or found.refutes(one, kept[0])):
+            kept = [one]
+    return kept
 
 
 def _trusted(training: Training) -> tuple[Training, NDArray[np.intp]]:
