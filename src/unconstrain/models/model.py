@@ -17,6 +17,9 @@ from .spaces import Embedding
 MOST_WEIGHTS = 500
 """Models of more weights are not chosen from."""
 
+MOST_FEATURE = 1e20
+"""Models of larger features at a state of ones are not chosen from: states in units so far off have no cubes."""
+
 NARROWER = (1, 2, 4, 8, 16)
 """Variances of fields that are tried, as shares of the default one."""
 
@@ -108,12 +111,13 @@ class Model(Shown):
         return {"affine": placed["affine"]} | few | {"local": cls.local(coordinates, embedding=embedding)}
 
     def _is_small(self, coordinates: Array, actions: int) -> bool:
-        """Whether it has at most :data:`MOST_WEIGHTS` weights, and half as many as there are numbers."""
+        """Whether it has few weights, half as many as there are numbers at most, and moderate features."""
         try:
-            weights = actions * self.features(coordinates[:1]).shape[1]
+            features = self.features(np.vstack([coordinates[:1], np.ones_like(coordinates[:1])]))
         except SettingError:  # more monomials than there may be
             return False
-        return weights <= min(MOST_WEIGHTS, coordinates.shape[0] * actions // 2)
+        few = actions * features.shape[1] <= min(MOST_WEIGHTS, coordinates.shape[0] * actions // 2)
+        return few and bool(np.abs(features).max() < MOST_FEATURE)
 
     @classmethod
     def of_widths(
