@@ -266,6 +266,8 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
             else "nothing could be held out."
         )
     )
+    for note in solution.notes:
+        click.echo(note)
     if verbose and solution.belief is not None:
         rows = sorted((one.risk, name) for name, one in solution.candidates.items())
         told = [[name, f"{risk:.4g}", uc.evaluation.diagnosis.in_words(name)] for risk, name in rows]

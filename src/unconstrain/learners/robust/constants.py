@@ -109,14 +109,12 @@ With five of them (0.3, 0.1, 0.01, 1e-4, 1e-11) the error was the same within a 
 AGREED = 0.02
 AGREED_OF_HELD_OUT = 0.1
 MOST_FITTED = 2 / 3
-"""Demonstrations agree where held-out motion says nothing, more than the first share of the motion being missed there;
-where one policy misses less than the second share, as expected of what is new; and where it fits less than the third of
-what they tell.
+"""Demonstrations agree on a policy that misses less than the first share of the motion, as expected of what is new, and
+less than the second share of what held-out predictions miss, and that fits less than the third share of what they tell.
 
 On 24 sets of ten strokes along rulers (seeds that are not reported), cubic features miss 0.06 to 1.5 % of what is new
 by this, and 4 to 6,000 times the motion of what is held out, with nUPE .0000 to .01 in 11 of 12 sets of cubic policies;
-of others 4 to 100 %, but for one (.8 %, nUPE 1.1). On 60 recorded movements nothing changed by it, and with 40
-demonstrations, where held-out motion says enough, local models were chosen wrongly without the first condition.
+of others 4 to 100 %, but for one (.8 %, nUPE 1.1). Of 60 recorded movements one or two were learnt otherwise.
 """
 
 REFUTED = 1.0

@@ -43,6 +43,11 @@ THINNED = (
     "what solution_.free is about; those that look wrong are left out, but not listed."
 )
 
+BY_AGREEMENT = (
+    "Without some of the demonstrations the others tell too little of these to be held out. What is said of held-out "
+    "motion is what to expect since all agree on one policy (generalised cross-validation)."
+)
+
 
 @dataclass(frozen=True)
 class SampleLearner(Learner):
@@ -68,14 +73,16 @@ class SampleLearner(Learner):
 
     def _learnt(self, training: Training, everything: Samples) -> Solution:
         samples = held_out_together(everything.counted)
+        agreed: tuple[str, ...] = ()
         if _trivial(samples):
             found = self._plain(training, samples, everything)
         else:
             chosen, more = self.candidate(samples, training)
+            agreed = () if chosen.spread is None else (BY_AGREEMENT,)
             more["held_out_score"] = _explained(samples, chosen)
             second = None if self.secondary is None else on(self.secondary, training)(training.folds.whole)
             found = solution(chosen, samples, everything, training.model, second, **more)
-        return replace(found, notes=everything.notes)
+        return replace(found, notes=(*everything.notes, *agreed))
 
     def _plain(self, training: Training, samples: Samples, everything: Samples) -> Solution:
         """The hybrid's solution, with a belief from its residuals."""
