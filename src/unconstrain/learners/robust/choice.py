@@ -202,10 +202,7 @@ class Comparison:
 
     @property
     def _squares(self) -> Array:
-        """Squared lengths of the actions (N,), of those at rest about that of rounding.
-
-        Usual ones at least where noise does not turn the action: along the line of a demonstration that kept to one.
-        """
+        """Squared lengths of actions (N,), at least of rounding; along a line, which noise does not turn, usual ones."""
         found, usual = np.maximum(self._lengths**2, TINY * self._samples.energy), self._samples.energy
         return np.where(self._on_line, np.maximum(found, usual), found)
 
