@@ -202,7 +202,7 @@ class Comparison:
 
     @property
     def _squares(self) -> Array:
-        """Squared lengths of actions (N,), at least of rounding; along a line, which noise does not turn, usual ones."""
+        """Squared lengths of actions (N,), at least of rounding; along lines, which noise does not turn, usual ones."""
         found, usual = np.maximum(self._lengths**2, TINY * self._samples.energy), self._samples.energy
         return np.where(self._on_line, np.maximum(found, usual), found)
 
