@@ -12,12 +12,14 @@ from .outlines import Outline
 FEWEST, MOST_COLUMNS = 5, 12
 """Demonstrations that it takes, and columns beyond which there are too many pairs to try."""
 
-FAR, NEARER, ALIKE = 2.0, 4.0, 1.5
+FAR, NEARER, ALIKE = 2.0, 5.0, 1.5
 """It is farther from the others than each of these by the first factor, and exchanged nearer by the second and within
 the third of these. What comes as near, to within that, is named, too; nothing is if it comes nearer by the first factor
 when it is played backwards.
 
-Of 630 recorded movements beside others of their kind none is so. Put in, 83 % are found."""
+With a second factor of 4 none of 630 recorded movements beside others of their kind was so, and 83 % were found that
+were put in. Of the 80 sets of such a fault in the tests 5 finds the same 77, and one fewer of 160 others is taken for it.
+"""
 
 
 def exchanged(outlines: Sequence[Outline]) -> tuple[int, list[tuple[int, int]]] | None:
