@@ -17,9 +17,8 @@ FAR, NEARER, ALIKE = 2.0, 5.0, 1.5
 the third of these. What comes as near, to within that, is named, too; nothing is if it comes nearer by the first factor
 when it is played backwards.
 
-With a second factor of 4 none of 630 recorded movements beside others of their kind was so, and 83 % were found that
-were put in. Of the 80 sets of such a fault in the tests 5 finds the same 77, and one fewer of 160 others is taken for it.
-"""
+With a second factor of 4, none of 630 recorded movements is so beside others of their kind; put in, 83 % were found. Of
+80 sets with it in the tests 5 finds as many, and one fewer without it."""
 
 
 def exchanged(outlines: Sequence[Outline]) -> tuple[int, list[tuple[int, int]]] | None:
