@@ -73,7 +73,7 @@ OTHERWISE = [{"size": 1.4}, {"size": 0.7}, {"pace": 1.4}, {"pace": 0.7}]
 
 @pytest.mark.parametrize(
     ("how", "near", "mark", "words"),
-    [(how, {"abs": 0.05}, Mark.GOOD, " mm away") for how in NEARLY]
+    [(how, {"abs": 0.05}, Mark.GOOD, " mm from the recorded path") for how in NEARLY]
     + [(how, {"rel": 0.1}, Mark.DOUBTFUL, "more than 20% off: ") for how in OTHERWISE],
 )
 def test_ovals_of_another_size_or_pace_are_no_good_however_much_they_explain(folder, how, near, mark, words):
@@ -95,7 +95,7 @@ def test_the_page_of_a_fit_shows_and_says_how_large_its_ovals_are(folder, browse
     assert "replays" in [one["id"] for one in opened(browser, page, tmp_path)]
     above = browser.find_element("xpath", "//h2[.='From where demonstrations start']/following-sibling::p").text
     assert float(re.search(r"size ([\d.]+) times", above)[1]) == pytest.approx(size, abs=0.1)
-    assert " mm away" in above
+    assert " mm from the recorded path" in above
     assert "no motion along directions" in browser.find_element("id", "replays").text
     sign = browser.find_element("css selector", ".verdict").text[0]
     assert sign == ("✔" if size == 1.0 else "!")

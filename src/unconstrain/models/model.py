@@ -17,7 +17,7 @@ from .spaces import Embedding
 MOST_WEIGHTS = 500
 """Models of more weights are not chosen from."""
 
-MOST_FEATURE = 1e20
+MOST_FEATURE = 1e60
 """Models of larger features at a state of ones are not chosen from: states in units so far off have no cubes."""
 
 NARROWER = (1, 2, 4, 8, 16)

@@ -32,6 +32,8 @@ def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Cand
     projections : ndarray, shape (N, d, d)
         Of that error.
     """
+    if len(found.weights) > 1:  # in narrow fields demonstrations are alone, and lines: agreement there is chance
+        return None
     policy, motion = samples.predict(found.weights), samples.energy
     residuals = np.einsum("nab,nb->na", projections, samples.actions - policy)
     held_out = np.einsum("nab,nb->na", projections, samples.actions - found.held_out)
@@ -39,10 +41,11 @@ def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Cand
     if _square(samples, residuals) > most:
         return None
     told, fitted = _numbers(found, samples, projections)
-    factors = told / np.maximum(told - fitted, np.maximum((1.0 - MOST_FITTED) * told, 1e-300))
-    idle = samples.shares @ (fitted >= MOST_FITTED * told)  # share of models in each prediction that fit anything
-    missed = residuals * (samples.shares @ factors)[:, None]
-    if _square(samples, missed) + samples.mean(idle * np.vecdot(samples.actions, samples.actions)) > most:
+    if fitted.sum() >= MOST_FITTED * told.sum():
+        return None
+    factors = told / (told - fitted)
+    missed = factors * residuals
+    if _square(samples, missed) > most:
         return None
     from_noise, undetermined = found.posterior.covariances()
     covariances = factors[:, None, None] * from_noise + undetermined
