@@ -330,7 +330,7 @@ def test_a_policy_is_recovered_from_behind_constraints(which):
         assert uc.nupe(policy, others) < 1e-12
     else:  # of orientations away from half a turn, rotation vectors are a chart in which this policy is nearly linear
         plain = [[_as_vectors(demo) for demo in held(which, seed)] for seed in (11, 12)]
-        straight = uc.LocallyLinearPolicy().fit_demonstrations(plain[0])
+        straight = uc.LocallyLinearPolicy(None).fit_demonstrations(plain[0])  # local models as well
         assert uc.nupe(policy, others) < 10.0 * uc.nupe(straight, plain[1])
 
 
