@@ -94,8 +94,9 @@ FAR = np.array([[0.0, 0.0], [1e3, -1e3], [1e12, 1e12], [-1e25, 0.0]])
 
 
 def assert_finite(policy, states):
-    if isinstance(policy.features_, uc.Polynomial):
-        states = np.sign(states) * np.abs(states) ** (1 / policy.features_.degree)  # whose features are as large
+    if isinstance(of := policy.features_, uc.Polynomial):
+        own = (states - of.centre) / of.scale
+        states = of.centre + of.scale * np.sign(own) * np.abs(own) ** (1 / of.degree)  # whose features are as large
     assert np.isfinite(policy.solution_.weights).all()
     assert np.isfinite(policy.predict(states)).all()
     assert 0 <= policy.solution_.determined_share <= 1

@@ -169,8 +169,10 @@ def _to_fit(
     more += ["--time", *clock] if clock else ["--rate", "HZ"] * timeless
     more += [] if actions or recipe.differentiate else ["--differentiate"]
     more += ["--leave-out", ",".join(left_out)] if left_out else []
-    more += ["--glitches", "repair"] * any(remark.code == "glitch" for one in surveys for remark in one.warnings)
-    wrong = [name for name, right in (("state", states), ("action", actions), ("leave_out", not left_out)) if not right]
+    jumps = any(remark.code == "glitch" for one in surveys for remark in one.warnings)
+    more += ["--glitches", "repair"] * jumps
+    right = {"state": states, "action": actions, "leave_out": not left_out, "glitches": not jumps}
+    wrong = [name for name, fine in right.items() if not fine]
     return next_command("fit", *more, "-o", "policy.npz", without=wrong)
 
 

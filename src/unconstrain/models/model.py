@@ -17,9 +17,6 @@ from .spaces import Embedding
 MOST_WEIGHTS = 500
 """Models of more weights are not chosen from."""
 
-MOST_FEATURE = 1e60
-"""Models of larger features at a state of ones are not chosen from: states in units so far off have no cubes."""
-
 NARROWER = (1, 2, 4, 8, 16)
 """Variances of fields that are tried, as shares of the default one."""
 
@@ -111,13 +108,12 @@ class Model(Shown):
         return {"affine": placed["affine"]} | few | {"local": cls.local(coordinates, embedding=embedding)}
 
     def _is_small(self, coordinates: Array, actions: int) -> bool:
-        """Whether it has few weights, half as many as there are numbers at most, and moderate features."""
+        """Whether it has at most :data:`MOST_WEIGHTS` weights, and half as many as there are numbers."""
         try:
-            features = self.features(np.vstack([coordinates[:1], np.ones_like(coordinates[:1])]))
+            weights = actions * self.features(coordinates[:1]).shape[1]
         except SettingError:  # more monomials than there may be
             return False
-        few = actions * features.shape[1] <= min(MOST_WEIGHTS, coordinates.shape[0] * actions // 2)
-        return few and bool(np.abs(features).max() < MOST_FEATURE)
+        return weights <= min(MOST_WEIGHTS, coordinates.shape[0] * actions // 2)
 
     @classmethod
     def of_widths(
@@ -140,7 +136,8 @@ class Model(Shown):
         widest = choose_variance(coordinates, at_least)
         found = {}
         if centres is None:
-            affine, cubic = (cls.local(coordinates, one, at_least, embedding=embedding) for one in (np.inf, "cubic"))
+            affine = cls.local(coordinates, np.inf, at_least, embedding=embedding)
+            cubic = replace(affine, features=Polynomial(3).place(coordinates))
             found = {"affine": affine} | ({"cubic": cubic} if cubic._is_small(coordinates, actions) else {})
         for share in NARROWER:
             one = cls.local(coordinates, widest / share, at_least, centres, embedding)

@@ -41,19 +41,18 @@ def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Cand
     if _square(samples, residuals) > most:
         return None
     told, fitted = _numbers(found, samples, projections)
-    if fitted.sum() >= MOST_FITTED * told.sum():
+    if fitted >= MOST_FITTED * told:
         return None
-    factors = told / (told - fitted)
-    missed = factors * residuals
+    factor = told / (told - fitted)
+    missed = factor * residuals
     if _square(samples, missed) > most:
         return None
     from_noise, undetermined = found.posterior.covariances()
-    covariances = factors[:, None, None] * from_noise + undetermined
     return replace(
         found,
         held_out=policy + residuals - missed,
         refits=np.repeat(found.weights[None], len(found.refits), axis=0),
-        spread=samples.mean(_variances(samples, covariances)),
+        spread=_spread(samples, factor * from_noise[0] + undetermined[0]),
     )
 
 
@@ -62,29 +61,25 @@ def _square(samples: Samples, residuals: Array) -> float:
     return samples.mean(np.vecdot(residuals, residuals))
 
 
-def _numbers(found: Candidate, samples: Samples, projections: Array) -> tuple[Array, Array]:
-    """How many numbers of each model's policy the demonstrations tell, each on its own, and how many are fitted, (M,).
+def _numbers(found: Candidate, samples: Samples, projections: Array) -> tuple[float, float]:
+    """How many numbers of the policy the demonstrations tell, each on its own, E, and how many are fitted, P.
 
     A direction of the weights counts as far as the data says more of it than the prior.
     """
     groups = (samples.groups == group for group in np.unique(samples.groups))
-    alone = np.stack([samples[rows].constrained(projections[rows]).hessian for rows in groups])
-    evidence, prior = found.posterior.evidence.hessian, found.posterior.floored_prior()
-    whole = np.maximum(np.einsum("gmii->m", alone), 1e-300)
-    alone *= (np.einsum("mii->m", evidence) / whole)[:, None, None]  # over the variance, as the evidence is
+    alone = np.stack([samples[rows].constrained(projections[rows]).hessian[0] for rows in groups])
+    evidence, prior = found.posterior.evidence.hessian[0], found.posterior.floored_prior()[0]
+    alone *= np.trace(evidence) / max(float(np.einsum("gii->", alone)), 1e-300)  # over the variance, as the evidence is
 
-    def count(information: Array) -> Array:
-        return np.einsum("...ii->...", np.linalg.solve(information + prior, information))
+    def count(information: Array) -> float:
+        return float(np.trace(np.linalg.solve(information + prior, information), axis1=-2, axis2=-1).sum())
 
-    return count(alone).sum(axis=0), count(evidence)
+    return count(alone), count(evidence)
 
 
-def _variances(samples: Samples, covariances: Array) -> Array:
-    """Variance of the prediction at each sample, summed over the action, (N,), by covariances of weights (M, P, P)."""
-    models, d, p = len(covariances), samples.actions.shape[1], samples.regressors
-    of_each = np.einsum("mpdqd->mpq", covariances.reshape(models, p, d, p, d))
-    found = np.zeros(len(samples))
-    for m, centring in enumerate(samples.centring):
-        own = samples.features @ centring.T
-        found += samples.shares[:, m] ** 2 * np.vecdot(own @ of_each[m], own)
-    return found
+def _spread(samples: Samples, covariance: Array) -> float:
+    """Mean variance of the predictions, summed over the action, by a covariance of the weights (P, P)."""
+    d, p = samples.actions.shape[1], samples.regressors
+    own = samples.features @ samples.centring[0].T
+    of_each = np.einsum("pdqd->pq", covariance.reshape(p, d, p, d))
+    return samples.mean(np.vecdot(own @ of_each, own))

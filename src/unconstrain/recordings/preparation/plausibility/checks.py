@@ -94,10 +94,8 @@ def clock_untold(subject: Subject) -> Remark | None:
     """A first column that rises as a clock does, where none is known."""
     recording = subject.recording
     name, steps = recording.columns[0], np.diff(recording.values[:, 0])
-    used, titled = (
-        name in (subject.recipe.states or (name,)),
-        "no-header" not in [one.code for one in recording.remarks],
-    )
+    used = name in (subject.recipe.states or (name,))
+    titled = "no-header" not in [one.code for one in recording.remarks]
     meant = (titled and subject.recipe.actions) if used else subject.recipe.rate
     if (
         meant
