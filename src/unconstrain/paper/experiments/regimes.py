@@ -7,7 +7,6 @@ actions without noise. No learner that is judged here may take differences of st
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -34,7 +33,7 @@ from ..systems.limit_cycle import LimitCycle
 from ..systems.pendulum import Pendulum
 from . import toy
 from .journal import Journal
-from .trials import Progress, Result, errors_of, reproduced, row, run_trials
+from .trials import Progress, Result, candidate_of, errors_of, reproduced, row, run_trials
 from .truths import true_policy, true_projections, was_free, with_noise
 
 PLANAR = ("none", "random", "half", "quarter free", "0.1", "0.3", "0.6", "1", "1.5")
@@ -362,12 +361,7 @@ def _best(policy: uc.Policy, test: Sequence[uc.Demonstration], found: Sequence[A
 
 def _compared(name: str, policy: uc.Policy, learner: uc.Learner) -> uc.Policy:
     """What a learner makes of the samples: that of the default learner's candidates, if it is among them."""
-    found = policy.solution_.candidates.get(name)
-    if found is None:
-        return policy.with_learner(learner)
-    own = copy(policy)
-    own.solution_ = replace(policy.solution_, weights=found.weights, method=name)
-    return own
+    return candidate_of(policy, name) if name in policy.solution_.candidates else policy.with_learner(learner)
 
 
 def _policy(system: str) -> uc.Policy:

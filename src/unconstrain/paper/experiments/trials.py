@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from copy import copy
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -110,6 +111,13 @@ def errors(
 def errors_of(policy: uc.Policy, demonstrations: Sequence[uc.Demonstration]) -> tuple[float, float, float]:
     """The three normalised errors of a policy, in the order of :data:`METRICS`."""
     return uc.nupe(policy, demonstrations), uc.ncpe(policy, demonstrations), uc.ninconsistency(policy, demonstrations)
+
+
+def candidate_of(policy: uc.Policy, name: str) -> uc.Policy:
+    """What one of the default learner's candidates makes of the samples that a policy was learnt from."""
+    own, found = copy(policy), policy.solution_
+    own.solution_ = replace(found, weights=found.candidates[name].weights, method=name)
+    return own
 
 
 def row(method: str, values: Sequence[Sequence[float]], **where: Any) -> dict[str, Any]:

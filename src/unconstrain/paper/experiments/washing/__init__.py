@@ -7,7 +7,7 @@ seen; and the arm wipes with it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -173,9 +173,16 @@ def headlines(result: Result) -> list[str]:
                 said.append(
                     f"{label} on unseen surfaces{of}, mean: {values}; hybrid is {ratio:.2f} times direct, "
                     f"{better:.2f} times the better of the two; robust, with nothing to set, is "
-                    f"{means['robust'] / means['direct']:.2f} times direct"
+                    f"{means['robust'] / means['direct']:.2f} times direct{_at_best(means)}"
                 )
     return said + [_said(name, rows) for name, rows in _by_surface(result.tables["reproduction"]).items()]
+
+
+def _at_best(means: Mapping[str, float]) -> str:
+    if learning.BEST not in means:
+        return ""
+    least = means[learning.BEST] / means["direct"]
+    return f", where the best of its candidates, known only afterwards, would be {least:.2f} times direct"
 
 
 WITHOUT_PHYSICS = (
