@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+import unconstrain as uc
 from unconstrain import training
 
 
@@ -71,3 +72,27 @@ def samples_of(data, groups=None, features=None, models=1):
 def seen(folds):
     """What a learner that needs sums alone looks at."""
     return SimpleNamespace(folds=folds)
+
+
+def on_plates(normals, policy, noise=0.0):
+    """Strokes of a policy in three dimensions, each in a plane of its own."""
+    rng, demos, angle = np.random.default_rng(3), [], np.linspace(0, 6, 60)
+    circle = np.column_stack([np.cos(angle), np.sin(angle), np.cos(angle + 1)])
+    for normal in np.array(normals):
+        onto = np.eye(3) - np.outer(normal, normal) / (normal @ normal)
+        states = (circle + rng.uniform(-0.5, 0.5, 3)) @ onto
+        demos.append(uc.Demonstration(states, policy(states) @ onto + rng.normal(0, noise, (60, 3))))
+    return demos
+
+
+def turning(states):
+    """A policy in three dimensions."""
+    return states @ np.array([[-1.0, 0.8, 0.2], [-0.8, -1.0, 0.5], [-0.2, -0.5, -0.8]]).T
+
+
+PLATES = [(0.0, 0.0, 1.0), (0.4, 0.0, 1.0), (0.0, -0.5, 1.0)]
+
+
+def off_everywhere(states):
+    """Another policy than :func:`turning`, in all directions."""
+    return turning(states) + np.stack([states[:, 1], 0.5 * states[:, 0], 0.0 * states[:, 0]], axis=1)

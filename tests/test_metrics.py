@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 import naive
 import unconstrain as uc
-from samples import draw
+from samples import PLATES, draw, off_everywhere, on_plates, turning
 from unconstrain.base.errors import InvalidDataError, SettingError
 from unconstrain.constraints.known import Plane
 from unconstrain.risks import along_motion
@@ -290,3 +290,31 @@ def test_a_fit_counts_what_it_holds_out_in_the_same_way(monkeypatch):
     monkeypatch.setattr("unconstrain.risks.projection.TURNED", 0.0)
     unknown = policy.fit_demonstrations(demos).held_out_score()
     assert known > unknown + 0.1
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+def test_in_planes_of_their_own_all_errors_but_those_across_are_seen(noise):
+    demos = on_plates(PLATES, turning, noise)
+    shares = uc.evaluation.metrics.explained_in_planes(off_everywhere, demos)
+    for demo, share, normal in zip(demos, shares, PLATES, strict=True):
+        missed = uc.metrics.cpe(off_everywhere, demo, uc.constraints.Plane(normal)) / (demo.actions**2).sum()
+        assert share == pytest.approx(1.0 - missed, abs=1e-3)
+        assert share < 1.0 - uc.metrics.inconsistency(off_everywhere, demo) / (demo.actions**2).sum() - 0.02
+        (alone,) = uc.evaluation.metrics.explained_in_planes(
+            off_everywhere, [demo]
+        )  # the policy itself leaves the plane
+        assert alone == pytest.approx(share, abs=1e-3)
+    assert uc.evaluation.metrics.explained_in_planes(turning, demos).min() > 1.0 - 10 * noise - 1e-9
+
+
+@pytest.mark.parametrize(
+    ("policy", "demos"),
+    [
+        (turning, on_plates([(0.0, 0.0, 1.0)], turning, 0.5)),  # noise hides whether it was held
+        (lambda states: turning(states) * [1.0, 1.0, 0.0], on_plates([(0.0, 0.0, 1.0)], turning)),  # nobody leaves it
+        (turning, [uc.Demonstration(np.eye(3), np.eye(3)[[0, 0, 0]])]),  # a line
+        (turning, [uc.Demonstration(np.eye(3), turning(np.eye(3)))]),  # free
+    ],
+)
+def test_what_kept_to_no_plane_is_not_judged_in_one(policy, demos):
+    assert np.isnan(uc.evaluation.metrics.explained_in_planes(policy, demos)).all()

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import unconstrain as uc
+from samples import PLATES, off_everywhere, on_plates, turning
 from seen import below
 from unconstrain import cli
 from unconstrain.base.errors import InvalidDataError
@@ -263,3 +264,40 @@ def test_a_column_that_is_not_there_has_a_neighbour(asked, meant):
 def test_what_is_like_nothing_has_none():
     with pytest.raises(InvalidDataError, match=r"no column 'force'; it has x, y\. Name those of this file"):
         Recording(("x", "y"), np.zeros((2, 2)), name="a").select(["force"])
+
+
+def test_a_score_tells_what_recordings_show_in_all_directions_of_their_planes():
+    found, none = verdicts.of_score(0.97, 4), np.full(4, np.nan)
+    fine, poor = (verdicts.of_planes(found, np.array([share, share, share, np.nan])) for share in (0.95, 0.6))
+    assert verdicts.of_planes(found, none) == found
+    assert (fine.mark, fine.said) == (found.mark, found.said)
+    assert fine.trust.endswith(
+        "In all directions of the planes that 3 of 4 demonstrations kept to, the policy explains 95% of the motion."
+    )
+    assert (poor.mark, poor.trust) == (Mark.DOUBTFUL, found.trust)
+    assert poor.said.endswith(
+        "But in all directions of the planes that 3 of 4 demonstrations kept to, the policy explains 60% of the "
+        "motion, unless more than a plane held them."
+    )
+    assert "of the plane that it kept to, the policy explains" in verdicts.of_planes(found, np.array([0.95])).trust
+
+
+def test_the_command_scores_recordings_in_their_planes(tmp_path):
+    policy = uc.ParametricPolicy(uc.Affine(), uc.Direct())
+    states = np.random.default_rng(0).uniform(-1, 1, (40, 3))
+    for name, moved in (("right", turning), ("off", off_everywhere)):
+        uc.storage.save(policy.fit(states, moved(states)), tmp_path / f"{name}.npz")
+    for place, demo in enumerate(on_plates(PLATES, turning)):
+        table = np.column_stack([np.arange(60), demo.states, demo.actions])
+        np.savetxt(tmp_path / f"{place}.csv", table, delimiter=",", header="t,x,y,z,vx,vy,vz", comments="")
+    files = [tmp_path / f"{place}.csv" for place in range(3)]
+    options = ["--state", "x,y,z", "--action", "vx,vy,vz", "--json"]
+    right, wrong = (
+        json.loads(call("score", tmp_path / f"{name}.npz", *files, *options).stdout) for name in ("right", "off")
+    )
+    assert right["in_planes"] == pytest.approx([1.0] * 3)
+    assert max(wrong["in_planes"]) < 0.9
+    assert "unless more than a plane held them" in wrong["verdict"]["said"]
+    assert "In all directions of the planes that 3 of 3" in right["verdict"]["trust"]
+    known = json.loads(call("score", tmp_path / "off.npz", files[0], *options, "--plane", "0,0,1").stdout)
+    assert "plane held" not in known["verdict"]["said"]  # it is given

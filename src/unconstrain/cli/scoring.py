@@ -52,15 +52,17 @@ def score(
     with shown("scoring"):
         rows = [_scores(moving, held, [demo], demo.name) for demo in demonstrations]
         whole = _scores(moving, held, demonstrations, "all")
+        planes = uc.evaluation.metrics.explained_in_planes(moving, demonstrations)
     known, under = learnt_from(learnt, notes, recordings), None if held is None else 1.0 - whole["ncpe"]
     more = under, None if known is None else len(known), notes.get(TOLD)
     judged = verdicts.of_score(whole["explains"], len(demonstrations), *more)
     judged = verdicts.of_worst(judged, {row["demonstration"]: row["explains"] for row in rows})
+    judged = judged if held is not None else verdicts.of_planes(judged, planes)
     with shown("running it from the same starts"):
         found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units)
     verdict = verdicts.of_unit(verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0)), _times(learnt, states))
     if as_json:
-        told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known}
+        told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known, "in_planes": _known(planes)}
         click.echo(json.dumps({**told, "replayed": found.medians, "verdict": verdict.to_json()}, indent=2))
         return
     say_verdict(verdict)
@@ -75,6 +77,11 @@ def _scores(moving: Any, held: Any, of: Sequence[uc.Demonstration], name: str) -
     found = {"demonstration": name, "samples": sum(map(len, of)), "explains": explained(moving, of)}
     found["ninc"] = uc.ninconsistency(moving, of)
     return found if held is None else found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(moving, of, held)}
+
+
+def _known(shares: Any) -> list[float | None]:
+    """With None for those that there are none of."""
+    return [None if share != share else share for share in shares.tolist()]
 
 
 def support_of(policy: uc.Policy, states: Any) -> Any:

@@ -160,6 +160,39 @@ def along_motion(policy: PolicyLike, demonstrations: Demonstrations, usual: floa
     return along(stack(demos).actions, _predicted(policy, demos), usual=usual, noise=noise)
 
 
+def explained_in_planes(policy: PolicyLike, demonstrations: Demonstrations) -> Array:
+    """Share of the motion ``1 − Σ ‖N̂ (u − π̃)‖² / Σ ‖u‖²`` that is explained in all directions of its plane.
+
+    Of a demonstration that moved much along at least two directions, and along none of the others, in which the policy
+    or other demonstrations move; N̂ projects onto the former. If nothing but that plane held it, this is all of the
+    policy's error that it can show, 1 − nCPE, where :func:`along_motion` sees what is along the path alone.
+
+    Returns
+    -------
+    ndarray, shape (G,)
+        Of each demonstration; NaN of one that kept to no plane.
+
+    Examples
+    --------
+    >>> angle = np.linspace(0.0, 6.0, 60)
+    >>> circle = np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
+    >>> demonstration = uc.Demonstration(circle, circle)
+    >>> uc.evaluation.metrics.explained_in_planes(lambda x: 0.5 * x + [0.0, 0.0, 5.0], demonstration).round(3)
+    array([0.75])
+    """
+    demos = _listed(demonstrations)
+    (_, actions, groups), predicted = stack(demos), _predicted(policy, demos)
+    noise = np.array([_noise(demo) for demo in demos])[groups]
+    # What the policy does freely is one movement more: a direction in which it would move is one that was held.
+    moved, labels = np.concatenate([actions, predicted]), np.append(groups, np.full(len(actions), len(demos)))
+    held, onto = robust.held_throughout(moved, labels, np.append(noise, np.full(len(actions), noise.max())))
+    plane = held[: len(groups)] & (np.einsum("naa->n", onto[: len(groups)]) > 1.5)
+    missed = (project(onto[: len(groups)], actions - predicted) ** 2).sum(axis=1)
+    missed, motion = (np.bincount(groups, each) for each in (missed, (actions**2).sum(axis=1)))
+    kept = np.bincount(groups, plane) > 0
+    return np.where(kept, 1.0 - missed / np.where(kept, motion, 1.0), np.nan)
+
+
 def nppe(constraint: Constraint, demonstrations: Demonstrations) -> float:
     """Normalised projected policy error of a constraint, ``Σ ‖N π − N̂ π‖² / Σ ‖π − mean π‖²``.
 

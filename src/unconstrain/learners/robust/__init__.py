@@ -11,5 +11,14 @@ True
 from .constants import SPHERE_HIDDEN_BY_NOISE
 from .learner import Likelihood, NoiseCorrected, Robust, Segments
 from .noise import noise_by_differences
+from .segments import held_throughout
 
-__all__ = ["SPHERE_HIDDEN_BY_NOISE", "Likelihood", "NoiseCorrected", "Robust", "Segments", "noise_by_differences"]
+__all__ = [
+    "SPHERE_HIDDEN_BY_NOISE",
+    "Likelihood",
+    "NoiseCorrected",
+    "Robust",
+    "Segments",
+    "held_throughout",
+    "noise_by_differences",
+]
