@@ -310,6 +310,13 @@ def test_a_default_that_chose_its_models_badly_is_seen_by_the_widest():
     assert summary.to_safe(one) == 2.0
 
 
+@pytest.mark.parametrize(("own", "best", "ratio"), [(1e-16, 1e-21, 1.0), (4e-8, 1e-9, 4.0), (3e-3, 1e-3, 3.0)])
+def test_errors_finer_than_any_recording_are_none(own, best, ratio):
+    one = {"kind": "a", "policy": "", "name": "b", "nupe": {"robust": own, "direct": own}, "best": best, "floor": best}
+    (row,) = summary.by_kind([{**one, "cost": None, **dict.fromkeys(summary.KNOWLEDGE)}])
+    assert row["to_best"] == pytest.approx(ratio)
+
+
 @needs_movements
 def test_the_table_is_what_its_data_sets_say(result):
     for row in result.tables["kinds"]:

@@ -11,7 +11,7 @@ from ...pages import html
 from ..experiments import recorded
 from ..experiments.recorded.judging import DEFAULT, LEARNERS
 from ..experiments.recorded.sets import RECORDED, described
-from ..experiments.recorded.summary import BEHIND, GROWN, to_safe
+from ..experiments.recorded.summary import BEHIND, GROWN, NEGLIGIBLE, to_safe
 from ..experiments.trials import Result
 from ..figures import charts
 
@@ -47,14 +47,15 @@ def page(result: Result) -> str:
 def _cells(kinds: Sequence[Row]) -> html.Markup:
     """What each learner has for nUPE over what the best candidate has, kinds by learners."""
     methods = [*LEARNERS, DEFAULT]
-    values = [[one[method] / one["best"] if one[method] else np.nan for method in methods] for one in kinds]
+    errors = [[one[method] or np.nan for method in methods] for one in kinds]
+    values = np.maximum(errors, NEGLIGIBLE) / np.maximum([[one["best"]] for one in kinds], NEGLIGIBLE)
     picture = charts.ratio_table(
-        [_name(one) for one in kinds], methods, np.array(values), title="nUPE over the best candidate’s",
+        [_name(one) for one in kinds], methods, values, title="nUPE over the best candidate’s",
         scale="ratio", top=TOP,
     )  # fmt: skip
     caption = (
         "Geometric means over the data sets of each kind. White is as good as the best candidate, orange worse; "
-        f"colours end at {TOP:g}. “Parametric” is the policy on 25 normalised kernels; all others are locally linear, "
+        f"colours end at {TOP:g}. Errors below {NEGLIGIBLE:g} count as that: none is felt. “Parametric” is the policy on 25 normalised kernels; all others are locally linear, "
         "or on the features that belong to the kind. Empty where there are no groups to take for segments."
     )
     return html.picture("kinds", [picture], caption)

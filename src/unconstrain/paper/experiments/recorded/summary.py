@@ -16,6 +16,9 @@ BEHIND = 1.1
 GROWN = 1.5
 """One in which bad samples make its error grow by more than this, too."""
 
+NEGLIGIBLE = 1e-8
+"""An nUPE of less is none: 0.01 % of a typical action is finer than any recording, and below it ratios are rounding's."""
+
 Row = dict[str, Any]
 
 
@@ -45,7 +48,7 @@ def _kind(kind: str, policy: str, sets: Sequence[Row]) -> Row:
         "worst_to_safe": max(ratios),
         "worst": sets[int(np.argmax(ratios))]["name"],
         "behind": float(np.mean([ratio > BEHIND for ratio in ratios])),
-        "to_best": geometric(one["nupe"][DEFAULT] / one["best"] for one in sets),
+        "to_best": geometric(max(one["nupe"][DEFAULT], NEGLIGIBLE) / max(one["best"], NEGLIGIBLE) for one in sets),
         "cost": geometric(costs),
         "worst_cost": max(costs, default=None),
         "grown": float(np.mean([cost > GROWN for cost in costs])) if costs else None,
@@ -101,7 +104,7 @@ def _of_all(own: Sequence[Row]) -> str:
     worst = max(own, key=lambda one: one["to_best"])
     return (
         f"over all {len(own)} kinds: {DEFAULT} nUPE {geometric(one['to_best'] for one in own):.3g} times the best "
-        f"candidate's, at worst {worst['to_best']:.3g} times ({worst['kind']})"
+        f"candidate's, at worst {worst['to_best']:.3g} times ({worst['kind']}); below {NEGLIGIBLE:g} all are as good"
     )
 
 
