@@ -55,7 +55,8 @@ def _cells(kinds: Sequence[Row]) -> html.Markup:
     )  # fmt: skip
     caption = (
         "Geometric means over the data sets of each kind. White is as good as the best candidate, orange worse; "
-        f"colours end at {TOP:g}. Errors below {NEGLIGIBLE:g} count as that: none is felt. “Parametric” is the policy on 25 normalised kernels; all others are locally linear, "
+        f"colours end at {TOP:g}. Errors below {NEGLIGIBLE:g} count as that: none is felt. "
+        "“Parametric” is the policy on 25 normalised kernels; all others are locally linear, "
         "or on the features that belong to the kind. Empty where there are no groups to take for segments."
     )
     return html.picture("kinds", [picture], caption)

@@ -17,7 +17,7 @@ GROWN = 1.5
 """One in which bad samples make its error grow by more than this, too."""
 
 NEGLIGIBLE = 1e-8
-"""An nUPE of less is none: 0.01 % of a typical action is finer than any recording, and below it ratios are rounding's."""
+"""An nUPE of less is none: 0.01 % of a typical action is finer than any recording, and ratios are of rounding."""
 
 Row = dict[str, Any]
 
