@@ -260,7 +260,7 @@ def of_units_apart(found: Verdict) -> Verdict:
 def of_glitches(found: Verdict, names: str) -> Verdict:
     """Add to a verdict that samples of some demonstrations, by name, are far off their neighbours."""
     said = f"samples of {names} jump far off their neighbours and back (glitches), and velocities about them are wrong"
-    return _doubted(found, said)._replace(next=f"Add --glitches repair, or drop where many are in a row. {found.next}")
+    return _doubted(found, said)._replace(next=f"Add --glitches drop, or repair if few are in a row. {found.next}")
 
 
 def of_forbidden(found: Verdict, share: float) -> Verdict:
