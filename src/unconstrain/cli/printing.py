@@ -183,7 +183,7 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
 
     ``told`` is the share of the recorded states at which recordings tell the policy, None where not known.
     """
-    from ..pages.fit import replayed
+    from ..pages.fit import retraced
 
     policy = innermost(moving)
     demos = stream.beginning() if scheduler is None or moving is not policy else []
@@ -199,7 +199,7 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     open_ = told is not None and told < uc.evaluation.verdicts.MOSTLY
     there = _least_known(policy, demos, stream.recipe) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
     found = uc.evaluation.verdicts.of_explained(alone, count, told, there, 1.0 - missed, lost)
-    ran = replayed(found, moving, demos, stream.recipe, None, stream.first.units, free=False)
+    ran = retraced(found, moving, demos, stream.recipe, None, stream.first.units, False)
     verdict = uc.evaluation.diagnosis.about_recordings(ran.verdict, demos, stream.recipe, moving)
     return Judged(as_noted(verdict), ran.medians, ran.in_words, count, samples, 1.0 - missed, held_out, lost)
 
