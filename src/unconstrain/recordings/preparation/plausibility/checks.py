@@ -193,7 +193,7 @@ def glitch(subject: Subject) -> Remark | None:
     if not left:
         cure = ", repaired by a straight line; glitches='keep' takes what was recorded, glitches='drop' leaves it out."
     elif subject.recipe.glitches == "auto":
-        cure = f", {kept} of them too many in a row to be repaired, and kept; glitches='drop' leaves them out."
+        cure = f", {'all' * (kept == many) or kept} too many in a row to repair: kept; glitches='drop' leaves them out."
     said = f"{'1 sample far off its' if many == 1 else f'{many} samples far off their'} neighbours{cure}"
     first = (left or subject.glitches)[0]
     return Remark("glitch", said, subject.name(first.column), subject.row(first.start), cured=not left)
