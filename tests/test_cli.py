@@ -197,7 +197,11 @@ def test_defaults_that_help_says_are_those_of_the_library():
     said = " ".join(run("fit", "--help").split())
     assert f"savgol, seconds; {uc.Recipe().window_s} by default" in said
     assert f"threshold, {uc.Hybrid().alpha} by default" in said
-    for option, default in (("pauses", uc.Recipe().pauses), ("seams", uc.Recipe().seams), ("glitches", "keep")):
+    for option, default in (
+        ("pauses", uc.Recipe().pauses),
+        ("seams", uc.Recipe().seams),
+        ("glitches", uc.Recipe().glitches),
+    ):
         assert re.search(rf"--{option} \[[^]]*\] [^[]*\[default: {default}\]", said)
 
 

@@ -299,15 +299,31 @@ def commands(tmp_path_factory):
     return run
 
 
+def flat(said):
+    """Without the ends of lines."""
+    return " ".join(said.split())
+
+
 def test_commands_make_a_guided_policy_and_take_it(commands):
     learn = "fit", "FILES", "--state", "x,y,z", "--differentiate", "--model", "affine"
     said = commands(*learn, "--guided", "auto", "-o", "HERE/p.npz", "--report", "HERE/p.html")
     assert re.search(r"Guided: .* free at \(0\.[23]\d*, -0\.[12]\d*, (0\.1|0\.09)", said)  # not where planes stop it
     assert "--guided" not in said.partition("Guided:")[0]
+    assert "a velocity is added with which V falls, a bowl with its bottom at the goal" in said.partition("Guided:")[2]
     assert "From every state, movements arrive" in commands("certify", "HERE/p.npz")
-    assert "From every state, movements arrive" in commands("info", "HERE/p.npz")
+    assert "From every state, movements arrive" in flat(commands("info", "HERE/p.npz"))
     far = commands("rollout", "HERE/p.npz", "--start", "30,-20,10", "--steps", 1000)
     assert_allclose([*map(float, far.splitlines()[1000].split(","))][1:4], GOAL, atol=0.04)
+    assert "from the goal" not in far
+    rail = commands("rollout", "HERE/p.npz", "--start", "30,-20,10", "--steps", 1000, "--plane", "1,0,0")
+    off = re.search(
+        r"It ends (\S+) \(unit of the states\) from the goal: it rests there, as the plane holds it off", flat(rail)
+    )
+    last = [*map(float, rail.splitlines()[1000].split(","))][1:4]
+    assert_allclose(float(off[1]), np.linalg.norm(np.subtract(last, GOAL)), rtol=0.02)
+    for plane, holds in (((), ""), (("--plane", "1,0,0"), ", and may come to rest where the plane holds it off")):
+        short = flat(commands("rollout", "HERE/p.npz", "--start", "30,-20,10", "--steps", 20, *plane))
+        assert f"from the goal: it is still on its way (--steps){holds}." in short
     assert "explains" in commands("score", "HERE/p.npz", "FILES")
     commands("look", "HERE/p.npz", "FILES", "-o", "HERE/look.html")
     commands(*learn, "-o", "HERE/plain.npz")
@@ -395,7 +411,42 @@ def test_fit_and_info_judge_the_policy_as_it_is_guided(tmp_path, starts, least, 
     assert_allclose(known["explained held out"], found["held_out"], atol=1e-4)
     for one in (found, known):
         assert one["verdict"]["mark"] == mark
-        assert one["verdict"]["said"].startswith("The guided policy ")
+        assert one["verdict"]["said"].startswith(alone["verdict"]["said"])
+        how = "But guided, it explains" if mark == "bad" else "Guided, it explains"
+        assert f" {how} " in one["verdict"]["said"]
+
+
+@pytest.mark.parametrize(("start", "mark"), [(1.05, "good"), (1.4, "doubtful")])
+def test_guides_that_retrace_what_they_were_fitted_to_make_no_doubtful_fit_a_good_one(tmp_path, start, mark):
+    """Rounds that come in to a circle, which no linear policy keeps to; guided, it does."""
+    for number, tilt in enumerate(([0.2, 0.0], [0.0, 0.3], [-0.2, 0.1], [0.1, -0.25])):
+        at = [start * np.cos(number), start * np.sin(number), 0.0]
+        run = uc.rollout(rounds, at, 200, 0.05, Plane([*tilt, 1.0]))
+        table = np.column_stack([run.times, run.states])
+        np.savetxt(tmp_path / f"{number}.csv", table, delimiter=",", header="t,x,y,z", comments="")
+    output = str(tmp_path / "p.npz")
+    learn = "fit", str(tmp_path / "*.csv"), "--state", "x,y,z", "--differentiate", "--model", "linear", "-o", output
+    ran = [
+        CliRunner().invoke(main, [*arguments, "--json"])
+        for arguments in (learn, (*learn, "--guided", "cycle", "--force"), ("info", output))
+    ]
+    alone, guided, known = [json.loads(one.stdout)["verdict"] for one in ran]
+    assert [one["mark"] for one in (alone, guided, known)] == [mark] * 3
+    told = "Guided, it explains as much of the demonstrations it was fitted to; that says nothing of new starts. "
+    assert told in guided["said"]
+    assert re.search(
+        r"run from the same starts: size .* recorded path.*\. Guided: size 1\.0\d times", guided["said"], re.IGNORECASE
+    )
+    assert re.search(r"run from the same starts: size .*; guided size 1\.0\d times", known["said"], re.IGNORECASE)
+    assert "uided" not in alone["said"]
+    assert "--guided" not in guided["next"]  # it is
+
+
+def rounds(states):
+    """Goes round the unit circle in x and y, and comes nearer to it slowly."""
+    radius = np.linalg.norm(states[:, :2], axis=1, keepdims=True)
+    flat = 2.0 * states[:, 1::-1] * [-1.0, 1.0] + 0.5 * (1.0 - radius) * states[:, :2]
+    return np.hstack([flat, -states[:, 2:]])
 
 
 def test_strokes_that_slow_down_but_end_in_motion_and_apart_show_no_goal():

@@ -200,3 +200,68 @@ def test_a_cycle_that_was_not_shown_is_refused_with_what_shows_one(tmp_path):
     said = refused("fit", tmp_path, *READ, "--guided", "cycle", "-o", tmp_path / "p.npz")
     assert said.startswith("--guided: demonstrations make 0.16 turns in the mean, and no cycle is near them.")
     assert "record whole rounds; or guide it to a goal, or not at all" in said
+
+
+# Samples far off their neighbours
+
+
+@pytest.fixture
+def jumping(tmp_path):
+    """Write six strokes, in one of which some rows from the 15th on are nought, as where a tracker is lost."""
+
+    def written(rows):
+        for k in range(6):
+            table = stroke(k, 80) + np.array([0.0, 300.0, 200.0])
+            table[15 : 15 + rows * (k == 2), 1:] = 0.0
+            write(tmp_path / f"w{k}.csv", "t,x,y", table)
+        return "fit", tmp_path, *READ, "--model", "affine", "--force", "-o", tmp_path.parent / "p.npz"
+
+    return written
+
+
+def learnt(*fit):
+    """What a policy learnt by a command predicts where it was shown, and how it was judged."""
+    verdict = json.loads(run(*fit, "--json"))["verdict"]
+    return uc.load(fit[fit.index("-o") + 1]).predict([[250.0, 200.0], [300.0, 260.0]]), verdict
+
+
+@pytest.mark.parametrize("rows", [1, 3])
+def test_few_samples_far_off_their_neighbours_spoil_no_fit_and_are_told(jumping, rows):
+    clean, well = learnt(*jumping(0))
+    assert "glitch" not in text(call(*jumping(0)))
+    fit = jumping(rows)
+    found, verdict = learnt(*fit)
+    assert np.abs(found - clean).max() < 0.02 * np.abs(clean).max()
+    assert verdict["mark"] == well["mark"]
+    assert "glitches" not in verdict["said"] + verdict["next"]
+    said = text(call(*fit))
+    assert "glitch: 'w2', row 15 (line 17), column 'x': " in said
+    assert (
+        "repaired by a straight line; --glitches keep takes what was recorded, --glitches drop leaves it out." in said
+    )
+    strict = call(*fit, "--strict")
+    assert strict.code == 2
+    assert "--strict: not as it seems (glitch)" in text(strict)
+    proposed = text(call("inspect", *fit[1:4]))
+    assert "repaired by a straight line" in proposed
+    assert "--glitches" not in proposed.partition("demonstration samples")[0]
+    for cure in ("repair", "drop"):
+        assert "glitch" not in text(call(*fit, "--glitches", cure))
+    spoilt, verdict = learnt(*fit, "--glitches", "keep")
+    assert np.abs(spoilt - clean).max() > 0.2 * np.abs(clean).max()
+    assert "samples of 'w2' jump far off their neighbours and back (glitches)" in verdict["said"]
+    assert verdict["mark"] != "good"
+    assert "--glitches repair" in text(call("inspect", *fit[1:4], "--glitches", "keep"))
+
+
+def test_many_samples_in_a_row_far_off_their_neighbours_are_kept_and_to_be_dropped(jumping):
+    clean, _ = learnt(*jumping(0))
+    fit = jumping(8)
+    assert "8 samples far off their neighbours, all too many in a row to repair: kept;" in text(call(*fit))
+    _, verdict = learnt(*fit)
+    assert "samples of 'w2' jump far off their neighbours" in verdict["said"]
+    assert verdict["next"].startswith("Add --glitches drop")
+    assert "--glitches drop -o policy.npz" in text(call("inspect", *fit[1:4]))
+    found, verdict = learnt(*fit, "--glitches", "drop")
+    assert np.abs(found - clean).max() < 0.02 * np.abs(clean).max()
+    assert "glitches" not in verdict["said"]

@@ -424,6 +424,47 @@ def test_a_glitch_is_repaired_or_dropped(cure):
     assert codes([recording(track)], recipe) == [[]]
 
 
+@pytest.mark.parametrize(("rows", "few"), [([70], True), ([70, 120, 121, 122], True), ([70, 71, 72, 73], False)])
+@pytest.mark.parametrize("timeless", [False, True])
+def test_few_glitches_in_a_row_are_repaired_unasked_and_said(rows, few, timeless):
+    track, clean = TRACK.copy(), uc.prepare(recording(), uc.Recipe(("x", "y"), differentiate="savgol"))[0]
+    track[rows, 0] += 2.0
+    track[rows[:2], 1] -= 1.0
+    if timeless:
+        given = uc.Recording(("x", "y", "a", "b"), np.hstack([track, clean.actions]), None, "d")
+        recipe, kept = uc.Recipe(("x", "y"), ("a", "b")), uc.Recipe(("x", "y"), ("a", "b"), glitches="keep")
+    else:
+        given, recipe = recording(track), uc.Recipe(("x", "y"), differentiate="savgol")
+        kept = uc.Recipe(("x", "y"), differentiate="savgol", glitches="keep")
+    assert recipe.glitches == "auto"
+    [found], [as_recorded] = quietly(given, recipe), quietly(given, kept)
+    np.testing.assert_array_equal(as_recorded.states, track)
+    if few:
+        np.testing.assert_allclose(found.states, TRACK, atol=0.01)
+        np.testing.assert_array_equal(np.delete(found.states, rows, axis=0), np.delete(TRACK, rows, axis=0))
+        np.testing.assert_allclose(found.actions, clean.actions, atol=0.05)
+    else:
+        np.testing.assert_array_equal(found.states, track)
+    [told] = [one for one in survey(given, recipe).warnings if one.code == "glitch"]
+    assert (told.row, told.column, told.cured) == (rows[0], "x", few)
+    assert ("repaired by a straight line" in told.message) == few
+    assert ("all too many in a row to repair: kept" in told.message) != few
+    [told] = [one for one in survey(given, kept).warnings if one.code == "glitch"]
+    assert told.message.endswith("neighbours; glitches='repair' or glitches='drop'.")
+
+
+def test_of_glitches_few_and_many_in_a_row_the_few_are_repaired_and_the_many_named():
+    track = TRACK.copy()
+    track[30] += 2.0
+    track[70:82] = 0.0
+    [found] = quietly(recording(track), MOVED)
+    np.testing.assert_allclose(found.states[30], TRACK[30], atol=0.01)
+    np.testing.assert_array_equal(found.states[70:82], 0.0)
+    [told] = [one for one in survey(recording(track), MOVED).warnings if one.code == "glitch"]
+    assert (told.row, told.cured) == (70, False)
+    assert told.message.startswith("13 samples far off their neighbours, 12 too many in a row")
+
+
 def test_a_cut_at_a_seam_keeps_both_sides_apart():
     other = TRACK[:100] + np.array([5, 3])
     both = recording(np.concatenate([TRACK, other]), 0.02 * np.arange(300))

@@ -210,14 +210,19 @@ def test_recordings_in_another_unit_are_called_so(folder, tmp_path, times, said)
 
 def test_a_guided_policy_is_judged_by_what_guiding_leaves():
     good, spoilt = (verdicts.of_explained(0.96, 5, learnt=0.99, lost=lost) for lost in (0.02, 0.1))
-    assert good.said == (
-        "The guided policy explains 94% of held-out motion (96% unguided, less 2% that guiding takes of what it learnt "
-        "from): good."
-    )
+    fitted = "it explains {} less of the demonstrations it was fitted to; that says nothing of new starts."
+    assert good.said == f"The policy explains 96% of held-out motion: good. Guided, {fitted.format('2%')}"
+    assert spoilt.said == f"The policy explains 96% of held-out motion: good. But guided, {fitted.format('10%')}"
     assert (good.mark, spoilt.mark) == (Mark.GOOD, Mark.DOUBTFUL)
     assert "--guided" not in good.next
     assert spoilt.next.startswith("Fit without --guided")
-    assert verdicts.of_explained(0.96, 2, lost=0.1).said.startswith("The guided policy explains 86% of held-out")
+    assert verdicts.of_explained(0.96, 2, lost=0.1).said.endswith(fitted.format("10%"))
+    for share in (0.95, 0.8, 0.3):  # guides were fitted to what they explain
+        for lost in (0.0, 0.004):
+            found, alone = verdicts.of_explained(share, 5, lost=lost), verdicts.of_explained(share, 5)
+            assert "explains as much of" in found.said
+            assert found.mark is alone.mark
+            assert "uided" not in alone.said
 
 
 def test_what_is_missed_by_more_than_all_is_said_in_words_with_a_cause():

@@ -169,8 +169,8 @@ def _to_fit(
     more += ["--time", *clock] if clock else ["--rate", "HZ"] * timeless
     more += [] if actions or recipe.differentiate else ["--differentiate"]
     more += ["--leave-out", ",".join(left_out)] if left_out else []
-    jumps = any(remark.code == "glitch" for one in surveys for remark in one.warnings)
-    more += ["--glitches", "repair"] * jumps
+    jumps = any(remark.code == "glitch" and not remark.cured for one in surveys for remark in one.warnings)
+    more += ["--glitches", "repair" if recipe.glitches == "keep" else "drop"] * jumps
     right = {"state": states, "action": actions, "leave_out": not left_out, "glitches": not jumps}
     wrong = [name for name, fine in right.items() if not fine]
     return next_command("fit", *more, "-o", "policy.npz", without=wrong)

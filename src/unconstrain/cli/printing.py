@@ -183,7 +183,7 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
 
     ``told`` is the share of the recorded states at which recordings tell the policy, None where not known.
     """
-    from ..pages.fit import replayed
+    from ..pages.fit import retraced
 
     policy = innermost(moving)
     demos = stream.beginning() if scheduler is None or moving is not policy else []
@@ -199,7 +199,7 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     open_ = told is not None and told < uc.evaluation.verdicts.MOSTLY
     there = _least_known(policy, demos, stream.recipe) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
     found = uc.evaluation.verdicts.of_explained(alone, count, told, there, 1.0 - missed, lost)
-    ran = replayed(found, moving, demos, stream.recipe, None, stream.first.units, free=False)
+    ran = retraced(found, moving, demos, stream.recipe, None, stream.first.units, False)
     verdict = uc.evaluation.diagnosis.about_recordings(ran.verdict, demos, stream.recipe, moving)
     return Judged(as_noted(verdict), ran.medians, ran.in_words, count, samples, 1.0 - missed, held_out, lost)
 
@@ -207,8 +207,8 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
 def as_noted(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.Verdict:
     """The same with what was noted: rest before a start, glitches, and units that differ; at best doubtful by these."""
     told = click.get_current_context().meta
-    if jumps := told.get(TITLES, {}).get("glitch"):
-        verdict = uc.evaluation.verdicts.of_glitches(verdict, listed([*jumps], 4))
+    if jumps := [title for title, one in told.get(TITLES, {}).get("glitch", {}).items() if not one.cured]:
+        verdict = uc.evaluation.verdicts.of_glitches(verdict, listed(jumps, 4))
     if rest := told.get(TITLES, {}).get("rest"):
         said = f"Where {listed([*rest], 4)} stood still before the start: rest is learnt there; --still trims it."
         verdict = verdict._replace(doubt=f"{verdict.doubt} {said}".lstrip())
@@ -376,7 +376,7 @@ def show_warning(message: Warning | str, *_: Any) -> None:
     remark, context = getattr(message, "remark", None), click.get_current_context(silent=True)
     if remark is not None and context is not None:
         titles = context.meta.setdefault(TITLES, {}).setdefault(remark.code, {})
-        titles[message.title] = None  # type: ignore[union-attr]
+        titles[message.title] = remark  # type: ignore[union-attr]
         if len(titles) > 1:
             return
     click.echo(f"Note: {as_typed(str(message))}", err=True)

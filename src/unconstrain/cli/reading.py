@@ -80,7 +80,7 @@ CURES = (
     ),
     of_words("--pauses", "drop keep", "Rows that stand still in the middle.", "drop"),
     of_words(
-        "--glitches", "keep repair drop", "Samples far off their neighbours: repair puts a straight line there.", "keep"
+        "--glitches", "auto keep repair drop", "Samples far off: repair puts a line there, auto only of few.", "auto"
     ),
     of_words("--seams", "keep cut", "Jumps to another place: cut smooths nothing across.", "keep"),
     click.option(

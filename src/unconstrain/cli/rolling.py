@@ -155,7 +155,7 @@ def _supported(
     untold = None if told >= verdicts.MOSTLY else uc.evaluation.diagnosis.untold(policy, path)
     found = verdicts.of_support(support_of(policy, path.states), path.times, untold)
     found = verdicts.of_early_end(found, why) if why else found
-    passes = f" {held[:1].upper()}{held[1:]} passes through the start." if held else ""
+    passes = f" {held[:1].upper()}{held[1:]} passes through the start." * bool(held) + _off_goal(moving, path, held)
     found = verdicts.of_fit(found._replace(said=f"{found.said}{passes}"), doubted(moving, notes))
     if not obstacles:
         return found
@@ -164,6 +164,17 @@ def _supported(
         said=f"{found.said} It keeps clear of {counted(len(obstacles), 'obstacle')}, at the nearest of number "
         f"{nearest[1]} by {nearest[0]:.0%} of its radius."
     )
+
+
+def _off_goal(moving: Any, path: uc.Demonstration, held: str, near: float = 0.02) -> str:
+    """A sentence on where off its goal a guided movement ends, by more than ``near`` of how far it was, and why."""
+    if not isinstance(getattr(moving, "aim_", None), uc.motion.descent.Descent):
+        return ""
+    far, speeds = ((each**2).sum(axis=1) ** 0.5 for each in (path.states - moving.goal_, path.actions))
+    rests = speeds[-1] <= near * speeds.max()
+    why = "it rests there" if rests else "it is still on its way (--steps)"
+    why += f", {'as' if rests else 'and may come to rest where'} {held} holds it off" if held else ""
+    return f" It ends {far[-1]:.3g} (unit of the states) from the goal: {why}." if far[-1] > near * far.max() else ""
 
 
 def _csv(header: Sequence[str], path: uc.Demonstration) -> str:

@@ -148,25 +148,26 @@ def of_explained(
     ``share`` is 1 − the share left unexplained, NaN where nothing could be held out; fewer than three demonstrations
     give no verdict. ``determined`` is the share of the recorded states at which recordings tell the policy, and
     ``there`` what to record where fewer show it. ``learnt`` is the share of what was learnt from, and ``lost`` what
-    guiding takes of that, None where it is not guided: where held out it takes about as much, from ``share``.
+    guiding takes of that, None where it is not guided: a guided policy is judged by the one in it, or worse.
     """
-    policy, alone, share = "The policy" if lost is None else "The guided policy", share, share - (lost or 0.0)
-    taken = ""
-    if lost is not None:
-        taken = f" ({percent(alone)} unguided, less {percent(lost)} that guiding takes of what it learnt from)"
     across = "What constraints hid: no recording shows it, so no score does."
     if determined is not None and determined < MOSTLY and demonstrations >= ENOUGH:
         across = f"Across the motion: {of_untold(1 - determined)}"
         across += "." if there else "; 'unconstrain diagnose' says where."
+    much = f"{percent(lost)} less" if lost and round(lost, 2) else "as much"
+    (alone, word), (mark, _) = (_graded(each, told=determined) for each in (share, share - (lost or 0.0)))
+    retold = (
+        f" {'Guided' if mark is alone else 'But guided'}, it explains {much} of the demonstrations it was fitted to"
+    )
+    retold = "" if lost is None else f"{retold}; that says nothing of new starts."
     if demonstrations < ENOUGH or not np.isfinite(share):
-        seen = f"{policy} {_explains(share)}{taken}, but no" if np.isfinite(share) else "No"
+        seen = f"The policy {_explains(share)}, but no" if np.isfinite(share) else "No"
         few = f"{seen} verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
-        return Verdict(Mark.DOUBTFUL, few, doubt=across, next=MORE)
-    mark, word = _graded(share, told=determined)
+        return Verdict(Mark.DOUBTFUL, few + retold, doubt=across, next=MORE)
     missed = f"where the policy predicts, it misses {percent(np.sqrt(max(1 - share, 0)))} of a typical action"
-    advice = _advice(word, learnt, mark is not _graded(alone, told=determined)[0])
+    advice = _advice(word, learnt, mark is not alone)
     trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
-    said = f"{policy} {_explains(share)}{taken}: {word}."
+    said = f"The policy {_explains(share)}: {word}.{retold}"
     return Verdict(mark, said, trust, across, f"{advice} {there}".rstrip())
 
 
@@ -273,7 +274,7 @@ def of_units_apart(found: Verdict) -> Verdict:
 def of_glitches(found: Verdict, names: str) -> Verdict:
     """Add to a verdict that samples of some demonstrations, by name, are far off their neighbours."""
     said = f"samples of {names} jump far off their neighbours and back (glitches), and velocities about them are wrong"
-    return _doubted(found, said)._replace(next=f"Add --glitches repair, or drop where many are in a row. {found.next}")
+    return _doubted(found, said)._replace(next=f"Add --glitches drop, or repair if few are in a row. {found.next}")
 
 
 def of_forbidden(found: Verdict, share: float) -> Verdict:

@@ -37,12 +37,15 @@ class Descent(Shown):
 
     @property
     def promise(self) -> str:
-        """What is guaranteed, in words."""
+        """What is added, when that is right, and what is guaranteed, in words."""
         goal = ", ".join(f"{each:.4g}" for each in self.potential.goal)
         return (
-            f"From every state, movements arrive: free at ({goal}), and under any flat constraint where it is nearest "
-            f"to that, as V measures. Every step of up to {self.dt:.3g} s leads nearer, at {0.75 * self.pace:.3g} a "
-            "second or faster, and slower only near the end. A constraint that moves, or an obstacle, may lead away."
+            "Where the policy does not lead to the goal, a velocity is added with which V falls, a bowl with its "
+            "bottom at the goal, fitted to the demonstrations. Right where every movement is to end there; ways from "
+            f"new starts are not learnt. From every state, movements arrive: free at ({goal}), and under any flat "
+            f"constraint where it is nearest to that, as V measures. Every step of up to {self.dt:.3g} s leads nearer, "
+            f"at {0.75 * self.pace:.3g} a second or faster, and slower only near the end. A constraint that moves, or "
+            "an obstacle, may lead away."
         )
 
     def correction(self) -> Correction:

@@ -77,14 +77,16 @@ class Orbit(Shown):
 
     @property
     def promise(self) -> str:
-        """What is guaranteed, in words."""
+        """What is added, when that is right, and what is guaranteed, in words."""
         middle = ", ".join(f"{each:.4g}" for each in self.potential.goal)
         return (
-            f"A closed convex surface, round or oval, attracts, typically {self.radius:.4g} off its middle ({middle}), "
-            "from every state but that, free and under any flat constraint: the distance from it shrinks at rates of "
-            f"{PULL * self.rate:.4g} to {RUSH * self.rate:.4g} per second. A plane through its inside cuts it in one "
-            f"cycle, on which the pace is within {STRAY:.0%} of the one learnt wherever the plane lets it turn. A "
-            "constraint that moves, or an obstacle, may lead off it."
+            "Where the policy does not lead to the cycle, and round, a velocity is added that does, by V, a bowl with "
+            "the cycle on its wall, fitted to the demonstrations. Right where every movement is to go round; ways from "
+            f"new starts are not learnt. A closed convex surface, round or oval, attracts, typically {self.radius:.4g} "
+            f"off its middle ({middle}), from every state but that, free and under any flat constraint: the distance "
+            f"from it shrinks at rates of {PULL * self.rate:.4g} to {RUSH * self.rate:.4g} per second. A plane through "
+            f"its inside cuts it in one cycle, on which the pace is within {STRAY:.0%} of the one learnt wherever the "
+            "plane lets it turn. A constraint that moves, or an obstacle, may lead off it."
         )
 
     def correction(self) -> Correction:

@@ -22,6 +22,7 @@ from . import figures, html
 from .diagnosis import unknown
 from .replays import Replay
 from .replays import replayed as replayed
+from .replays import retraced as retraced
 
 if TYPE_CHECKING:
     from ..policies import Policy
@@ -74,7 +75,7 @@ def policy_page(
     learner, held_out = named(policy.learner), _held_out(policy, demos)
     lost = diagnosis.lost_by_guiding(moving, demos)
     found = verdicts.of_explained(policy.held_out_score(), len(demos), diagnosis.states_told(policy), lost=lost)
-    judged = replayed(found, moving, demos, made, None, known)
+    judged = retraced(found, moving, demos, made, None, known)
     parts = [
         *([html.section("Guided", html.paragraph(moving.aim_.promise))] if isinstance(moving, Guided) else []),
         *_replays(

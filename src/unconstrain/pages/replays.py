@@ -93,6 +93,18 @@ def replayed(
     return Replayed(_advised(judged, found, policy), told, runs, verdicts.size_and_pace(extents, paces, lasts))
 
 
+def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Replayed:
+    """:func:`replayed` on what was learnt from: a guided policy, fitted to that, is judged no better than by itself."""
+    guided, alone = replayed(found, policy, *of), innermost(policy)
+    if alone is policy:
+        return guided
+    (plain, _, _, ran), words = replayed(found, alone, *of), guided.in_words
+    mark = max(plain.mark, guided.verdict.mark, key=[*verdicts.Mark].index)
+    more = f" {'Guided' if mark is plain.mark else 'But guided'}: {words}." if words else ""
+    judged = plain._replace(mark=mark, said=plain.said + more, next=plain.next.removesuffix(GUIDE).rstrip())
+    return guided._replace(verdict=judged, in_words="; guided ".join(filter(None, (ran, words))))
+
+
 def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Policy | Guided) -> verdicts.Verdict:
     """With what cures a policy that strays, unless it was tried."""
     if judged.next == before.next:

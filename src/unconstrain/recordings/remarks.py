@@ -38,7 +38,7 @@ class Remark(NamedTuple):
     """One thing to know about a recording.
 
     ``code`` is a word for programs, ``message`` a sentence for people; ``column``, ``row`` (from 0), and for people
-    ``place`` say where.
+    ``place`` say where; ``cured`` is whether that was repaired on the way.
     """
 
     code: str
@@ -46,6 +46,7 @@ class Remark(NamedTuple):
     column: str | None = None
     row: int | None = None
     place: str = ""
+    cured: bool = False
 
     @property
     def warns(self) -> bool:

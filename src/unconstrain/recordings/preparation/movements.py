@@ -120,7 +120,7 @@ def prepare_one(subject: Subject, stacklevel: int = 2) -> Demonstration:
     """Turn one recording into a demonstration, by a recipe that names its columns; as :func:`prepare`."""
     title = subject.recording.title
     warn(title, examine(subject), stacklevel + 1)
-    demonstration, notes = _prepare(subject.recording, subject.recipe)
+    demonstration, notes = _prepare(subject)
     warn(title, notes, stacklevel + 1)
     return demonstration
 
@@ -272,10 +272,13 @@ def find_gaps(times: Array, max_gap_s: float | None = None) -> tuple[Gap, ...]:
     return tuple(Gap(float(times[row]), float(intervals[row])) for row in rows)
 
 
-def _prepare(recording: Recording, recipe: Recipe) -> tuple[Demonstration, list[Remark]]:
+def _prepare(subject: Subject) -> tuple[Demonstration, list[Remark]]:
+    recording, recipe = subject.recording, subject.recipe
     if not len(recording):
         raise InvalidDataError(f"'{recording.name}' has no samples, expected at least one.")
     states = _finite(recording, recipe.states or (), recipe)
+    if subject.isolated:
+        states[subject.rows] = repaired(subject.states, subject.isolated)
     actions = None if recipe.actions is None else _finite(recording, recipe.actions, recipe)
     times = stamps(recording, recipe)
     _check_finite(recording, np.empty((0, 0)) if times is None else times[:, None], ("time",))
@@ -372,13 +375,12 @@ def _in_rows(states: Array, actions: Array | None, recipe: Recipe) -> tuple[NDAr
 
 
 def _without_glitches(piece: _Piece, recipe: Recipe) -> _Piece:
-    found = [] if recipe.glitches == "keep" else glitches(piece.states)
-    if not found:
-        return piece
     if recipe.glitches == "repair":
-        return piece._replace(states=repaired(piece.states, found))
+        return piece._replace(states=repaired(piece.states, glitches(piece.states)))
+    if recipe.glitches != "drop":
+        return piece
     keep = np.ones(len(piece.times), dtype=bool)
-    for one in found:
+    for one in glitches(piece.states):
         keep[one.start : one.stop] = False
     return piece.at(keep)
 

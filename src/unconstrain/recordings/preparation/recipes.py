@@ -25,7 +25,7 @@ ORDERS = (2, 3)
 CHOICES = {
     "centre": (False, True),
     "sort": (False, True),
-    "glitches": ("keep", "repair", "drop"),
+    "glitches": ("auto", "keep", "repair", "drop"),
     "seams": ("keep", "cut"),
     "pauses": ("drop", "keep"),
     "action_is": ("auto", "velocity", "target", "delta"),
@@ -73,8 +73,9 @@ class Recipe:
     rotation_vectors : tuple of tuple of str
         Three state columns each that are a rotation vector: of the numbers for the same orientation those closest to
         the row before are taken.
-    glitches : {"keep", "repair", "drop"}
+    glitches : {"auto", "keep", "repair", "drop"}
         What becomes of samples far off their neighbours: a straight line in their place, or their rows are left out.
+        ``"auto"`` repairs at most three in a row, says so, and keeps more.
     seams : {"keep", "cut"}
         Whether nothing is smoothed across jumps to another place, as between demonstrations in one table.
     pauses : {"drop", "keep"}
@@ -111,7 +112,7 @@ class Recipe:
     degrees: tuple[str, ...] | None = None
     quaternions: tuple[tuple[str, ...], ...] = ()
     rotation_vectors: tuple[tuple[str, ...], ...] = ()
-    glitches: str = "keep"
+    glitches: str = "auto"
     seams: str = "keep"
     pauses: str = "drop"
     action_is: str = "auto"

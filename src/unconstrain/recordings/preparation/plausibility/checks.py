@@ -185,12 +185,18 @@ def turned_sign(code: str, subject: Subject) -> Remark | None:
 
 def glitch(subject: Subject) -> Remark | None:
     """Samples far off their neighbours."""
-    if not subject.glitches or subject.recipe.glitches != "keep":
+    if not subject.glitches or subject.recipe.glitches not in ("auto", "keep"):
         return None
-    first, rows = subject.glitches[0], {row for one in subject.glitches for row in range(one.start, one.stop)}
-    far = "1 sample far off its" if len(rows) == 1 else f"{len(rows)} samples far off their"
-    message = f"{far} neighbours; glitches='repair' or glitches='drop'."
-    return Remark("glitch", message, subject.name(first.column), subject.row(first.start))
+    left = sorted({*subject.glitches} - {*subject.isolated}, key=lambda one: one.start)
+    many, kept = (len({row for one in each for row in range(one.start, one.stop)}) for each in (subject.glitches, left))
+    cure = "; glitches='repair' or glitches='drop'."
+    if not left:
+        cure = ", repaired by a straight line; glitches='keep' takes what was recorded, glitches='drop' leaves it out."
+    elif subject.recipe.glitches == "auto":
+        cure = f", {'all' * (kept == many) or kept} too many in a row to repair: kept; glitches='drop' leaves them out."
+    said = f"{'1 sample far off its' if many == 1 else f'{many} samples far off their'} neighbours{cure}"
+    first = (left or subject.glitches)[0]
+    return Remark("glitch", said, subject.name(first.column), subject.row(first.start), cured=not left)
 
 
 def seam(subject: Subject) -> Remark | None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ....base.arrays import Array
 from ...demonstration import Recording
-from ...signals.jumps import Glitch, glitches, repaired, seams, topics
+from ...signals.jumps import Glitch, glitches, repaired, seams, stretches, topics
 from ...signals.orientations import Wrap, continuous_quaternions, quaternion_flips, rotation_flips, wraps
 from ...signals.stillness import pauses
 from ..continuity import continuous, unturned
@@ -21,6 +21,9 @@ from ..recipes import Recipe, select, stamps
 
 LEAST_ROWS = 10
 """Fewer rows show no movement."""
+
+FEW = 3
+"""Samples in a row, at most, that a straight line replaces unasked: of more, nobody knows what was between."""
 
 GAP_INTERVALS = 5.0
 """An interval of this many median ones is a gap, where nothing else is said."""
@@ -141,6 +144,13 @@ class Subject:
     def glitches(self) -> list[Glitch]:
         """Samples of states far off their neighbours."""
         return glitches(self.unwrapped) if self.moves else []
+
+    @cached_property
+    def isolated(self) -> list[Glitch]:
+        """Those of at most :data:`FEW` rows in a row, whatever the column, where a recipe lets them be repaired."""
+        bad = np.isin(np.arange(len(self.rows)), [row for one in self.glitches for row in range(one.start, one.stop)])
+        long = {row for start, stop in stretches(bad) if stop - start > FEW for row in range(start, stop)}
+        return [one for one in self.glitches if self.recipe.glitches == "auto" and one.start not in long]
 
     @cached_property
     def clean(self) -> Array:
