@@ -1,6 +1,8 @@
 """What somebody meets whose files are not as they seem: what is said, of which line, and what to type."""
 
 import json
+import shlex
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ import pytest
 import unconstrain as uc
 from test_cli import call, refused, run, write
 from test_formats import workbook
-from test_newcomer import stroke, text
+from test_newcomer import LINEAR, stroke, text
 
 READ = ("--state", "x,y", "--by", "savgol")
 
@@ -200,3 +202,52 @@ def test_a_cycle_that_was_not_shown_is_refused_with_what_shows_one(tmp_path):
     said = refused("fit", tmp_path, *READ, "--guided", "cycle", "-o", tmp_path / "p.npz")
     assert said.startswith("--guided: demonstrations make 0.16 turns in the mean, and no cycle is near them.")
     assert "record whole rounds; or guide it to a goal, or not at all" in said
+
+
+# Angles, and the command that comes next
+
+
+def turning(number, start, per_second=30.0, length=60):
+    """Times, a place, and an angle in degrees from -180 to 180 that begins somewhere."""
+    times = 0.05 * np.arange(length)
+    return np.column_stack([times, 50 * np.sin(times + number), (start + per_second * times + 180) % 360 - 180])
+
+
+def command_of(shown):
+    """Words of the fit that inspect proposes."""
+    return shlex.split(next(line for line in shown.splitlines() if "unconstrain fit " in line).split("Next: ")[-1])
+
+
+def test_the_command_that_comes_next_has_each_cure_that_the_notes_name(tmp_path):
+    for k in range(4):
+        rows = np.column_stack([turning(k, 120 + 10 * k), turning(k, 100 + 40 * k)[:, 2]])
+        write(tmp_path / f"a{k}.csv", "t,x,roll,yaw", rows * [1000, 1, 1, 1])
+    typed = (tmp_path / "a*.csv", "--state", "x,roll,yaw", "--time-unit", "s", "--angle", "roll")
+    shown = run("inspect", *typed, "--differentiate")
+    _, *words_ = command_of(shown)
+    options = dict(pairwise(words_))
+    assert (options["--angle"], options["--degrees"], options["--time-unit"]) == ("roll,yaw", "roll,yaw", "ms")
+    assert words_.count("--time-unit") == words_.count("--angle") == 1
+    assert "and is taken for a plain number, so that each jump counts as motion; for an angle, say" in text(
+        call("inspect", *typed, "--differentiate")
+    )
+    ran = call(*words_[:-1], tmp_path / "p.npz", *LINEAR)
+    assert "angle-wrap" not in ran.err
+    assert "clock-unit" not in ran.err
+    for k in range(4):
+        write(tmp_path / f"steady{k}.csv", "t,x,yaw", turning(k, -60))
+    plain = command_of(run("inspect", tmp_path / "steady*.csv", "--state", "x,yaw", "--differentiate"))
+    assert not {"--angle", "--degrees", "--time-unit"} & {*plain}
+
+
+def test_an_angle_in_degrees_that_a_later_file_alone_shows_is_said_with_its_cure(tmp_path):
+    for k, start in enumerate((-60, 120, 130)):
+        write(tmp_path / f"a{k}.csv", "t,x,yaw", turning(k, start))
+    asked = (tmp_path / "a*.csv", "--state", "x,yaw", "--differentiate", "--angle", "yaw")
+    fit = (*asked, *LINEAR, "-o", tmp_path / "p.npz", "--force")
+    told = "column 'yaw': jumps by 360, as an angle in degrees does, and is taken for radians; if it is in degrees, say"
+    assert f"{told} --degrees yaw." in text(call("inspect", *asked))
+    assert f"{told} --degrees yaw." in text(call("fit", *fit))
+    assert "--degrees" in command_of(run("inspect", *asked))
+    assert told not in text(call("fit", *fit, "--degrees", "yaw"))
+    assert told not in text(call("fit", *fit, "--leave-out", "a0"))  # the first tells it then

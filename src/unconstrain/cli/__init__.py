@@ -55,7 +55,7 @@ from .reading import (
 )
 from .rolling import rollout
 from .scoring import score
-from .speaking import as_typed
+from .speaking import as_typed, options_in
 from .writing import check_name, check_outputs, option_for_force
 
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
@@ -166,14 +166,26 @@ def _to_fit(
     common = [name for name in first.columns if name not in clock and all(name in one.columns for one in surveys)]
     more = [] if states else ["--state", ",".join(likely_states(common or first.columns))]
     timeless = guess and first.times is None and not recipe.rate and not recipe.actions
-    more += ["--time", *clock] if clock else ["--rate", "HZ"] * timeless
-    more += [] if actions or recipe.differentiate else ["--differentiate"]
+    more += ["--rate", "HZ"] * (timeless and not clock)
+    cures = _cures(surveys)
+    more += [word for option_and_value in cures.items() for word in option_and_value if word]
+    more += [] if actions or recipe.differentiate or "--by" in cures else ["--differentiate"]
     more += ["--leave-out", ",".join(left_out)] if left_out else []
-    jumps = any(remark.code == "glitch" for one in surveys for remark in one.warnings)
-    more += ["--glitches", "repair"] * jumps
-    right = {"state": states, "action": actions, "leave_out": not left_out, "glitches": not jumps}
+    right = {"state": states, "action": actions and "--by" not in cures, "leave_out": not left_out}
     wrong = [name for name, fine in right.items() if not fine]
+    wrong += [option[2:].replace("-", "_") for option in cures]
     return next_command("fit", *more, "-o", "policy.npz", without=wrong)
+
+
+def _cures(surveys: Sequence[Any]) -> dict[str, str]:
+    """Options, with their values, that warnings name, and notes on degrees; of angles all."""
+    found: dict[str, str] = {}
+    for remark in (one for each in surveys for one in (*each.warnings, *each.notes)):
+        cures = (remark.warns and remark.code != "pause") or remark.code == "degrees"
+        for option, value in options_in(remark.message).items() if cures else ():
+            names = (*found.get(option, value).split(","), *value.split(",") * (option in ("--angle", "--degrees")))
+            found[option] = ",".join(dict.fromkeys(names))
+    return dict(sorted(found.items()))
 
 
 def _are_there(names: Sequence[str] | None, recording: uc.Recording) -> bool:

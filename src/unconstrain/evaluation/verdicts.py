@@ -389,18 +389,20 @@ def _part(where: NDArray[np.bool_], seconds: Array) -> str:
     return f"{percent(where.mean())} of the time, first at {seconds[int(where.argmax())]:.2f} s"
 
 
-def of_replays(found: Verdict, extents: Array, paces: Array, apart: str, lasts: Sequence[float] = ()) -> Verdict:
+def of_replays(
+    found: Verdict, extents: Array, paces: Array, apart: str, lasts: Sequence[float] = (), of: str = ""
+) -> Verdict:
     """Add to a verdict how a policy moves from the starts of demonstrations, held as they were.
 
     ``extents`` and ``paces`` are size and turns of each run over those of its demonstration, NaN where there are none,
     and ``lasts`` the size of the last round over that of the first, over the same; ``apart`` is how far the runs stray
-    from the nearest recorded states, with its unit.
+    from the nearest recorded states, with its unit; ``of`` is as of :func:`size_and_pace`.
     Half of them may be off by :data:`OTHERWISE` either way, whatever the mean is, and none by :data:`FAR_OFF`.
     """
-    measured = _measured(extents, paces, lasts)
+    measured = _measured(*(given := (extents, paces, lasts)))
     if not measured:
         return found
-    ran = f"un from the same starts: {size_and_pace(extents, paces, lasts)}, typically {apart} from the recorded path"
+    ran = f"un from the same starts: {size_and_pace(*given, of)}, typically {apart} from the recorded path"
     off = {name: np.abs(np.log(np.maximum(ratios, 1e-9))) for name, ratios in measured.items()}
     strays = {
         name: int((many > np.log(OTHERWISE)).sum())
@@ -414,11 +416,11 @@ def of_replays(found: Verdict, extents: Array, paces: Array, apart: str, lasts: 
     return _strays(found, f"r{ran}{which}", " and ".join(strays))
 
 
-def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> str:
-    """Those of :func:`of_replays` in words: the middle ones, and their ranges."""
+def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = (), of: str = "") -> str:
+    """Those of :func:`of_replays` in words: the middle ones, and their ranges; ``of`` says which, if not all."""
     told = ", ".join(f"{name} {_times(ratios)}" for name, ratios in _measured(extents, paces, lasts).items())
     runs = f" (in brackets, least to most of {len(extents)} runs)" if "(" in told else ""
-    return f"{told} the demonstrated{runs}" if told else ""
+    return f"{of}{told} the demonstrated{runs}" if told else ""
 
 
 def _measured(*given: Sequence[float] | Array) -> dict[str, Array]:

@@ -94,9 +94,11 @@ def survey(recording: Recording, recipe: Recipe | None = None) -> Survey:
 def survey_set(recordings: Iterable[Recording], recipe: Recipe | None = None) -> list[Survey]:
     """Look at recordings one by one, and at each beside the others; parameters as of :func:`survey`."""
     asked = recipe or Recipe()
-    surveys, outlines = [], []
+    surveys, outlines, degrees = list[Survey](), [], tuple[str, ...]()
     for recording in recordings:
-        subject = subject_of(recording, asked)
+        known = tuple(name for name in degrees if name in recording.columns)  # as of the first, which decides for a fit
+        subject = subject_of(recording, replace(asked, degrees=known) if surveys else asked)
+        degrees = degrees if surveys else subject.recipe.degrees or ()
         surveys.append(_survey(subject, asked))
         outlines.append(outline(subject))
     more = compare(outlines)

@@ -11,6 +11,7 @@ from ....base.arrays import Array
 from ....base.display import listed
 from ...readers.clocks import UNITS, usual
 from ...remarks import Remark
+from ...signals.orientations import TURNS, wraps
 from ...signals.stillness import is_noise, noise_share, rest_before, stops
 from ..meaning import are_backwards, are_targets
 from .subject import FLIPS, GAP_INTERVALS, LEAST_ROWS, Subject
@@ -162,14 +163,27 @@ def reversed_in_time(subject: Subject) -> Remark | None:
 
 
 def angle_wrap(subject: Subject) -> Remark | None:
-    """An angle that jumps by a whole turn."""
+    """Angles that jump by a whole turn."""
     if not subject.wraps:
         return None
     column, wrap = min(subject.wraps.items(), key=lambda one: one[1].rows[0])
-    name = subject.name(column)
-    cure = f"it is made continuous with angles={(name,)}."
-    message = f"jumps by a turn of {wrap.turn:.4g}, {len(wrap.rows)} in all; {cure}"
-    return Remark("angle-wrap", message, name, subject.row(wrap.rows[0]))
+    turns, recipe = {subject.name(one): found.turn for one, found in subject.wraps.items()}, subject.recipe
+    degrees = [name for name, turn in turns.items() if turn == TURNS[1]]
+    cure = f"angles={(*recipe.angles, *turns)}" + f" and degrees={(*(recipe.degrees or ()), *degrees)}" * bool(degrees)
+    said = f"jumps by a turn of {wrap.turn:.4g}, {len(wrap.rows)} in all, and is taken for a plain number, so that "
+    said += f"each jump counts as motion; for an angle, say {cure}."
+    return Remark("angle-wrap", said, subject.name(column), subject.row(wrap.rows[0]))
+
+
+def degrees_untold(subject: Subject) -> Remark | None:
+    """An angle that is taken for radians, and jumps as one in degrees."""
+    degrees = subject.recipe.degrees or ()
+    for name in (one for one in subject.recipe.angles if one not in degrees):
+        wrap = wraps(subject.recording.select([name])[subject.rows, 0])
+        if wrap is not None and wrap.turn == TURNS[1]:
+            said = "jumps by 360, as an angle in degrees does, and is taken for radians; if it is in degrees, say "
+            return Remark("degrees", f"{said}degrees={(*degrees, name)}.", name, subject.row(wrap.rows[0]))
+    return None
 
 
 def turned_sign(code: str, subject: Subject) -> Remark | None:
@@ -288,6 +302,7 @@ CHECKS: tuple[Callable[[Subject], Remark | None], ...] = (
     reversed_in_time,
     other_topic,
     angle_wrap,
+    degrees_untold,
     *(partial(turned_sign, flip.code) for flip in FLIPS),
     glitch,
     seam,
