@@ -146,10 +146,9 @@ def _used(recipe: uc.Recipe, first: uc.Recording, surveys: Sequence[Any]) -> tup
     needed, left_out = as_typed(next(iter(said.values()), "")), list(said)
     if recipe.states is None and 2 * len(said) >= len(surveys):
         other = next(one for one in surveys if one.name in said)
-        needed = (
-            f"'{surveys[0].name}' has columns {listed(first.columns, 8)}, '{other.name}' {listed(other.columns, 8)}, "
-        )
-        needed += "and which are right cannot be told: name with --state what all have, or rename those that are wrong."
+        needed = f"'{surveys[0].name}' has columns {listed(first.columns, 8)}, '{other.name}' "
+        needed += f"{listed(other.columns, 8)}, and which are right cannot be told: name with --state what all have, "
+        needed += "or rename those that are wrong."
         left_out = []
     elif decided.actions is None and decided.rate is None and first.times is None:
         needed = "Nothing tells the time, which velocities take: name its column with --time, or give --rate."
@@ -171,10 +170,9 @@ def _to_fit(
     more += [word for option_and_value in cures.items() for word in option_and_value if word]
     more += [] if actions or recipe.differentiate or "--by" in cures else ["--differentiate"]
     more += ["--leave-out", ",".join(left_out)] if left_out else []
-    right = {"state": states, "action": actions and "--by" not in cures, "leave_out": not left_out}
-    wrong = [name for name, fine in right.items() if not fine]
-    wrong += [option[2:].replace("-", "_") for option in cures]
-    return next_command("fit", *more, "-o", "policy.npz", without=wrong)
+    wrong = {"state": not states, "action": not actions or "--by" in cures, "leave_out": bool(left_out)}
+    wrong |= {option[2:].replace("-", "_"): True for option in cures}
+    return next_command("fit", *more, "-o", "policy.npz", without=[name for name in wrong if wrong[name]])
 
 
 def _cures(surveys: Sequence[Any]) -> dict[str, str]:

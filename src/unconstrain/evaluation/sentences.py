@@ -87,12 +87,13 @@ def about_choice(method: str, candidates: Mapping[str, float]) -> str:
     said = f"Learnt as {way}{f' (softness {softness})' * bool(softness)}: {in_words(way) or 'as asked for'}."
     if len(candidates) < 2:
         return f"{said} Nothing was compared with it."
-    least = {}
-    for name, risk in sorted(candidates.items(), key=lambda one: -one[1]):
-        least[name.partition(", ")[0]] = risk
-    own = max(candidates[method], 1e-300)
-    others = [f"{name} {risk / own:.3g}" for name, risk in reversed(least.items()) if name != way]
-    return f"{said} Estimated squared error of other ways over that of this: {', '.join(others)} ('fit -v' lists all)."
+    least, own = {way: ""}, max(candidates[method], 1e-300)
+    for name, risk in sorted(candidates.items(), key=lambda one: one[1]):
+        many = f"{risk / own:.3g}" if risk <= 1000 * own else "over 1,000"
+        least.setdefault(name.partition(", ")[0], many)
+    others = ", ".join(f"{name} {many}" for name, many in least.items() if many)
+    said += " Estimated squared error of other ways to learn, as times that of this (more is worse):"
+    return f"{said} {others} ('fit -v' lists all)."
 
 
 def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> list[str]:

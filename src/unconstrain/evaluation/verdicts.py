@@ -193,8 +193,8 @@ def of_score(
     across = "What constraints hid in these recordings, too"
     if told is not None and told < MOSTLY:
         across = f"Across the motion: {of_untold(1 - told)}"
-    across += ". What held these recordings, given with --plane or --constraint, tells how far the policy is off in "
-    across += "all directions that this leaves free."
+    across += ". Only motion along the recorded actions is judged; what held these recordings, given with --plane or "
+    across += "--constraint (one by one, if each was held in its own way), tells more: all directions that were free."
     return Verdict(
         mark,
         f"The policy {_explains(share)}{known}{unknown}: {word}.",

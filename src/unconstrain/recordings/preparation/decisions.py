@@ -91,7 +91,5 @@ def may_be_degrees(asked: Recipe, decided: Recipe, recording: Recording) -> tupl
     far = float(np.ptp(recording.select(joints), axis=0).max(initial=0.0)) if len(recording) else 0.0
     if asked.degrees is not None or decided.degrees or not far > FARTHEST * TURNS[0]:
         return ()
-    said = (
-        f"joints go through {far:.3g}, which looks like degrees, and are taken for radians; if they are degrees, say "
-    )
-    return (Remark("degrees", f"{said}degrees={tuple(joints)}.", joints[0]),)
+    said = f"joints go through {far:.3g}, which looks like degrees, and are taken for radians; if they are degrees, "
+    return (Remark("degrees", f"{said}say degrees={tuple(joints)}.", joints[0]),)

@@ -153,10 +153,8 @@ def _prepared(subject: Subject) -> tuple[int | None, tuple[Remark, ...]]:
         missing = np.column_stack([missing, ~np.isfinite(subject.times)])
     if rows := np.flatnonzero(missing.any(axis=1)).tolist():
         lacking = listed([name for name, cells in zip((*used, "time"), missing.T, strict=False) if cells.any()], 8)
-        said = (
-            f"{counted(len(rows), 'row')} without numbers in {lacking}, empty or NaN, cannot be learnt from: remove or "
-        )
-        said += "repair them, or leave it out with leave_out=."
+        said = f"{counted(len(rows), 'row')} without numbers in {lacking}, empty or NaN, cannot be learnt from: remove "
+        said += "or repair them, or leave it out with leave_out=."
         return None, (Remark("missing", said, row=rows[0], place=recording.place(rows[0])),)
     stamps = subject.stamps
     long = stamps is None or (len(stamps) > 0 and np.ptp(stamps) >= window_used(recipe, recording))

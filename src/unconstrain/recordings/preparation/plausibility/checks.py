@@ -211,22 +211,18 @@ def seam(subject: Subject) -> Remark | None:
     """Jumps to another place, as between demonstrations under one another in one table."""
     if subject.recipe.seams == "cut" or not subject.seams:
         return None
-    message = (
-        f"{len(subject.seams)} jump{'s' * (len(subject.seams) > 1)} to another place, as between demonstrations; "
-        "tell them apart with group=, or cut there with seams='cut'."
-    )
-    return Remark("seam", message, row=subject.row(subject.seams[0]))
+    said = f"{len(subject.seams)} jump{'s' * (len(subject.seams) > 1)} to another place, as between demonstrations; "
+    said += "tell them apart with group=, or cut there with seams='cut'."
+    return Remark("seam", said, row=subject.row(subject.seams[0]))
 
 
 def other_topic(subject: Subject) -> Remark | None:
     """Rows that alternate between two movements in two places."""
     if subject.topic is None:
         return None
-    message = (
-        "rows alternate between two places, as where two topics share a table; take them apart by the column that "
-        "names them (group=), or read one (topic= of a ROS recording)."
-    )
-    return Remark("other-topic", message, row=subject.row(subject.topic))
+    said = "rows alternate between two places, as where two topics share a table; take them apart by the column that "
+    said += "names them (group=), or read one (topic= of a ROS recording)."
+    return Remark("other-topic", said, row=subject.row(subject.topic))
 
 
 def targets(subject: Subject) -> Remark | None:

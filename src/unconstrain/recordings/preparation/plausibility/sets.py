@@ -152,10 +152,9 @@ def clock_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
     found = np.flatnonzero(odd & np.isfinite(usual)).tolist()
     if 0 < len(found) == len(outlines) - len(found):
         few, most = ([outlines[place].title for place in np.flatnonzero(odd == of).tolist()] for of in (True, False))
-        said = (
-            f"{listed(few, MOST_NAMED)} have {np.median(rates[odd]):.3g} samples a second, {listed(most, MOST_NAMED)} "
-        )
-        said += f"{usual:.3g}, as in another unit of time, and as many: convert the stamps that are wrong."
+        said = f"{listed(few, MOST_NAMED)} have {np.median(rates[odd]):.3g} samples a second, "
+        said += f"{listed(most, MOST_NAMED)} {usual:.3g}, as in another unit of time, and as many: "
+        said += "convert the stamps that are wrong."
         return [(place, Remark("clock-differs", said)) for place in range(len(outlines))]
     said = f"samples a second, and others have {usual:.3g}: the stamps are in another unit than theirs; convert them, "
     said += "or leave it out with leave_out=."
