@@ -2,6 +2,7 @@
 
 import json
 import shlex
+import shutil
 from itertools import pairwise
 
 import numpy as np
@@ -251,3 +252,18 @@ def test_an_angle_in_degrees_that_a_later_file_alone_shows_is_said_with_its_cure
     assert "--degrees" in command_of(run("inspect", *asked))
     assert told not in text(call("fit", *fit, "--degrees", "yaw"))
     assert told not in text(call("fit", *fit, "--leave-out", "a0"))  # the first tells it then
+
+
+def test_recordings_that_are_the_same_are_named_and_learnt_from_all_the_same(tmp_path):
+    for k in range(4):
+        write(tmp_path / f"w{k}.csv", "t,x,y", stroke(k))
+    asked, fit = (tmp_path / "*.csv", *READ), (*LINEAR, "-o", tmp_path / "p.npz", "--force")
+    assert "same-recording" not in text(call("inspect", *asked)) + text(call("fit", *asked, *fit))
+    shutil.copy(tmp_path / "w0.csv", tmp_path / "copy.csv")
+    with (tmp_path / "w3.csv").open() as file:  # written otherwise
+        (tmp_path / "other.csv").write_text(file.read().replace(",", ";"))
+    said = "'copy' and 'w0', 'other' and 'w3' hold the same recording, which counts more than once"
+    assert text(call("inspect", *asked)).count(said) == 1
+    assert text(call("fit", *asked, *fit)).count(said) == 1
+    assert run("inspect", *asked).startswith("✔ ")
+    run("fit", *asked, *fit, "--strict")

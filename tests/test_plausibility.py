@@ -527,7 +527,8 @@ def test_velocities_in_any_unit_and_changes_stay_as_they_are():
 
 def test_files_are_learnt_from_as_their_first_recording_shows(tmp_path):
     for number in range(3):
-        uc.writers.write_recordings([replace(TARGETS, name=f"d{number}")], tmp_path / f"d{number}.csv")
+        moved = replace(TARGETS, name=f"d{number}", values=TARGETS.values + 1e-6 * number)
+        uc.writers.write_recordings([moved], tmp_path / f"d{number}.csv")
     stream = uc.Stream(sorted(tmp_path.glob("*.csv")), COMMANDED)
     with pytest.warns(PreparationWarning) as said:
         [batch] = stream

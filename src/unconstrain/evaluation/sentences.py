@@ -53,10 +53,8 @@ def _about_noise(found: Diagnosis) -> str:
     verdict = "little" if found.noise_share < SMALL else "some" if found.noise_share < 3 * SMALL else "much"
     too_much = found.noise_share > robust.SPHERE_HIDDEN_BY_NOISE
     hidden = " So much noise makes the following unreliable." if too_much else ""
-    said = (
-        f"Noise: {verdict}, {found.noise:.3g} on each action coordinate, {found.noise_share:.1%} of a typical action "
-        f"({found.typical:.3g}) in all.{hidden}"
-    )
+    said = f"Noise: {verdict}, {found.noise:.3g} on each action coordinate, {found.noise_share:.1%} of a typical "
+    said += f"action ({found.typical:.3g}) in all.{hidden}"
     if found.noise_share < 0.5 * SMALL or found.noise < MISFIT * found.jitter:
         return said
     return said + (
@@ -128,10 +126,8 @@ def _least_shown(region: Region, states: Sequence[str], actions: Sequence[str]) 
 def _about_freedom(found: Diagnosis) -> str:
     said = f"Free, or held by less than the noise: {percent(found.free_share)} of the samples"
     if found.undecided_share >= LITTLE:
-        said += (
-            f"; {percent(found.undecided_share)} were free or always held in the same way, which looks alike. "
-            "Demonstrations held in another way would tell"
-        )
+        said += f"; {percent(found.undecided_share)} were free or always held in the same way, which looks alike. "
+        said += "Demonstrations held in another way would tell"
     if found.free is None:
         return f"{said}. That is of the samples that the policy was fitted to."
     means = np.array([one.free for one in found.movements], dtype=np.float64)

@@ -82,7 +82,7 @@ def compare(outlines: Sequence[Outline | None]) -> list[tuple[Remark, ...]]:
     remarks: list[list[Remark]] = [[] for _ in outlines]
     if known:
         several = [one for _, one in known]
-        remarks[known[0][0]] += [*mixed_units(several), *different_places(several)]
+        remarks[known[0][0]] += [*mixed_units(several), *different_places(several), *same(several)]
         units = unit_differs(several)
         columns = columns_differ(several, {place for place, _ in units})
         against = reversed_among_others(several, {place for place, _ in (*units, *columns)})
@@ -101,11 +101,9 @@ def too_few(demonstrations: int) -> tuple[Remark, ...]:
 
 def doubts(demonstrations: int, missed: float) -> tuple[Remark, ...]:
     """Remarks on what was learnt from some demonstrations, by the share of their motion that it misses."""
-    message = (
-        f"misses {percent(min(missed, 1))} of the motion that it learnt from; actions may be no function of the state, "
-        "as where a movement goes out and back or stands still. Look at the warnings of a survey, and at states=."
-    )
-    nothing = (Remark("explains-nothing", message),) if missed > MOST_MISSED else ()
+    said = f"misses {percent(min(missed, 1))} of the motion it learnt from; actions may be no function of the state, "
+    said += "as where a movement goes out and back or stands still. Look at the warnings of a survey, and at states=."
+    nothing = (Remark("explains-nothing", said),) if missed > MOST_MISSED else ()
     return (*too_few(demonstrations), *nothing)
 
 
@@ -142,6 +140,17 @@ def different_places(outlines: Sequence[Outline]) -> list[Remark]:
     return [
         Remark("places", f"demonstrations are in different places, each farther from others than it is long; {cure}.")
     ]
+
+
+def same(outlines: Sequence[Outline]) -> list[Remark]:
+    """Demonstrations that are the same in each number."""
+    titles: dict[bytes, list[str]] = {}
+    for one in outlines:
+        titles.setdefault(one.places.tobytes() + one.steps.tobytes(), []).append(one.title)
+    alike = ", ".join(" and ".join(several) for several in titles.values() if several[1:])
+    said = f"{alike} hold the same recording, which counts more than once, and tests nothing where its like is learnt "
+    said += "from; leave all but one out with leave_out=."
+    return [Remark("same-recording", said)] if alike else []
 
 
 def clock_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
