@@ -465,8 +465,8 @@ def of_surveys(surveys: Sequence[Any], needed: str = "", then: str = "unconstrai
     """
     count, few = _count(len(surveys)), len(surveys) < ENOUGH
     fewer = f"{count}: 'fit' tells what was free from {ENOUGH} or more, held in different ways." if few else ""
-    warned = [found for found in surveys if found.warnings]
-    odd = {one.code: one for found in reversed(warned) for one in reversed(found.warnings)}
+    warned = [found for found in surveys if {one.code for one in found.warnings} - {"clock-gap"}]
+    odd = {one.code: one for found in reversed(surveys) for one in reversed(found.warnings)}
     if several := odd.get("several-in-one"):
         codes = ", ".join(code for code in odd if code not in SAME_CAUSE)
         said = f"{len(warned)} of {count} not as it should be: {codes}."
@@ -476,7 +476,8 @@ def of_surveys(surveys: Sequence[Any], needed: str = "", then: str = "unconstrai
     if not warned and needed:
         return Verdict(Mark.DOUBTFUL, f"{count}, nothing odd, but fit needs to know more.", doubt=fewer, next=guess)
     if not warned:
-        said = f"{count}, nothing odd: ready to learn from."
+        gaps = " but gaps in time, which nothing is smoothed across" if odd else ""
+        said = f"{count}, nothing odd{gaps}: ready to learn from."
         return Verdict(Mark.DOUBTFUL if few else Mark.GOOD, said, doubt=fewer, next=then)
     said = f"{len(warned)} of {count} not as it should be: {', '.join(odd)}."
     cures = "Read the notes below; each names its cure."
