@@ -205,6 +205,24 @@ def test_a_cycle_that_was_not_shown_is_refused_with_what_shows_one(tmp_path):
     assert "record whole rounds; or guide it to a goal, or not at all" in said
 
 
+def test_values_that_change_every_fifth_row_only_are_said_with_what_smooths_them(tmp_path):
+    fine = [np.column_stack([0.02 * np.arange(200), stroke(k, 200)[:, 1:]]) for k in range(4)]
+    for k, rows in enumerate(fine):
+        held = np.column_stack([rows[:, 0], rows[np.arange(200) // 5 * 5, 1:]])
+        write(tmp_path / f"held{k}.csv", "t,x,y", held)
+        write(tmp_path / f"kept{k}.csv", "t,x,y", held[::5])
+        write(tmp_path / f"fine{k}.csv", "t,x,y", rows)
+    said = "stale: 'held0': changes every 5 rows only, as where a sensor is slower than the clock"
+    shown = run("inspect", tmp_path / "held*.csv", *READ)
+    assert said in text(call("inspect", tmp_path / "held*.csv", *READ))
+    words_ = command_of(shown)[1:-1]
+    assert dict(pairwise(words_))["--by"] == "kalman"
+    assert "stale" not in text(call(*words_, tmp_path / "p.npz", *LINEAR))
+    assert said in text(call("fit", tmp_path / "held*.csv", *READ, *LINEAR, "-o", tmp_path / "q.npz"))
+    for others in ("kept*.csv", "fine*.csv"):
+        assert "stale" not in text(call("inspect", tmp_path / others, *READ))
+
+
 # Angles, and the command that comes next
 
 

@@ -75,9 +75,11 @@ def hands():
         yield uc.Recording(("x", "y"), track.reshape(45, 2), 0.16 * np.arange(45), f"hand {number}")
 
 
-def contours():
+def contours(every=False):
+    """Rows where a tracker saw something new, or every row of a clock that is ten times as fast."""
     for path in sorted((DATA / "kuleuven_contour").glob("data_demo_*.dat")):
         table = np.loadtxt(path, skiprows=1)
+        table = table[every | np.r_[True, (np.diff(table[:, 1:4], axis=0) != 0).any(axis=1)]]
         yield uc.Recording(("x", "y", "z"), table[:, 1:4], table[:, 0], path.stem)
 
 
@@ -86,6 +88,12 @@ def contours():
 def test_nothing_is_said_of_real_recordings(recordings, every):
     for recording in list(recordings())[::every]:
         assert codes([recording], uc.Recipe(recording.columns, differentiate="savgol")) == [[]], recording.name
+
+
+@needs_data
+def test_a_tracker_that_is_slower_than_its_clock_is_found_in_real_recordings():
+    for recording in contours(every=True):
+        assert codes([recording], uc.Recipe(recording.columns, differentiate="savgol")) == [["stale"]], recording.name
 
 
 @pytest.mark.slow

@@ -115,14 +115,7 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     keep_codes(remark.code for found in surveys for remark in found.warnings)
     if as_json:
         plain = [
-            asdict(found)
-            | {
-                kind: [
-                    {"code": one.code, "message": as_typed(one.message), "column": one.column, "row": one.row}
-                    for one in getattr(found, kind)
-                ]
-                for kind in ("warnings", "notes")
-            }
+            asdict(found) | {kind: [*map(_plain, getattr(found, kind))] for kind in ("warnings", "notes")}
             for found in surveys
         ]
         click.echo(json.dumps(plain, indent=2))
@@ -132,6 +125,10 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
         say_surveys(surveys, needed, _to_fit(recipe, first[0], surveys, bool(needed and not lacking), left_out))
         click.echo(used, nl=False)
     refuse_warnings(reading["strict"])
+
+
+def _plain(one: Any) -> dict[str, Any]:
+    return {"code": one.code, "message": as_typed(one.message), "column": one.column, "row": one.row}
 
 
 def _used(recipe: uc.Recipe, first: uc.Recording, surveys: Sequence[Any]) -> tuple[str, str, list[str]]:

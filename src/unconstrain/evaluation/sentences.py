@@ -87,8 +87,7 @@ def about_choice(method: str, candidates: Mapping[str, float]) -> str:
         return f"{said} Nothing was compared with it."
     least, own = {way: ""}, max(candidates[method], 1e-300)
     for name, risk in sorted(candidates.items(), key=lambda one: one[1]):
-        many = f"{risk / own:.3g}" if risk <= 1000 * own else "over 1,000"
-        least.setdefault(name.partition(", ")[0], many)
+        least.setdefault(name.partition(", ")[0], f"{risk / own:.3g}" if risk <= 1000 * own else "over 1,000")
     others = ", ".join(f"{name} {many}" for name, many in least.items() if many)
     said += " Estimated squared error of other ways to learn, as times that of this (more is worse):"
     return f"{said} {others} ('fit -v' lists all)."
@@ -96,11 +95,9 @@ def about_choice(method: str, candidates: Mapping[str, float]) -> str:
 
 def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> list[str]:
     worst = found.regions[0]
-    advice = (
-        f"demonstrate around {named(worst.state, states)} with motion along {named(worst.direction, actions)} left "
-        "free: tilt what holds it, such as the plate, another way, or take another (standard deviation there: "
-        f"{percent(worst.along)} of a typical action; see '{worst.demonstration}')."
-    )
+    advice = f"demonstrate around {named(worst.state, states)} with motion along {named(worst.direction, actions)} "
+    advice += "left free: tilt what holds it, such as the plate, another way, or take another (standard deviation "
+    advice += f"there: {percent(worst.along)} of a typical action; see '{worst.demonstration}')."
     if all(one.determined == 1.0 for one in found.regions):
         return [f"Every recorded state is determined. If you record more: {advice}"]
     told, every, (open_, few) = found.told_together, len(found.regions), regions_left(found)

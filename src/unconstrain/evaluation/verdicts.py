@@ -182,9 +182,7 @@ def of_score(
     few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
     least = "nothing" if under is not None and under < -1 else percent(under or 0)
     known = "" if under is None else f", and {least} under the constraint given (1 − nCPE)"
-    counted = (
-        "Movement under other constraints. Noise, and motion faster or slower than learnt, count as missed in nCPE."
-    )
+    more = "Movement under other constraints. Noise, and motion faster or slower than learnt, count as missed in nCPE."
     if learnt:
         said = f"The policy {_explains(share, 'the motion')}{known}, but it learnt from {learnt} of "
         said += f"{_count(demonstrations)}: a score on what was learnt from is too good."
@@ -199,7 +197,7 @@ def of_score(
         mark,
         f"The policy {_explains(share)}{known}{unknown}: {word}.",
         "" if mark is Mark.BAD else "Movement like this, along the directions that were recorded.",
-        across if under is None else counted,
+        across if under is None else more,
         f"Score it under other constraints.{few}"
         if mark is Mark.GOOD
         else "'unconstrain diagnose' says what to record.",
@@ -476,7 +474,7 @@ def of_surveys(surveys: Sequence[Any], needed: str = "", then: str = "unconstrai
     if not warned and needed:
         return Verdict(Mark.DOUBTFUL, f"{count}, nothing odd, but fit needs to know more.", doubt=fewer, next=guess)
     if not warned:
-        gaps = " but gaps in time, which nothing is smoothed across" if odd else ""
+        gaps = " but gaps in time, which nothing is smoothed across" * bool(odd)
         said = f"{count}, nothing odd{gaps}: ready to learn from."
         return Verdict(Mark.DOUBTFUL if few else Mark.GOOD, said, doubt=fewer, next=then)
     said = f"{len(warned)} of {count} not as it should be: {', '.join(odd)}."

@@ -99,7 +99,6 @@ def look_page(
     learnt = _free(innermost(policy), demos)
     known = free if learnt is None else learnt
     described = None if policy is None else _described(policy, len(columns))
-    planes = diagnosis.planes_of(demos)
     data = {
         "columns": list(columns),
         "units": [(units or {}).get(name, "") for name in columns],
@@ -111,7 +110,7 @@ def look_page(
         "patches": list(_patches(constraint, stack(held or thinned).states)),
         "samples": sum(map(len, demos)),
         "policy": described,
-        "planes": planes[: len(planes) == 1].tolist(),
+        "planes": (planes := diagnosis.planes_of(demos))[: len(planes) == 1].tolist(),
         "verdict": "" if verdict is None else f"{verdict.mark.value} {verdict.said}",
     }
     runs = policy is not None and described is not None and not described["trouble"]

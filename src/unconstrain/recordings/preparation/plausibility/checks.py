@@ -83,12 +83,9 @@ def clock_gap(subject: Subject) -> Remark | None:
     if not rows.size:
         return None
     worst = int(rows[np.argmax(intervals[rows - 1])])
-    return Remark(
-        "clock-gap",
-        f"{rows.size} gap{'s' * (rows.size > 1)} in the time stamps, the longest {intervals[worst - 1]:.3g} s after "
-        f"{stamps[worst - 1] - stamps[0]:.6g} s; nothing is smoothed or interpolated across (max_gap_s=).",
-        row=int(at[rows[0]]),
-    )
+    said = f"{rows.size} gap{'s' * (rows.size > 1)} in the time stamps, the longest {intervals[worst - 1]:.3g} s after "
+    said += f"{stamps[worst - 1] - stamps[0]:.6g} s; nothing is smoothed or interpolated across (max_gap_s=)."
+    return Remark("clock-gap", said, row=int(at[rows[0]]))
 
 
 def clock_untold(subject: Subject) -> Remark | None:
@@ -110,6 +107,20 @@ def clock_untold(subject: Subject) -> Remark | None:
         return None
     said = f"rises steadily, as a clock: if it is one, say time={name!r}; no clock and no count of rows is a state."
     return Remark("clock-untold", said, name)
+
+
+def stale(subject: Subject) -> Remark | None:
+    """Values that are repeated at regular steps, so of a sensor that is slower than the clock."""
+    changes = np.zeros(max(len(subject.rows) - 1, 0), dtype=bool)
+    for column in subject.states.T if subject.moves and subject.recipe.differentiate != "kalman" else ():
+        changes |= column[1:] != column[:-1]
+    steps = np.diff(np.flatnonzero(changes))
+    every = float(np.median(steps)) if len(steps) >= LEAST_ROWS else 1.0
+    if every < 2 or (np.abs(steps - every) > every / 3).mean() > STEADY:
+        return None
+    said = f"changes every {every:.0f} rows only, as where a sensor is slower than the clock: velocities are those of "
+    said += "stairs. Record at the rate of the sensor, or keep only the rows that change"
+    return Remark("stale", said + ("." if subject.recipe.actions else ", or smooth them with differentiate='kalman'."))
 
 
 def irregular(subject: Subject) -> Remark | None:
@@ -293,6 +304,7 @@ CHECKS: tuple[Callable[[Subject], Remark | None], ...] = (
     clock_unit,
     clock_gap,
     clock_untold,
+    stale,
     irregular,
     row_order,
     reversed_in_time,

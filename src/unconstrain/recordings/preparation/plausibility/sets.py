@@ -137,9 +137,8 @@ def different_places(outlines: Sequence[Outline]) -> list[Remark]:
         cure = "if where they are does not matter, take each from its own centre with centre=True"
     else:
         cure = "they move on from end to end, so no mean tells their places (centre=True would hide a constant push)"
-    return [
-        Remark("places", f"demonstrations are in different places, each farther from others than it is long; {cure}.")
-    ]
+    said = f"demonstrations are in different places, each farther from others than it is long; {cure}."
+    return [Remark("places", said)]
 
 
 def same(outlines: Sequence[Outline]) -> list[Remark]:
@@ -185,10 +184,8 @@ def unit_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
     named = [listed([outlines[place].title for place in places], MOST_NAMED) for places in (few, most)]
     than = f"{factor:.3g} times {size} than {named[1]}, as in another unit"
     if len(few) == len(most):
-        said, places = (
-            f"{named[0]} {'are' if few[1:] else 'is'} {than}, and as many: convert those that are wrong.",
-            sorted([*few, *most]),
-        )
+        said = f"{named[0]} {'are' if few[1:] else 'is'} {than}, and as many: convert those that are wrong."
+        places = sorted([*few, *most])
     else:
         said, places = f"is {than}; convert it, or leave it out with leave_out=.", few
     rest = unit_differs([outlines[place] for place in most]) if len(few) < len(most) else []
