@@ -282,6 +282,14 @@ def clock_untold(rng):
     return Fault(recordings, recipe, "clock-untold", int(rng.integers(len(recordings))), None)
 
 
+def stale(rng):
+    tables, dt = movements(rng)
+    which, every = int(rng.integers(len(tables))), float(rng.choice([2.0, 5.0, rng.uniform(3, 6)]))
+    seen = np.floor(np.arange(len(tables[which])) / every) * every  # when the sensor last looked
+    tables[which] = tables[which][np.ceil(seen).astype(int).clip(max=len(seen) - 1)]
+    return Fault(*recorded(tables, dt), "stale", which, None)
+
+
 def missing(rng):
     recordings, recipe = recorded(*movements(rng))
     which = int(rng.integers(len(recordings)))
@@ -304,7 +312,7 @@ def refused(rng):
 FAULTS = (
     nothing, nothing_with_actions, angle_wrap, quaternion_flip, rotation_vector_flip, seam, glitch, clock_unit,
     clock_gap, targets, mixed_units, unit_differs, pause, backwards, at_rest, all_zero, few_demonstrations, row_order,
-    other_topic, clock_differs, columns_differ, clock_untold, missing, refused,
+    other_topic, clock_differs, columns_differ, clock_untold, stale, missing, refused,
 )  # fmt: skip
 
 

@@ -356,7 +356,8 @@ def test_fit_says_the_unit_of_noise_where_actions_have_one(files, tmp_path, unit
 def test_fit_says_how_the_default_learner_went(files, tmp_path):
     said = below(run("fit", *files, "--model", "linear", "-o", tmp_path / "p.npz")).splitlines()[2]
     assert re.fullmatch(
-        r"Learnt as .*: .*\. Estimated squared error of other ways over that of this: .* \('fit -v' lists all\)\. "
+        r"Learnt as .*: .*\. Estimated squared error of other ways to learn, as times that of this \(more is worse\): "
+        r".* \('fit -v' lists all\)\. "
         r"Noise and misfit are about \S+ on each action, in its unit, and \d+% of the samples were free.*\.",
         said,
     )

@@ -135,7 +135,11 @@ class TestWhatIsFound:
                     "method": "softened hybrid, 0.1",
                     "candidates": {"direct": 0.3, "softened hybrid, 0.1": 0.1, "softened hybrid, 1": 0.2},
                 },
-                "Estimated squared error of other ways over that of this: direct 3 ('fit -v' lists all).",
+                "of other ways to learn, as times that of this (more is worse): direct 3 ('fit -v' lists all).",
+            ),
+            (
+                {"method": "direct", "candidates": {"direct": 1e-9, "hybrid": 1.0}},
+                "worse): hybrid over 1,000 (",
             ),
             ({"noise_share": 0.5}, "So much noise makes the following unreliable."),
             ({"noise_share": 0.2, "noise": 1.0, "jitter": 0.1}, "Only 0.1 of it changes from sample to sample"),
@@ -194,7 +198,7 @@ class TestCommand:
             "12 demonstrations, 360 samples",
             "Noise: ",
             "Learnt as likelihood: ",
-            "Estimated squared error of other ways over that of this: ",
+            "Estimated squared error of other ways to learn, as times that of this (more is worse): ",
             "demonstrate around (x = ",
             "left free: tilt what holds it, such as the plate, another way, or take another (",
         ):

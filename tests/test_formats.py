@@ -254,7 +254,7 @@ def test_robomimic_holds_a_demonstration_a_group_with_its_observations_beside_th
     path = robomimic(tmp_path / "a.hdf5")
     recordings = uc.read(path)
     assert names(recordings) == ["data/demo_0", "data/demo_1", "data/demo_2"]
-    demonstrations = uc.prepare(recordings, uc.Recipe(states="robot0_eef_pos", actions="actions"))
+    demonstrations = uc.prepare(recordings[0], uc.Recipe(states="robot0_eef_pos", actions="actions"))
     assert_array_equal(demonstrations[0].states, STATES)
     assert_array_equal(demonstrations[0].actions, ACTIONS)
     assert_allclose(recordings[0].times, STEPS / 20)

@@ -11,7 +11,7 @@ from selenium.webdriver import ActionChains, Keys
 
 import unconstrain as uc
 from seen import on_a_phone, unnamed_canvases, width_of
-from test_cli import call, refused, run
+from test_cli import call, refused, run, write
 from test_one_model import FEATURES, of_one_model
 from unconstrain.pages.look import look_page, marks_of
 
@@ -239,6 +239,48 @@ def test_every_colour_and_time_can_be_shown(page):
     )
     page.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]));")
     assert text(page, "now-says") == "2 s"
+
+
+@pytest.mark.parametrize("tilts", [(30, 30, 30), (10, 20, 30)])
+def test_the_plane_begins_as_that_of_the_recordings_where_all_are_in_one(browser, tmp_path, tilts):
+    times, files = np.arange(0, 4, 0.05), []
+    for index, tilt in enumerate(np.radians(tilts)):
+        x, y = np.exp(-0.5 * times) * np.cos(times + index), np.exp(-0.5 * times) * np.sin(times + index)
+        table = np.column_stack([times, np.cos(tilt) * x, y, -np.sin(tilt) * x])
+        files.append(write(tmp_path / f"{index}.csv", "t,x,y,z", table))
+    policy, page = tmp_path / "p.npz", tmp_path / "look.html"
+    run("fit", *files, "--model", "affine", "--learner", "direct", "-o", policy)
+    run("look", *files, policy, "-o", page)
+    for seen in opened(browser, page):
+        roll = seen.execute_script("return look.roll")
+        begins = (True, 30, 0) if len({*tilts}) == 1 else (False, 0, 0)
+        assert (roll["plane"], roll["tilt"], roll["turn"]) == begins
+        assert seen.find_element("id", "plane").is_selected() is begins[0]
+        assert seen.find_element("id", "tilt").get_attribute("value") == f"{begins[1]}"
+        assert text(seen, "tilt-says") == f"{begins[1]}°"
+
+
+@pytest.mark.parametrize("unit", ["px", "mm"])
+def test_what_was_drawn_on_a_screen_is_shown_as_there(browser, tmp_path, unit):
+    times = np.arange(0, 4, 0.05)
+    table = np.column_stack([times, 300 + 100 * np.cos(times), 200 + 100 * times])
+    files = [write(tmp_path / f"{k}.csv", f"t,x [{unit}],y [{unit}]", np.add(table, [0, k, k])) for k in range(3)]
+    run("look", *files, "-o", tmp_path / "look.html")
+    for seen in opened(browser, tmp_path / "look.html"):
+        upper, lower = seen.execute_script("return [[300, 200], [300, 600]].map((point) => look.project(point)[1])")
+        assert (upper < lower) is (unit == "px")
+        assert ("points downwards, as on a screen" in text(seen, "legend")) is (unit == "px")
+
+
+def test_a_gap_in_time_alone_is_no_reason_to_doubt(tmp_path):
+    for index, table in enumerate(wipes(4)[:2] + wipes(4)[3:]):
+        write(tmp_path / f"{index}.csv", "t,x,y,z", table)
+    asked = (tmp_path / "*.csv", "--by", "savgol")
+    for command in (("inspect", *asked), ("look", *asked, "-o", tmp_path / "look.html")):
+        assert run(*command).startswith("✔ 3 demonstrations, nothing odd but gaps in time, which nothing is smoothed")
+    rests = wipes(4)[2]
+    write(tmp_path / "3.csv", "t,x,y,z", rests)
+    assert run("inspect", *asked).startswith("! 1 of 4 demonstrations not as it should be: ")
 
 
 def test_regions_count_demonstrations_not_samples(browser, tmp_path):

@@ -237,6 +237,46 @@ def test_score_says_what_was_learnt_from(folder, policy):
     assert "it learnt from 1 of 2 demonstrations" in mixed["verdict"]["said"]
 
 
+def test_a_stroke_that_hardly_moves_has_no_score_and_spoils_no_mean(folder, policy, tmp_path):
+    moving, rows = folder / "unseen" / "w6.csv", stroke(6)
+    rows[:, 1:] = rows[0, 1:] + 1e-4 * np.random.default_rng(0).standard_normal((40, 2))
+    still = write(tmp_path / "still.csv", HEAD, rows)
+    shown = call("score", policy, moving, still)
+    assert re.search(r"^still +hardly moved: no score *$", shown.out, re.MULTILINE)
+    assert "Note: still hardly moved, beside what the policy does there: no score." in shown.err
+    both, one = (json.loads(run("score", policy, *of, "--json")) for of in ((moving, still), (moving,)))
+    assert (both["hardly_moved"], one["hardly_moved"]) == (["still"], [])
+    assert (both["all"], both["verdict"]) == (one["all"], one["verdict"])
+    rows = stroke(6)
+    rows[:, 1:] = rows[::-1, 1:] * [1.0, -1.0]  # which moves, but another way
+    shown = call("score", policy, moving, write(tmp_path / "other.csv", HEAD, rows))
+    assert re.search(r"^other +40 +worse than standing still ", shown.out, re.MULTILINE)
+    assert "hardly moved" not in text(shown)
+
+
+def test_a_score_says_that_motion_along_the_recorded_actions_alone_is_judged_but_where_a_constraint_is_given(
+    folder, policy
+):
+    said = "Only motion along the recorded actions is judged; what held these recordings, given with --plane or"
+    assert said in text(call("score", policy, folder / "unseen"))
+    assert said not in text(call("score", policy, folder / "unseen", "--plane", "1,1"))
+
+
+@pytest.mark.parametrize(
+    ("typed", "said"),
+    [
+        (("--variance", "inf"), "a policy: one affine model for all states"),
+        (("--variance", "3000"), r"a policy: \d+ local models of σ² 3000"),
+        (("--variance", "inf", "--guided", "0,0"), "a guided policy: one affine model for all states"),
+    ],
+)
+def test_info_begins_with_the_models_that_fit_spoke_of(folder, tmp_path, typed, said):
+    told = run("fit", folder, "--learner", "direct", *typed, "-o", tmp_path / "p.npz")
+    [shown] = re.findall(r"^holds +(.*?) *$", run("info", tmp_path / "p.npz"), re.MULTILINE)
+    assert re.fullmatch(said, shown)
+    assert shown.partition(": ")[2] in told
+
+
 def test_it_knows_files_by_what_is_in_them(folder, policy, tmp_path):
     shutil.copy(folder / "w1.csv", tmp_path)
     shutil.copy(folder / "unseen" / "w6.csv", tmp_path / "w2.csv")

@@ -1,6 +1,9 @@
 """What somebody meets whose files are not as they seem: what is said, of which line, and what to type."""
 
 import json
+import shlex
+import shutil
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,7 +11,7 @@ import pytest
 import unconstrain as uc
 from test_cli import call, refused, run, write
 from test_formats import workbook
-from test_newcomer import stroke, text
+from test_newcomer import LINEAR, stroke, text
 
 READ = ("--state", "x,y", "--by", "savgol")
 
@@ -265,3 +268,85 @@ def test_many_samples_in_a_row_far_off_their_neighbours_are_kept_and_to_be_dropp
     found, verdict = learnt(*fit, "--glitches", "drop")
     assert np.abs(found - clean).max() < 0.02 * np.abs(clean).max()
     assert "glitches" not in verdict["said"]
+
+
+def test_values_that_change_every_fifth_row_only_are_said_with_what_smooths_them(tmp_path):
+    fine = [np.column_stack([0.02 * np.arange(200), stroke(k, 200)[:, 1:]]) for k in range(4)]
+    for k, rows in enumerate(fine):
+        held = np.column_stack([rows[:, 0], rows[np.arange(200) // 5 * 5, 1:]])
+        write(tmp_path / f"held{k}.csv", "t,x,y", held)
+        write(tmp_path / f"kept{k}.csv", "t,x,y", held[::5])
+        write(tmp_path / f"fine{k}.csv", "t,x,y", rows)
+    said = "stale: 'held0': changes every 5 rows only, as where a sensor is slower than the clock"
+    shown = run("inspect", tmp_path / "held*.csv", *READ)
+    assert said in text(call("inspect", tmp_path / "held*.csv", *READ))
+    words_ = command_of(shown)[1:-1]
+    assert dict(pairwise(words_))["--by"] == "kalman"
+    assert "stale" not in text(call(*words_, tmp_path / "p.npz", *LINEAR))
+    assert said in text(call("fit", tmp_path / "held*.csv", *READ, *LINEAR, "-o", tmp_path / "q.npz"))
+    for others in ("kept*.csv", "fine*.csv"):
+        assert "stale" not in text(call("inspect", tmp_path / others, *READ))
+
+
+# Angles, and the command that comes next
+
+
+def turning(number, start, per_second=30.0, length=60):
+    """Times, a place, and an angle in degrees from -180 to 180 that begins somewhere."""
+    times = 0.05 * np.arange(length)
+    return np.column_stack([times, 50 * np.sin(times + number), (start + per_second * times + 180) % 360 - 180])
+
+
+def command_of(shown):
+    """Words of the fit that inspect proposes."""
+    return shlex.split(next(line for line in shown.splitlines() if "unconstrain fit " in line).split("Next: ")[-1])
+
+
+def test_the_command_that_comes_next_has_each_cure_that_the_notes_name(tmp_path):
+    for k in range(4):
+        rows = np.column_stack([turning(k, 120 + 10 * k), turning(k, 100 + 40 * k)[:, 2]])
+        write(tmp_path / f"a{k}.csv", "t,x,roll,yaw", rows * [1000, 1, 1, 1])
+    typed = (tmp_path / "a*.csv", "--state", "x,roll,yaw", "--time-unit", "s", "--angle", "roll")
+    shown = run("inspect", *typed, "--differentiate")
+    _, *words_ = command_of(shown)
+    options = dict(pairwise(words_))
+    assert (options["--angle"], options["--degrees"], options["--time-unit"]) == ("roll,yaw", "roll,yaw", "ms")
+    assert words_.count("--time-unit") == words_.count("--angle") == 1
+    assert "and is taken for a plain number, so that each jump counts as motion; for an angle, say" in text(
+        call("inspect", *typed, "--differentiate")
+    )
+    ran = call(*words_[:-1], tmp_path / "p.npz", *LINEAR)
+    assert "angle-wrap" not in ran.err
+    assert "clock-unit" not in ran.err
+    for k in range(4):
+        write(tmp_path / f"steady{k}.csv", "t,x,yaw", turning(k, -60))
+    plain = command_of(run("inspect", tmp_path / "steady*.csv", "--state", "x,yaw", "--differentiate"))
+    assert not {"--angle", "--degrees", "--time-unit"} & {*plain}
+
+
+def test_an_angle_in_degrees_that_a_later_file_alone_shows_is_said_with_its_cure(tmp_path):
+    for k, start in enumerate((-60, 120, 130)):
+        write(tmp_path / f"a{k}.csv", "t,x,yaw", turning(k, start))
+    asked = (tmp_path / "a*.csv", "--state", "x,yaw", "--differentiate", "--angle", "yaw")
+    fit = (*asked, *LINEAR, "-o", tmp_path / "p.npz", "--force")
+    told = "column 'yaw': jumps by 360, as an angle in degrees does, and is taken for radians; if it is in degrees, say"
+    assert f"{told} --degrees yaw." in text(call("inspect", *asked))
+    assert f"{told} --degrees yaw." in text(call("fit", *fit))
+    assert "--degrees" in command_of(run("inspect", *asked))
+    assert told not in text(call("fit", *fit, "--degrees", "yaw"))
+    assert told not in text(call("fit", *fit, "--leave-out", "a0"))  # the first tells it then
+
+
+def test_recordings_that_are_the_same_are_named_and_learnt_from_all_the_same(tmp_path):
+    for k in range(4):
+        write(tmp_path / f"w{k}.csv", "t,x,y", stroke(k))
+    asked, fit = (tmp_path / "*.csv", *READ), (*LINEAR, "-o", tmp_path / "p.npz", "--force")
+    assert "same-recording" not in text(call("inspect", *asked)) + text(call("fit", *asked, *fit))
+    shutil.copy(tmp_path / "w0.csv", tmp_path / "copy.csv")
+    with (tmp_path / "w3.csv").open() as file:  # written otherwise
+        (tmp_path / "other.csv").write_text(file.read().replace(",", ";"))
+    said = "'copy' and 'w0', 'other' and 'w3' hold the same recording, which counts more than once"
+    assert text(call("inspect", *asked)).count(said) == 1
+    assert text(call("fit", *asked, *fit)).count(said) == 1
+    assert run("inspect", *asked).startswith("✔ ")
+    run("fit", *asked, *fit, "--strict")

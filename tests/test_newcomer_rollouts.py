@@ -433,3 +433,15 @@ def test_what_a_page_cannot_draw_together_is_refused(folder, tmp_path):
     run("constraint", table, "--state", "a,b", "--differentiate", "-o", tmp_path / "c.npz")
     assert "of the same columns" in refused("look", stroke, policies[0], tmp_path / "c.npz", "-o", page)
     run("look", stroke, policies[0], "-o", page)
+
+
+def test_where_some_demonstrations_alone_are_run_it_is_said_how_many_and_why(folder, tmp_path):
+    held, turns = [write(tmp_path / f"{k}.csv", HEAD, oval(k, 4.0)[::4]) for k in range(4)], np.linspace(0, 40, 101)
+    wound = [[t, 60 * np.cos(t), 60 * np.sin(t) * np.cos(t / 7), 60 * np.sin(t) * np.sin(t / 7)] for t in turns]
+    bent = write(tmp_path / "bent.csv", HEAD, np.array(wound) * [0.1, 1, 1, 1])
+    asked = ("--by", "savgol", "--model", "affine", "--learner", "direct", "-o", tmp_path / "p.npz", "--force")
+    told = "for 4 of 5 demonstrations, each held in the same way all the time (along a line, in a plane), size"
+    assert f"un from the same starts: {told}" in " ".join(run("fit", *held, bent, *asked).split())
+    assert f"un from the same starts: {told}" in " ".join(run("info", tmp_path / "p.npz").split())
+    assert told in " ".join(run("score", tmp_path / "p.npz", *held, bent).split())
+    assert "un from the same starts: size" in " ".join(run("fit", *held, *asked).split())

@@ -75,9 +75,11 @@ def hands():
         yield uc.Recording(("x", "y"), track.reshape(45, 2), 0.16 * np.arange(45), f"hand {number}")
 
 
-def contours():
+def contours(every=False):
+    """Rows where a tracker saw something new, or every row of a clock that is ten times as fast."""
     for path in sorted((DATA / "kuleuven_contour").glob("data_demo_*.dat")):
         table = np.loadtxt(path, skiprows=1)
+        table = table[every | np.r_[True, (np.diff(table[:, 1:4], axis=0) != 0).any(axis=1)]]
         yield uc.Recording(("x", "y", "z"), table[:, 1:4], table[:, 0], path.stem)
 
 
@@ -86,6 +88,12 @@ def contours():
 def test_nothing_is_said_of_real_recordings(recordings, every):
     for recording in list(recordings())[::every]:
         assert codes([recording], uc.Recipe(recording.columns, differentiate="savgol")) == [[]], recording.name
+
+
+@needs_data
+def test_a_tracker_that_is_slower_than_its_clock_is_found_in_real_recordings():
+    for recording in contours(every=True):
+        assert codes([recording], uc.Recipe(recording.columns, differentiate="savgol")) == [["stale"]], recording.name
 
 
 @pytest.mark.slow
@@ -568,7 +576,8 @@ def test_velocities_in_any_unit_and_changes_stay_as_they_are():
 
 def test_files_are_learnt_from_as_their_first_recording_shows(tmp_path):
     for number in range(3):
-        uc.writers.write_recordings([replace(TARGETS, name=f"d{number}")], tmp_path / f"d{number}.csv")
+        moved = replace(TARGETS, name=f"d{number}", values=TARGETS.values + 1e-6 * number)
+        uc.writers.write_recordings([moved], tmp_path / f"d{number}.csv")
     stream = uc.Stream(sorted(tmp_path.glob("*.csv")), COMMANDED)
     with pytest.warns(PreparationWarning) as said:
         [batch] = stream

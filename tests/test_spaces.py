@@ -212,7 +212,7 @@ def test_degrees_are_known_by_the_row_of_units_by_their_jumps_or_by_the_option()
 def test_degrees_that_are_said_to_be_none_are_a_warning():
     wrapped = crank(3.0, 180 / np.pi)
     told = uc.Recipe(("crank",), differentiate="savgol", angles=("crank",), degrees=())
-    with pytest.warns(match="column 'crank': jumps by 360, and is taken for radians"):
+    with pytest.warns(match="column 'crank': jumps by 360, as an angle in degrees does, and is taken for radians"):
         uc.prepare(wrapped, told)
     with catch_warnings():
         simplefilter("error")

@@ -106,7 +106,7 @@ def test_convert_goes_from_robomimic_to_lerobot(tmp_path):
     assert done.exit_code == 0, done.output
     again = uc.read(tmp_path / "set")
     assert len(again) == 3
-    assert_allclose(uc.prepare(again, uc.Recipe("observation.state", "action"))[1].actions, ACTIONS, atol=1e-6)
+    assert_allclose(uc.prepare(again[1], uc.Recipe("observation.state", "action"))[0].actions, ACTIONS, atol=1e-6)
 
 
 def test_convert_brings_topics_onto_one_clock(tmp_path):

@@ -55,7 +55,7 @@ from .reading import (
 )
 from .rolling import rollout
 from .scoring import score
-from .speaking import as_typed
+from .speaking import as_typed, options_in
 from .writing import check_name, check_outputs, option_for_force
 
 LEARNERS = ("robust", "hybrid", "inconsistency", "direct")
@@ -115,14 +115,7 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     keep_codes(remark.code for found in surveys for remark in found.warnings)
     if as_json:
         plain = [
-            asdict(found)
-            | {
-                kind: [
-                    {"code": one.code, "message": as_typed(one.message), "column": one.column, "row": one.row}
-                    for one in getattr(found, kind)
-                ]
-                for kind in ("warnings", "notes")
-            }
+            asdict(found) | {kind: [*map(_plain, getattr(found, kind))] for kind in ("warnings", "notes")}
             for found in surveys
         ]
         click.echo(json.dumps(plain, indent=2))
@@ -132,6 +125,10 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
         say_surveys(surveys, needed, _to_fit(recipe, first[0], surveys, bool(needed and not lacking), left_out))
         click.echo(used, nl=False)
     refuse_warnings(reading["strict"])
+
+
+def _plain(one: Any) -> dict[str, Any]:
+    return {"code": one.code, "message": as_typed(one.message), "column": one.column, "row": one.row}
 
 
 def _used(recipe: uc.Recipe, first: uc.Recording, surveys: Sequence[Any]) -> tuple[str, str, list[str]]:
@@ -146,10 +143,9 @@ def _used(recipe: uc.Recipe, first: uc.Recording, surveys: Sequence[Any]) -> tup
     needed, left_out = as_typed(next(iter(said.values()), "")), list(said)
     if recipe.states is None and 2 * len(said) >= len(surveys):
         other = next(one for one in surveys if one.name in said)
-        needed = (
-            f"'{surveys[0].name}' has columns {listed(first.columns, 8)}, '{other.name}' {listed(other.columns, 8)}, "
-        )
-        needed += "and which are right cannot be told: name with --state what all have, or rename those that are wrong."
+        needed = f"'{surveys[0].name}' has columns {listed(first.columns, 8)}, '{other.name}' "
+        needed += f"{listed(other.columns, 8)}, and which are right cannot be told: name with --state what all have, "
+        needed += "or rename those that are wrong."
         left_out = []
     elif decided.actions is None and decided.rate is None and first.times is None:
         needed = "Nothing tells the time, which velocities take: name its column with --time, or give --rate."
@@ -166,14 +162,25 @@ def _to_fit(
     common = [name for name in first.columns if name not in clock and all(name in one.columns for one in surveys)]
     more = [] if states else ["--state", ",".join(likely_states(common or first.columns))]
     timeless = guess and first.times is None and not recipe.rate and not recipe.actions
-    more += ["--time", *clock] if clock else ["--rate", "HZ"] * timeless
-    more += [] if actions or recipe.differentiate else ["--differentiate"]
+    more += ["--rate", "HZ"] * (timeless and not clock)
+    cures = _cures(surveys)
+    more += [word for option_and_value in cures.items() for word in option_and_value if word]
+    more += [] if actions or recipe.differentiate or "--by" in cures else ["--differentiate"]
     more += ["--leave-out", ",".join(left_out)] if left_out else []
-    jumps = any(remark.code == "glitch" and not remark.cured for one in surveys for remark in one.warnings)
-    more += ["--glitches", "repair" if recipe.glitches == "keep" else "drop"] * jumps
-    right = {"state": states, "action": actions, "leave_out": not left_out, "glitches": not jumps}
-    wrong = [name for name, fine in right.items() if not fine]
-    return next_command("fit", *more, "-o", "policy.npz", without=wrong)
+    wrong = {"state": not states, "action": not actions or "--by" in cures, "leave_out": bool(left_out)}
+    wrong |= {option[2:].replace("-", "_"): True for option in cures}
+    return next_command("fit", *more, "-o", "policy.npz", without=[name for name in wrong if wrong[name]])
+
+
+def _cures(surveys: Sequence[Any]) -> dict[str, str]:
+    """Options, with their values, that warnings name, and notes on degrees; of angles all."""
+    found: dict[str, str] = {}
+    for remark in (one for each in surveys for one in (*each.warnings, *each.notes)):
+        cures = (remark.warns and not remark.cured and remark.code != "pause") or remark.code == "degrees"
+        for option, value in options_in(remark.message).items() if cures else ():
+            names = (*found.get(option, value).split(","), *value.split(",") * (option in ("--angle", "--degrees")))
+            found[option] = ",".join(dict.fromkeys(names))
+    return dict(sorted(found.items()))
 
 
 def _are_there(names: Sequence[str] | None, recording: uc.Recording) -> bool:

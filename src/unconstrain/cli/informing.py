@@ -92,7 +92,8 @@ def info(file: str, as_json: bool) -> None:
         click.echo(json.dumps(told | {"verdict": verdict_of(held, notes).to_json()}, indent=2))
         return
     say_verdict(verdict_of(held, notes))
-    told |= {"holds": "a learnt constraint"} if isinstance(held, uc.LearntConstraint) else {}
+    kind = {uc.LearntConstraint: "a learnt constraint", uc.Guided: "a guided policy"}.get(type(held), "a policy")
+    told["holds"] = f"{kind}: {told.pop('model')}" if "model" in told else kind
     told |= {TOLD: f"{percent(told[TOLD])}, by all recordings together"} if told.get(TOLD) is not None else {}
     rows = [[name, _said(value)] for name, value in told.items() if value not in (None, [], {}, "")]
     print_table(["", ""], rows, uc.evaluation.verdicts.WIDTH)

@@ -11,7 +11,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import innermost, percent
+from ..base.display import innermost, listed, percent
 from ..base.errors import SettingError
 from .constraining import held_of, options_for_held
 from .informing import TOLD, learnt_from
@@ -50,27 +50,46 @@ def score(
     if 2 * (support_of(learnt, states) < uc.models.SUPPORTED).sum() > len(states):
         click.echo(f"Note: {policy}: learnt far from most of these states: are they of another task?", err=True)
     with shown("scoring"):
+        demonstrations, still = _moved(moving, demonstrations)
         rows = [_scores(moving, held, [demo], demo.name) for demo in demonstrations]
         whole = _scores(moving, held, demonstrations, "all")
         planes = uc.evaluation.metrics.explained_in_planes(moving, demonstrations)
     known, under = learnt_from(learnt, notes, recordings), None if held is None else 1.0 - whole["ncpe"]
-    more = under, None if known is None else len(known), notes.get(TOLD)
-    judged = verdicts.of_score(whole["explains"], len(demonstrations), *more)
+    seen = None if known is None else len(known)
+    judged = verdicts.of_score(whole["explains"], len(demonstrations), under, seen, notes.get(TOLD))
     judged = verdicts.of_worst(judged, {row["demonstration"]: row["explains"] for row in rows})
     judged = judged if held is not None else verdicts.of_planes(judged, planes)
     with shown("running it from the same starts"):
         found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units)
     verdict = verdicts.of_unit(verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0)), _times(learnt, states))
     if as_json:
-        told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known, "in_planes": _known(planes)}
-        click.echo(json.dumps({**told, "replayed": found.medians, "verdict": verdict.to_json()}, indent=2))
+        told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known, "hardly_moved": still}
+        more = {"in_planes": _known(planes), "replayed": found.medians, "verdict": verdict.to_json()}
+        click.echo(json.dumps(told | more, indent=2))
         return
     say_verdict(verdict)
+    _print_scores(rows, whole, still)
+
+
+def _print_scores(rows: Sequence[dict[str, Any]], whole: dict[str, Any], still: Sequence[str]) -> None:
+    """Scores of each demonstration and of all, and those that hardly moved."""
     head = ["demonstration", "samples", "explains", "normalised inconsistency", "nPOE", "nCPE"][: len(whole)]
-    each = [[*one.values()] for one in (*rows, whole)]
-    print_table(
-        head, [[name, str(size), percent(share), *map("{:.4g}".format, rest)] for name, size, share, *rest in each]
-    )
+    each = [
+        [name, str(size), percent(share) if share >= -1 else "worse than standing still", *map("{:.4g}".format, rest)]
+        for name, size, share, *rest in (one.values() for one in (*rows, whole))
+    ]
+    print_table(head, [*each[:-1], *([name, "", "hardly moved: no score"] for name in still), each[-1]])
+
+
+def _moved(moving: Any, demonstrations: list[uc.Demonstration]) -> tuple[list[uc.Demonstration], list[str]]:
+    """Those that move, or all where none does; and the names of the others, which have no score."""
+    poor = [one for one in demonstrations if explained(moving, [one]) < -1]
+    few = uc.evaluation.verdicts.SMALL**2
+    rest = [one.name for one in poor if (one.actions**2).sum() < few * (moving(one.states) ** 2).sum()]
+    if rest:
+        click.echo(f"Note: {listed(rest, 4)} hardly moved, beside what the policy does there: no score.", err=True)
+    moved = [one for one in demonstrations if one.name not in rest]
+    return (moved, rest) if moved else (demonstrations, [])
 
 
 def _scores(moving: Any, held: Any, of: Sequence[uc.Demonstration], name: str) -> dict[str, Any]:

@@ -52,15 +52,27 @@ def as_typed(said: str, of_file: bool = False) -> str:
     context = click.get_current_context(silent=True)
     if context is None:
         return said
-    commands = getattr(context.find_root().command, "commands", {})
-    own = commands.get(context.invoked_subcommand, context.command)
-    every = [one for command in (*commands.values(), own) for one in command.params]
-    options = {one.name: one.opts[-1] for one in every if one.opts[-1].startswith("--")} | ALSO
+    options = _options(context)
     head, _, rest = said.partition(": ")
     said = f"{option}: {rest}" if not of_file and (option := _option(head, options)) else said
     for made, option in OBJECTS.items():
         said = said.replace(made, option)
     return _SETTING.sub(lambda found: _set(found, options), said)
+
+
+def options_in(said: str) -> dict[str, str]:
+    """Options that a sentence of the library gives a value, and the first value of each, empty of a flag."""
+    every = _options(click.get_current_context())
+    named = [(_option(found[1], every), found[2]) for found in _SETTING.finditer(said)]
+    return {option: _plain(value) for option, value in reversed(named) if option and value}
+
+
+def _options(context: click.Context) -> dict[str, str]:
+    """Options of this command, and of others, by the names of their settings."""
+    commands = getattr(context.find_root().command, "commands", {})
+    own = commands.get(context.invoked_subcommand, context.command)
+    every = [one for command in (*commands.values(), own) for one in command.params]
+    return {one.name: one.opts[-1] for one in every if one.opts[-1].startswith("--")} | ALSO
 
 
 def _option(name: str, options: Mapping[str, str]) -> str:
@@ -69,10 +81,15 @@ def _option(name: str, options: Mapping[str, str]) -> str:
 
 
 def _set(found: re.Match[str], options: Mapping[str, str]) -> str:
-    option, value = _option(found[1], options), found[2]
-    words = shlex.quote(",".join(re.findall(r"'([^']*)'", value))) if "'" in value else ""
-    plain = words or ("none" if value == "()" else re.sub(r"[()\s]|True", "", value).lower())
-    return f"{option} {plain}".rstrip() if option else found[0]
+    option, value = _option(found[1], options), _plain(found[2])
+    return f"{option} {shlex.quote(value) if value else ''}".rstrip() if option else found[0]
+
+
+def _plain(value: str) -> str:
+    """A value as it is typed, but for quotation marks."""
+    if "'" in value:
+        return ",".join(re.findall(r"'([^']*)'", value))
+    return "none" if value == "()" else re.sub(r"[()\s]|True", "", value).lower()
 
 
 def meant_of(value: str, known: Iterable[str]) -> str:

@@ -28,7 +28,8 @@ from .shown import FLAT as FLAT
 from .shown import about_recordings as about_recordings
 from .shown import flat as flat
 from .shown import named as named
-from .shown import names_of, planes_of
+from .shown import names_of
+from .shown import planes_of as planes_of
 from .verdicts import ENOUGH as ENOUGH
 from .verdicts import SMALL as SMALL
 

@@ -53,10 +53,8 @@ def _about_noise(found: Diagnosis) -> str:
     verdict = "little" if found.noise_share < SMALL else "some" if found.noise_share < 3 * SMALL else "much"
     too_much = found.noise_share > robust.SPHERE_HIDDEN_BY_NOISE
     hidden = " So much noise makes the following unreliable." if too_much else ""
-    said = (
-        f"Noise: {verdict}, {found.noise:.3g} on each action coordinate, {found.noise_share:.1%} of a typical action "
-        f"({found.typical:.3g}) in all.{hidden}"
-    )
+    said = f"Noise: {verdict}, {found.noise:.3g} on each action coordinate, {found.noise_share:.1%} of a typical "
+    said += f"action ({found.typical:.3g}) in all.{hidden}"
     if found.noise_share < 0.5 * SMALL or found.noise < MISFIT * found.jitter:
         return said
     return said + (
@@ -87,21 +85,19 @@ def about_choice(method: str, candidates: Mapping[str, float]) -> str:
     said = f"Learnt as {way}{f' (softness {softness})' * bool(softness)}: {in_words(way) or 'as asked for'}."
     if len(candidates) < 2:
         return f"{said} Nothing was compared with it."
-    least = {}
-    for name, risk in sorted(candidates.items(), key=lambda one: -one[1]):
-        least[name.partition(", ")[0]] = risk
-    own = max(candidates[method], 1e-300)
-    others = [f"{name} {risk / own:.3g}" for name, risk in reversed(least.items()) if name != way]
-    return f"{said} Estimated squared error of other ways over that of this: {', '.join(others)} ('fit -v' lists all)."
+    least, own = {way: ""}, max(candidates[method], 1e-300)
+    for name, risk in sorted(candidates.items(), key=lambda one: one[1]):
+        least.setdefault(name.partition(", ")[0], f"{risk / own:.3g}" if risk <= 1000 * own else "over 1,000")
+    others = ", ".join(f"{name} {many}" for name, many in least.items() if many)
+    said += " Estimated squared error of other ways to learn, as times that of this (more is worse):"
+    return f"{said} {others} ('fit -v' lists all)."
 
 
 def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> list[str]:
     worst = found.regions[0]
-    advice = (
-        f"demonstrate around {named(worst.state, states)} with motion along {named(worst.direction, actions)} left "
-        "free: tilt what holds it, such as the plate, another way, or take another (standard deviation there: "
-        f"{percent(worst.along)} of a typical action; see '{worst.demonstration}')."
-    )
+    advice = f"demonstrate around {named(worst.state, states)} with motion along {named(worst.direction, actions)} "
+    advice += "left free: tilt what holds it, such as the plate, another way, or take another (standard deviation "
+    advice += f"there: {percent(worst.along)} of a typical action; see '{worst.demonstration}')."
     if all(one.determined == 1.0 for one in found.regions):
         return [f"Every recorded state is determined. If you record more: {advice}"]
     told, every, (open_, few) = found.told_together, len(found.regions), regions_left(found)
@@ -127,10 +123,8 @@ def _least_shown(region: Region, states: Sequence[str], actions: Sequence[str]) 
 def _about_freedom(found: Diagnosis) -> str:
     said = f"Free, or held by less than the noise: {percent(found.free_share)} of the samples"
     if found.undecided_share >= LITTLE:
-        said += (
-            f"; {percent(found.undecided_share)} were free or always held in the same way, which looks alike. "
-            "Demonstrations held in another way would tell"
-        )
+        said += f"; {percent(found.undecided_share)} were free or always held in the same way, which looks alike. "
+        said += "Demonstrations held in another way would tell"
     if found.free is None:
         return f"{said}. That is of the samples that the policy was fitted to."
     means = np.array([one.free for one in found.movements], dtype=np.float64)

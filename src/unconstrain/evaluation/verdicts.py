@@ -183,9 +183,7 @@ def of_score(
     few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
     least = "nothing" if under is not None and under < -1 else percent(under or 0)
     known = "" if under is None else f", and {least} under the constraint given (1 − nCPE)"
-    counted = (
-        "Movement under other constraints. Noise, and motion faster or slower than learnt, count as missed in nCPE."
-    )
+    more = "Movement under other constraints. Noise, and motion faster or slower than learnt, count as missed in nCPE."
     if learnt:
         said = f"The policy {_explains(share, 'the motion')}{known}, but it learnt from {learnt} of "
         said += f"{_count(demonstrations)}: a score on what was learnt from is too good."
@@ -194,13 +192,13 @@ def of_score(
     across = "What constraints hid in these recordings, too"
     if told is not None and told < MOSTLY:
         across = f"Across the motion: {of_untold(1 - told)}"
-    across += ". What held these recordings, given with --plane or --constraint, tells how far the policy is off in "
-    across += "all directions that this leaves free."
+    across += ". Only motion along the recorded actions is judged; what held these recordings, given with --plane or "
+    across += "--constraint (one by one, if each was held in its own way), tells more: all directions that were free."
     return Verdict(
         mark,
         f"The policy {_explains(share)}{known}{unknown}: {word}.",
         "" if mark is Mark.BAD else "Movement like this, along the directions that were recorded.",
-        across if under is None else counted,
+        across if under is None else more,
         f"Score it under other constraints.{few}"
         if mark is Mark.GOOD
         else "'unconstrain diagnose' says what to record.",
@@ -403,18 +401,20 @@ def _part(where: NDArray[np.bool_], seconds: Array) -> str:
     return f"{percent(where.mean())} of the time, first at {seconds[int(where.argmax())]:.2f} s"
 
 
-def of_replays(found: Verdict, extents: Array, paces: Array, apart: str, lasts: Sequence[float] = ()) -> Verdict:
+def of_replays(
+    found: Verdict, extents: Array, paces: Array, apart: str, lasts: Sequence[float] = (), of: str = ""
+) -> Verdict:
     """Add to a verdict how a policy moves from the starts of demonstrations, held as they were.
 
     ``extents`` and ``paces`` are size and turns of each run over those of its demonstration, NaN where there are none,
     and ``lasts`` the size of the last round over that of the first, over the same; ``apart`` is how far the runs stray
-    from the nearest recorded states, with its unit.
+    from the nearest recorded states, with its unit; ``of`` is as of :func:`size_and_pace`.
     Half of them may be off by :data:`OTHERWISE` either way, whatever the mean is, and none by :data:`FAR_OFF`.
     """
-    measured = _measured(extents, paces, lasts)
+    measured = _measured(*(given := (extents, paces, lasts)))
     if not measured:
         return found
-    ran = f"un from the same starts: {size_and_pace(extents, paces, lasts)}, typically {apart} from the recorded path"
+    ran = f"un from the same starts: {size_and_pace(*given, of)}, typically {apart} from the recorded path"
     off = {name: np.abs(np.log(np.maximum(ratios, 1e-9))) for name, ratios in measured.items()}
     strays = {
         name: int((many > np.log(OTHERWISE)).sum())
@@ -428,11 +428,11 @@ def of_replays(found: Verdict, extents: Array, paces: Array, apart: str, lasts: 
     return _strays(found, f"r{ran}{which}", " and ".join(strays))
 
 
-def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> str:
-    """Those of :func:`of_replays` in words: the middle ones, and their ranges."""
+def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = (), of: str = "") -> str:
+    """Those of :func:`of_replays` in words: the middle ones, and their ranges; ``of`` says which, if not all."""
     told = ", ".join(f"{name} {_times(ratios)}" for name, ratios in _measured(extents, paces, lasts).items())
     runs = f" (in brackets, least to most of {len(extents)} runs)" if "(" in told else ""
-    return f"{told} the demonstrated{runs}" if told else ""
+    return f"{of}{told} the demonstrated{runs}" if told else ""
 
 
 def _measured(*given: Sequence[float] | Array) -> dict[str, Array]:
@@ -477,8 +477,8 @@ def of_surveys(surveys: Sequence[Any], needed: str = "", then: str = "unconstrai
     """
     count, few = _count(len(surveys)), len(surveys) < ENOUGH
     fewer = f"{count}: 'fit' tells what was free from {ENOUGH} or more, held in different ways." if few else ""
-    warned = [found for found in surveys if found.warnings]
-    odd = {one.code: one for found in reversed(warned) for one in reversed(found.warnings)}
+    warned = [found for found in surveys if {one.code for one in found.warnings} - {"clock-gap"}]
+    odd = {one.code: one for found in reversed(surveys) for one in reversed(found.warnings)}
     if several := odd.get("several-in-one"):
         codes = ", ".join(code for code in odd if code not in SAME_CAUSE)
         said = f"{len(warned)} of {count} not as it should be: {codes}."
@@ -488,7 +488,8 @@ def of_surveys(surveys: Sequence[Any], needed: str = "", then: str = "unconstrai
     if not warned and needed:
         return Verdict(Mark.DOUBTFUL, f"{count}, nothing odd, but fit needs to know more.", doubt=fewer, next=guess)
     if not warned:
-        said = f"{count}, nothing odd: ready to learn from."
+        gaps = " but gaps in time, which nothing is smoothed across" * bool(odd)
+        said = f"{count}, nothing odd{gaps}: ready to learn from."
         return Verdict(Mark.DOUBTFUL if few else Mark.GOOD, said, doubt=fewer, next=then)
     said = f"{len(warned)} of {count} not as it should be: {', '.join(odd)}."
     cures = "Read the notes below; each names its cure."

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Array
 from ..base.display import innermost
 from ..base.errors import MissingBeliefError, SettingError
-from ..evaluation import verdicts
+from ..evaluation import diagnosis, verdicts
 from ..recordings import Demonstration, Recording, stack
 from .alone import assembled, literal
 from .live import serve as serve
@@ -110,6 +110,7 @@ def look_page(
         "patches": list(_patches(constraint, stack(held or thinned).states)),
         "samples": sum(map(len, demos)),
         "policy": described,
+        "planes": (planes := diagnosis.planes_of(demos))[: len(planes) == 1].tolist(),
         "verdict": "" if verdict is None else f"{verdict.mark.value} {verdict.said}",
     }
     runs = policy is not None and described is not None and not described["trouble"]

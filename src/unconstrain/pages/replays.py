@@ -89,8 +89,10 @@ def replayed(
     measured = {"extent": extents, "pace": paces, "last_round": lasts, "apart": apart}
     finite = {name: values[np.isfinite(values)] for name, values in measured.items()}
     told = {name: float(np.median(values)) if len(values) else None for name, values in finite.items()}
-    judged = verdicts.of_replays(found, extents, paces, said, lasts)
-    return Replayed(_advised(judged, found, policy), told, runs, verdicts.size_and_pace(extents, paces, lasts))
+    alike = "" if held is not None else ", each held in the same way all the time (along a line, in a plane)"
+    of = "" if len(known) == len(demos) else f"for {len(known)} of {len(demos)} demonstrations{alike}, "
+    judged = verdicts.of_replays(found, extents, paces, said, lasts, of)
+    return Replayed(_advised(judged, found, policy), told, runs, verdicts.size_and_pace(extents, paces, lasts, of))
 
 
 def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Replayed:

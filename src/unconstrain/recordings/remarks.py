@@ -14,6 +14,7 @@ WARNINGS = (
     "clock-differs",
     "clock-gap",
     "clock-untold",
+    "stale",
     "missing",
     "targets-as-velocities",
     "mixed-units",

@@ -195,6 +195,7 @@ class Stream:
     def _read(self) -> Iterator[tuple[str, Demonstration]]:
         by_rows = self.recipe.is_row_by_row
         read = 0
+        self._outlines.clear()  # of a walk that was left
         for number, path in enumerate(self.paths, start=self._first_file):
             before = Counter[str]()
             for recording in self._blocks(path, whole=not by_rows):
@@ -229,7 +230,6 @@ class Stream:
         said = compare([one for _, one in self._outlines])
         for (title, _), remarks in zip(self._outlines, said, strict=True):
             warn(title, remarks)
-        self._outlines.clear()
 
     def _batch(self, named: list[tuple[str, Demonstration]]) -> Block:
         actions = np.concatenate([demo.actions for _, demo in named])

@@ -92,6 +92,7 @@
   const HOME = { yaw: -0.65, pitch: 0.45, zoom: 1 };
   const view = { ...HOME, extent: 1, width: 1, height: 1, scale: 1, centre: [0, 0] };
   const flat = () => axes.length < 3;
+  const downwards = count === 2 && shown.units.every((unit) => /^(px|pixels?)$/i.test(unit)); // as on a screen
 
   /** Turn the axes of the screen, and let the box fill it as it is seen at first. */
   function aim(width, height) {
@@ -109,7 +110,7 @@
   function look({ yaw, pitch }) {
     const [a, b] = flat() ? [0, Math.PI / 2] : [yaw, pitch];
     view.right = [Math.cos(a), Math.sin(a), 0];
-    view.up = [-Math.sin(a) * Math.sin(b), Math.cos(a) * Math.sin(b), Math.cos(b)];
+    view.up = downwards ? [0, -1, 0] : [-Math.sin(a) * Math.sin(b), Math.cos(a) * Math.sin(b), Math.cos(b)];
     view.back = [Math.sin(a) * Math.cos(b), -Math.cos(a) * Math.cos(b), Math.sin(b)];
   }
 
@@ -176,6 +177,7 @@
       parts.push(`${several(demos.length, "demonstration")}, each in its colour; a dot is where it is at the time below.`);
     }
     if (!flat()) parts.push("Light grey on the floor: their shadows.");
+    if (downwards) parts.push(`${named[1]} points downwards, as on a screen, since its unit is the pixel.`);
     if (shown.patches.length) parts.push("Faint pieces: what the learnt constraint leaves free.");
     legend.append(...parts.map((part) => {
       if (typeof part !== "string") return part;
@@ -218,7 +220,7 @@
     context.fillStyle = drawing.colour("soft");
     context.font = "12px system-ui, sans-serif";
     // Numbers stand at the edges of the floor that are in front, and at the upright edge that is at the left.
-    const nearX = flat() || view.back[1] < 0 ? 0 : 1, nearY = flat() || view.back[0] < 0 ? 0 : 1;
+    const nearX = downwards || !(flat() || view.back[1] < 0) ? 1 : 0, nearY = flat() || view.back[0] < 0 ? 0 : 1;
     sayAxis(context, 0, (v) => [v, nearX ? box.high[1] : box.low[1], box.low[2]], [0, 16]);
     sayAxis(context, 1, (v) => [nearY ? box.high[0] : box.low[0], v, box.low[2]], flat() ? [-8, 0] : [0, 16]);
     if (flat()) return;
@@ -248,7 +250,7 @@
     context.textAlign = "center";
     const middle = [(first[0] + last[0]) / 2, (first[1] + last[1]) / 2];
     const out = flat() ? 0 : Math.sign(middle[0] - centre[0] || 1);
-    const place = dx ? [last[0] - (flat() ? 6 : 0), last[1] - 16] : [middle[0] + 44 * out, middle[1] + 32];
+    const place = dx ? [last[0] - (flat() ? 6 : 0), Math.min(first[1], last[1]) - 16] : [middle[0] + 44 * out, middle[1] + 32];
     const half = context.measureText(labelOf(axes[axis])).width / 2 + 8;
     context.fillText(labelOf(axes[axis]), Math.max(half, Math.min(view.width - half, place[0])), place[1]);
     context.restore();
@@ -836,6 +838,12 @@
     }
     if (count === 2) of("plane-says").textContent = "On a line through the start";
     if (learnt) begin(0);
+    for (const way of shown.planes) { // on which all were recorded
+      const [x, y, z] = way.map((each) => each * (way[2] < 0 ? -1 : 1)), degree = Math.PI / 180;
+      of("tilt").value = roll.tilt = Math.round(Math.acos(Math.min(z, 1)) / degree);
+      of("turn").value = roll.turn = Math.round(Math.atan2(y, x) / degree + 360) % 360;
+      roll.plane = of("plane").checked = true;
+    }
     sayRoll();
   }
   drawing.onChange(() => {

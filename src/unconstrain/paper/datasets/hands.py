@@ -27,7 +27,7 @@ FRAMES = 45
 
 
 def load_hand_tracks(sign: int, *, window_s: float = 1.1) -> list[uc.Demonstration]:
-    """Twenty-four tracks of the centre of a hand, each of another video.
+    """Twenty-four tracks of the centre of a hand, each of another video, but for some that the table has twice.
 
     Parameters
     ----------
@@ -52,4 +52,4 @@ def load_hand_tracks(sign: int, *, window_s: float = 1.1) -> list[uc.Demonstrati
     recordings = [
         uc.Recording(("x", "y"), track, times, f"sign {sign}, {index + 1}") for index, track in enumerate(tracks)
     ]
-    return uc.prepare(recordings, uc.Recipe(states=("x", "y"), differentiate="savgol", window_s=window_s))
+    return [uc.prepare(one, uc.Recipe(("x", "y"), differentiate="savgol", window_s=window_s))[0] for one in recordings]

@@ -8,7 +8,7 @@ import numpy as np
 from ...base.errors import SettingError
 from ..demonstration import Recording
 from ..remarks import Remark
-from ..signals.orientations import TURNS, in_degrees, wraps
+from ..signals.orientations import TURNS, in_degrees
 from .plausibility.checks import targets
 from .plausibility.subject import Subject
 from .recipes import Recipe, complete_recipe, stamps
@@ -25,9 +25,6 @@ JOINT = re.compile(
 
 FARTHEST = 2.0
 """Turns from end to end that joints of arms have at most."""
-
-NOT_TOLD = "jumps by 360, and is taken for radians; name it with degrees=, or leave that off."
-"""What is said of an angle in degrees that is not told to be."""
 
 
 def decide(recipe: Recipe, recording: Recording) -> tuple[Recipe, tuple[Remark, ...]]:
@@ -75,13 +72,6 @@ def _of_used_columns(recipe: Recipe) -> Recipe:
     return replace(recipe, degrees=tuple(name for name in recipe.degrees or () if name in _used(recipe)))
 
 
-def _turning_by_360(recipe: Recipe, recording: Recording) -> list[str]:
-    """Angles that are taken for radians, and jump as if they were none."""
-    left = [name for name in recipe.angles if name not in (recipe.degrees or ())]
-    found = [(name, wraps(recording.select([name])[:, 0])) for name in left]
-    return [name for name, wrap in found if wrap is not None and wrap.turn == TURNS[1]]
-
-
 def _used(recipe: Recipe) -> tuple[str, ...]:
     return (*(recipe.states or ()), *(recipe.actions or ()))
 
@@ -90,9 +80,7 @@ def _about_degrees(asked: Recipe, decided: Recipe, recording: Recording) -> tupl
     degrees, used = decided.degrees or (), _used(decided)
     if others := set(degrees) - {*used, *recording.resolve(asked.actions or ())}:
         raise SettingError(f"degrees: got {', '.join(sorted(others))}, expected some of {', '.join(used)}.")
-    if asked.degrees is not None:
-        return tuple(Remark("degrees", NOT_TOLD, name) for name in _turning_by_360(decided, recording))
-    if not degrees:
+    if asked.degrees is not None or not degrees:
         return may_be_degrees(asked, decided, recording)
     return (Remark("degrees", f"{', '.join(degrees)} is taken in radians; degrees=() forbids it."),)
 
@@ -103,7 +91,5 @@ def may_be_degrees(asked: Recipe, decided: Recipe, recording: Recording) -> tupl
     far = float(np.ptp(recording.select(joints), axis=0).max(initial=0.0)) if len(recording) else 0.0
     if asked.degrees is not None or decided.degrees or not far > FARTHEST * TURNS[0]:
         return ()
-    said = (
-        f"joints go through {far:.3g}, which looks like degrees, and are taken for radians; if they are degrees, say "
-    )
-    return (Remark("degrees", f"{said}degrees={tuple(joints)}.", joints[0]),)
+    said = f"joints go through {far:.3g}, which looks like degrees, and are taken for radians; if they are degrees, "
+    return (Remark("degrees", f"{said}say degrees={tuple(joints)}.", joints[0]),)

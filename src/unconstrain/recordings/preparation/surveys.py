@@ -94,9 +94,11 @@ def survey(recording: Recording, recipe: Recipe | None = None) -> Survey:
 def survey_set(recordings: Iterable[Recording], recipe: Recipe | None = None) -> list[Survey]:
     """Look at recordings one by one, and at each beside the others; parameters as of :func:`survey`."""
     asked = recipe or Recipe()
-    surveys, outlines = [], []
+    surveys, outlines, degrees = list[Survey](), [], tuple[str, ...]()
     for recording in recordings:
-        subject = subject_of(recording, asked)
+        known = tuple(name for name in degrees if name in recording.columns)  # as of the first, which decides for a fit
+        subject = subject_of(recording, replace(asked, degrees=known) if surveys else asked)
+        degrees = degrees if surveys else subject.recipe.degrees or ()
         surveys.append(_survey(subject, asked))
         outlines.append(outline(subject))
     more = compare(outlines)
@@ -151,10 +153,8 @@ def _prepared(subject: Subject) -> tuple[int | None, tuple[Remark, ...]]:
         missing = np.column_stack([missing, ~np.isfinite(subject.times)])
     if rows := np.flatnonzero(missing.any(axis=1)).tolist():
         lacking = listed([name for name, cells in zip((*used, "time"), missing.T, strict=False) if cells.any()], 8)
-        said = (
-            f"{counted(len(rows), 'row')} without numbers in {lacking}, empty or NaN, cannot be learnt from: remove or "
-        )
-        said += "repair them, or leave it out with leave_out=."
+        said = f"{counted(len(rows), 'row')} without numbers in {lacking}, empty or NaN, cannot be learnt from: remove "
+        said += "or repair them, or leave it out with leave_out=."
         return None, (Remark("missing", said, row=rows[0], place=recording.place(rows[0])),)
     stamps = subject.stamps
     long = stamps is None or (len(stamps) > 0 and np.ptp(stamps) >= window_used(recipe, recording))

@@ -35,8 +35,8 @@ MOST_KINDS = 50
 """So many different kinds of rows are told apart."""
 
 _UNIT_WORD = re.compile(
-    r"[\[(]?(m|mm|cm|um|km|in|ft|rad|deg|degrees?|radians?|°|%|s|secs?|seconds?|ms|us|µs|ns|hz"
-    r"|n|nm|nmm|n\.?m|n\*m|kg|g|v|mv|uv|a|(mm|m|cm|rad|deg|°)/s(\^?[2²]|/s)?|m/s/s|pa|kpa|mpa|c|°c|none|-)[\])]?",
+    r"[\[(]?(m|mm|cm|um|km|in|ft|px|pixels?|rad|deg|degrees?|radians?|°|%|s|secs?|seconds?|ms|us|µs|ns|hz"
+    r"|n|nm|nmm|n\.?m|n\*m|kg|g|v|mv|uv|a|(mm|m|cm|px|rad|deg|°)/s(\^?[2²]|/s)?|m/s/s|pa|kpa|mpa|c|°c|none|-)[\])]?",
     re.IGNORECASE,
 )
 _UNIT_IN_NAME = re.compile(r"[_ ]?[\[(]([^\[\]()]{1,12})[\])]$")

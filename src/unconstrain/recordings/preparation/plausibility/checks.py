@@ -11,6 +11,7 @@ from ....base.arrays import Array
 from ....base.display import listed
 from ...readers.clocks import UNITS, usual
 from ...remarks import Remark
+from ...signals.orientations import TURNS, wraps
 from ...signals.stillness import is_noise, noise_share, rest_before, stops
 from ..meaning import are_backwards, are_targets
 from .subject import FLIPS, GAP_INTERVALS, LEAST_ROWS, Subject
@@ -82,12 +83,9 @@ def clock_gap(subject: Subject) -> Remark | None:
     if not rows.size:
         return None
     worst = int(rows[np.argmax(intervals[rows - 1])])
-    return Remark(
-        "clock-gap",
-        f"{rows.size} gap{'s' * (rows.size > 1)} in the time stamps, the longest {intervals[worst - 1]:.3g} s after "
-        f"{stamps[worst - 1] - stamps[0]:.6g} s; nothing is smoothed or interpolated across (max_gap_s=).",
-        row=int(at[rows[0]]),
-    )
+    said = f"{rows.size} gap{'s' * (rows.size > 1)} in the time stamps, the longest {intervals[worst - 1]:.3g} s after "
+    said += f"{stamps[worst - 1] - stamps[0]:.6g} s; nothing is smoothed or interpolated across (max_gap_s=)."
+    return Remark("clock-gap", said, row=int(at[rows[0]]))
 
 
 def clock_untold(subject: Subject) -> Remark | None:
@@ -109,6 +107,20 @@ def clock_untold(subject: Subject) -> Remark | None:
         return None
     said = f"rises steadily, as a clock: if it is one, say time={name!r}; no clock and no count of rows is a state."
     return Remark("clock-untold", said, name)
+
+
+def stale(subject: Subject) -> Remark | None:
+    """Values that are repeated at regular steps, so of a sensor that is slower than the clock."""
+    changes = np.zeros(max(len(subject.rows) - 1, 0), dtype=bool)
+    for column in subject.states.T if subject.moves and subject.recipe.differentiate != "kalman" else ():
+        changes |= column[1:] != column[:-1]
+    steps = np.diff(np.flatnonzero(changes))
+    every = float(np.median(steps)) if len(steps) >= LEAST_ROWS else 1.0
+    if every < 2 or (np.abs(steps - every) > every / 3).mean() > STEADY:
+        return None
+    said = f"changes every {every:.0f} rows only, as where a sensor is slower than the clock: velocities are those of "
+    said += "stairs. Record at the rate of the sensor, or keep only the rows that change"
+    return Remark("stale", said + ("." if subject.recipe.actions else ", or smooth them with differentiate='kalman'."))
 
 
 def irregular(subject: Subject) -> Remark | None:
@@ -162,14 +174,27 @@ def reversed_in_time(subject: Subject) -> Remark | None:
 
 
 def angle_wrap(subject: Subject) -> Remark | None:
-    """An angle that jumps by a whole turn."""
+    """Angles that jump by a whole turn."""
     if not subject.wraps:
         return None
     column, wrap = min(subject.wraps.items(), key=lambda one: one[1].rows[0])
-    name = subject.name(column)
-    cure = f"it is made continuous with angles={(name,)}."
-    message = f"jumps by a turn of {wrap.turn:.4g}, {len(wrap.rows)} in all; {cure}"
-    return Remark("angle-wrap", message, name, subject.row(wrap.rows[0]))
+    turns, recipe = {subject.name(one): found.turn for one, found in subject.wraps.items()}, subject.recipe
+    degrees = [name for name, turn in turns.items() if turn == TURNS[1]]
+    cure = f"angles={(*recipe.angles, *turns)}" + f" and degrees={(*(recipe.degrees or ()), *degrees)}" * bool(degrees)
+    said = f"jumps by a turn of {wrap.turn:.4g}, {len(wrap.rows)} in all, and is taken for a plain number, so that "
+    said += f"each jump counts as motion; for an angle, say {cure}."
+    return Remark("angle-wrap", said, subject.name(column), subject.row(wrap.rows[0]))
+
+
+def degrees_untold(subject: Subject) -> Remark | None:
+    """An angle that is taken for radians, and jumps as one in degrees."""
+    degrees = subject.recipe.degrees or ()
+    for name in (one for one in subject.recipe.angles if one not in degrees):
+        wrap = wraps(subject.recording.select([name])[subject.rows, 0])
+        if wrap is not None and wrap.turn == TURNS[1]:
+            said = "jumps by 360, as an angle in degrees does, and is taken for radians; if it is in degrees, say "
+            return Remark("degrees", f"{said}degrees={(*degrees, name)}.", name, subject.row(wrap.rows[0]))
+    return None
 
 
 def turned_sign(code: str, subject: Subject) -> Remark | None:
@@ -203,22 +228,18 @@ def seam(subject: Subject) -> Remark | None:
     """Jumps to another place, as between demonstrations under one another in one table."""
     if subject.recipe.seams == "cut" or not subject.seams:
         return None
-    message = (
-        f"{len(subject.seams)} jump{'s' * (len(subject.seams) > 1)} to another place, as between demonstrations; "
-        "tell them apart with group=, or cut there with seams='cut'."
-    )
-    return Remark("seam", message, row=subject.row(subject.seams[0]))
+    said = f"{len(subject.seams)} jump{'s' * (len(subject.seams) > 1)} to another place, as between demonstrations; "
+    said += "tell them apart with group=, or cut there with seams='cut'."
+    return Remark("seam", said, row=subject.row(subject.seams[0]))
 
 
 def other_topic(subject: Subject) -> Remark | None:
     """Rows that alternate between two movements in two places."""
     if subject.topic is None:
         return None
-    message = (
-        "rows alternate between two places, as where two topics share a table; take them apart by the column that "
-        "names them (group=), or read one (topic= of a ROS recording)."
-    )
-    return Remark("other-topic", message, row=subject.row(subject.topic))
+    said = "rows alternate between two places, as where two topics share a table; take them apart by the column that "
+    said += "names them (group=), or read one (topic= of a ROS recording)."
+    return Remark("other-topic", said, row=subject.row(subject.topic))
 
 
 def targets(subject: Subject) -> Remark | None:
@@ -289,11 +310,13 @@ CHECKS: tuple[Callable[[Subject], Remark | None], ...] = (
     clock_unit,
     clock_gap,
     clock_untold,
+    stale,
     irregular,
     row_order,
     reversed_in_time,
     other_topic,
     angle_wrap,
+    degrees_untold,
     *(partial(turned_sign, flip.code) for flip in FLIPS),
     glitch,
     seam,

@@ -82,7 +82,7 @@ def compare(outlines: Sequence[Outline | None]) -> list[tuple[Remark, ...]]:
     remarks: list[list[Remark]] = [[] for _ in outlines]
     if known:
         several = [one for _, one in known]
-        remarks[known[0][0]] += [*mixed_units(several), *different_places(several)]
+        remarks[known[0][0]] += [*mixed_units(several), *different_places(several), *same(several)]
         units = unit_differs(several)
         columns = columns_differ(several, {place for place, _ in units})
         against = reversed_among_others(several, {place for place, _ in (*units, *columns)})
@@ -101,11 +101,9 @@ def too_few(demonstrations: int) -> tuple[Remark, ...]:
 
 def doubts(demonstrations: int, missed: float) -> tuple[Remark, ...]:
     """Remarks on what was learnt from some demonstrations, by the share of their motion that it misses."""
-    message = (
-        f"misses {percent(min(missed, 1))} of the motion that it learnt from; actions may be no function of the state, "
-        "as where a movement goes out and back or stands still. Look at the warnings of a survey, and at states=."
-    )
-    nothing = (Remark("explains-nothing", message),) if missed > MOST_MISSED else ()
+    said = f"misses {percent(min(missed, 1))} of the motion it learnt from; actions may be no function of the state, "
+    said += "as where a movement goes out and back or stands still. Look at the warnings of a survey, and at states=."
+    nothing = (Remark("explains-nothing", said),) if missed > MOST_MISSED else ()
     return (*too_few(demonstrations), *nothing)
 
 
@@ -139,9 +137,19 @@ def different_places(outlines: Sequence[Outline]) -> list[Remark]:
         cure = "if where they are does not matter, take each from its own centre with centre=True"
     else:
         cure = "they move on from end to end, so no mean tells their places (centre=True would hide a constant push)"
-    return [
-        Remark("places", f"demonstrations are in different places, each farther from others than it is long; {cure}.")
-    ]
+    said = f"demonstrations are in different places, each farther from others than it is long; {cure}."
+    return [Remark("places", said)]
+
+
+def same(outlines: Sequence[Outline]) -> list[Remark]:
+    """Demonstrations that are the same in each number."""
+    titles: dict[bytes, list[str]] = {}
+    for one in outlines:
+        titles.setdefault(one.places.tobytes() + one.steps.tobytes(), []).append(one.title)
+    alike = ", ".join(" and ".join(several) for several in titles.values() if several[1:])
+    said = f"{alike} hold the same recording, which counts more than once, and tests nothing where its like is learnt "
+    said += "from; leave all but one out with leave_out=."
+    return [Remark("same-recording", said)] if alike else []
 
 
 def clock_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
@@ -152,10 +160,9 @@ def clock_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
     found = np.flatnonzero(odd & np.isfinite(usual)).tolist()
     if 0 < len(found) == len(outlines) - len(found):
         few, most = ([outlines[place].title for place in np.flatnonzero(odd == of).tolist()] for of in (True, False))
-        said = (
-            f"{listed(few, MOST_NAMED)} have {np.median(rates[odd]):.3g} samples a second, {listed(most, MOST_NAMED)} "
-        )
-        said += f"{usual:.3g}, as in another unit of time, and as many: convert the stamps that are wrong."
+        said = f"{listed(few, MOST_NAMED)} have {np.median(rates[odd]):.3g} samples a second, "
+        said += f"{listed(most, MOST_NAMED)} {usual:.3g}, as in another unit of time, and as many: "
+        said += "convert the stamps that are wrong."
         return [(place, Remark("clock-differs", said)) for place in range(len(outlines))]
     said = f"samples a second, and others have {usual:.3g}: the stamps are in another unit than theirs; convert them, "
     said += "or leave it out with leave_out=."
@@ -177,10 +184,8 @@ def unit_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
     named = [listed([outlines[place].title for place in places], MOST_NAMED) for places in (few, most)]
     than = f"{factor:.3g} times {size} than {named[1]}, as in another unit"
     if len(few) == len(most):
-        said, places = (
-            f"{named[0]} {'are' if few[1:] else 'is'} {than}, and as many: convert those that are wrong.",
-            sorted([*few, *most]),
-        )
+        said = f"{named[0]} {'are' if few[1:] else 'is'} {than}, and as many: convert those that are wrong."
+        places = sorted([*few, *most])
     else:
         said, places = f"is {than}; convert it, or leave it out with leave_out=.", few
     rest = unit_differs([outlines[place] for place in most]) if len(few) < len(most) else []
