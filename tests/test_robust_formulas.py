@@ -323,9 +323,8 @@ def test_noise_that_smoothing_hid_is_at_least_the_misfit():
 # The choice
 
 
-@pytest.mark.parametrize("always", [True, False])
-def test_what_is_missed_across_the_action_is_seen_where_demonstrations_were_always_held(always):
-    """Of two candidates, one misses what lies across each action, in the plane of its demonstration."""
+def on_planes(always):
+    """Samples of eight demonstrations, each in one plane all the time or in others at every moment; their truth."""
     rng, count = np.random.default_rng(4), 240
     groups = np.arange(count) * 8 // count
     normals = rng.standard_normal((8, 3))[groups] if always else rng.standard_normal((count, 3))
@@ -333,13 +332,34 @@ def test_what_is_missed_across_the_action_is_seen_where_demonstrations_were_alwa
     policy = np.array([1.0, 0.5, -1.0]) + rng.standard_normal((count, 3))
     actions = policy - normals * np.vecdot(normals, policy)[:, None]
     data = draw(samples=count, groups=8, dimensions=2)._replace(actions=actions, groups=groups)
-    samples = samples_of(data)
-    across = np.cross(actions, normals)
+    return samples_of(data), policy, normals
+
+
+@pytest.mark.parametrize("always", [True, False])
+def test_what_is_missed_across_the_action_is_seen_where_demonstrations_were_always_held(always):
+    """Of two candidates, one misses what lies across each action, in the plane of its demonstration."""
+    samples, policy, normals = on_planes(always)
+    across = np.cross(samples.actions, normals)
     right = replace(softened(samples)[0], held_out=policy, softness=0.0)
     wrong = replace(right, name="wrong", held_out=policy + 0.5 * across)
-    found = Comparison([right, wrong], np.zeros(count), samples).judged()
+    found = Comparison([right, wrong], np.zeros(len(samples)), samples).judged()
     assert found["direct"].loss == pytest.approx(0.0, abs=1e-12)
     assert found["wrong"].loss == pytest.approx(0.25 if always else 0.0, rel=0.5, abs=1e-12)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+def test_noise_makes_actions_longer_and_no_policy_that_is_too_long_the_best(noise):
+    rng, count = np.random.default_rng(5), 3000
+    data = draw(samples=count, groups=10)
+    policy = np.array([0.8, -0.6]) + 0.1 * rng.standard_normal((count, 2))
+    normals = rotation(1, 2)[:, 0] + 0.5 * rng.standard_normal((count, 2))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    actions = policy - normals * np.vecdot(normals, policy)[:, None] + noise * rng.standard_normal((count, 2))
+    samples = samples_of(data._replace(actions=actions))
+    right = replace(softened(samples)[0], held_out=policy, softness=0.0)
+    others = [replace(right, name=str(times), held_out=times * policy) for times in (0.9, 1.05)]
+    found = Comparison([right, *others], np.full(count, noise**2), samples).judged()
+    assert found["direct"].loss < min(found["0.9"].loss, found["1.05"].loss)
 
 
 def test_changes_of_the_constraint_are_found():

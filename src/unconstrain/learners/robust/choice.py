@@ -11,13 +11,14 @@ variance and bias there can be estimated:
 
 loss_k is the mean square of what held-out motion shows to be missed: the
 residual ``r = ‖u‖ − ûᵀπ̃`` along the action, or ``‖N̂ (u − π̃)‖`` where N̂ is
-known; N̂ is not known exactly, so differences aside from the action that are
-less than the least misfit do not count. Where N̂ is one line, û is along it,
-also of samples at rest. Where each of few demonstrations is needed, policies by
-segments are judged by :mod:`.agreement`. variance_k is the jackknife's, from
-the policies learnt without each fold. bias_k compares the candidate with
-others of less bias, j, as Goldenshluger and Lepski do (*Annals of Statistics*
-39(3), 2011):
+known. Noise makes actions longer, and policies that are too long look good: r²
+is ``ρ² / ‖u‖²`` without the noise's part, see :mod:`.noise`. N̂ is not known
+exactly, so differences aside from the action that are less than the least
+misfit do not count. Where N̂ is one line, û is along it, also of samples at
+rest. Where each of few demonstrations is needed, policies by segments are
+judged by :mod:`.agreement`. variance_k is the jackknife's, from the policies
+learnt without each fold. bias_k compares the candidate with others of less
+bias, j, as Goldenshluger and Lepski do (*Annals of Statistics* 39(3), 2011):
 
     bias_k = max_j E ‖π̃_k − π̃_j‖² − half the variance of π̃_k − π̃_j
 
@@ -179,8 +180,11 @@ class Comparison:
     @cached_property
     def _along(self) -> Array:
         """Squared residuals along the action, without the noise's part, (K, N)."""
-        size = self._squares + self._held_out.shape[2] * self._noise
-        return np.asarray(self._residuals**2 - self._noise * (self._held_out**2).sum(axis=2) / size)
+        noise, d = self._noise, self._held_out.shape[2]
+        size = self._squares + d * noise
+        on_lines = self._residuals**2 - noise * (self._held_out**2).sum(axis=2) / size
+        squares = np.stack([corrected_squares(self._samples, one, noise) for one in self._held_out])
+        return np.where(self._on_line, on_lines, (squares + 2.0 * d * noise**2) / size)
 
     @cached_property
     def _reliable(self) -> Array:
