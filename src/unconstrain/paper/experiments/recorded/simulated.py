@@ -57,6 +57,13 @@ def come_to_rest(states: Array) -> Array:
     return np.column_stack([LimitCycle()(states[:, :2]), -2.0 * states[:, 2:]])
 
 
+def reach(states: Array) -> Array:
+    """To a goal in turns, slower and slower: velocities (N, 3) at positions (N, 3)."""
+    x, y, z = states.T
+    pull = states @ np.array([[-1.0, -0.6, 0.1], [0.8, -1.0, -0.4], [0.2, 0.5, -0.8]])
+    return pull + 0.4 * np.column_stack([np.sin(2 * y), np.cos(2 * z) - 1.0, np.sin(2 * x)])
+
+
 @dataclass(frozen=True, eq=False)
 class Oval:
     """Round an oval at some rad/s, and onto it: velocities (N, 2) at positions (N, 2).
@@ -282,6 +289,11 @@ def tilted_plates(rng: np.random.Generator) -> Simulated:
     starts -= normals * np.vecdot(normals, starts)[:, None]
     demos = _rolled(wipe_round, starts, 4000, 0.001, [uc.constraints.Plane(normal) for normal in normals])
     return Simulated([_differentiated(one[::10], 0.05, rng) for one in demos])
+
+
+def reaching(rng: np.random.Generator, share: float) -> Simulated:
+    """To a goal on eight tilted plates, with noise of so much of the actions' spread: more than motion at the end."""
+    return Simulated(with_noise(_rolled(reach, rng.uniform(-1, 1, (8, 3)), 90, 0.03, tilted(rng, 8)), share, rng))
 
 
 def turning_planes(rng: np.random.Generator) -> Simulated:
