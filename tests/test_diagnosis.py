@@ -343,6 +343,16 @@ CROSSING = [stroke((-1, 0), (1, 0), 0, "by"), stroke((0, -1), (0, 0), 40, "held"
 TO_A_GOAL = [stroke(start, (0, 0), 40, "to") for start in ((1, 0), (0, 1), (-1, 0), (0, -1))]
 
 
+def test_motion_about_one_place_is_said_to_show_nothing_that_points_there():
+    angle, fair = np.linspace(0.0, 1.2, 60), verdicts.Verdict(verdicts.Mark.DOUBTFUL, "Fair.")
+    swings = [radius * np.column_stack([np.cos(angle), np.sin(angle)]) for radius in (0.64, 0.65, 0.66)]
+    doors = [uc.Demonstration(path + np.array([1.0, 0.5]), np.gradient(path, 0.02, axis=0)) for path in swings]
+    said = about_recordings(fair, doors, uc.Recipe(("x [m]", "y [m]"), still=0.1), np.ones_like)
+    assert said.doubt.startswith("All motion is about (x [m] = 0.999, y [m] = 0.499), as of a door about its hinge: ")
+    lines = [uc.Demonstration(one.states, one.actions[:1] * np.ones((60, 1))) for one in doors]
+    assert "hinge" not in about_recordings(fair, lines, uc.Recipe(("x", "y"), still=0.1), np.ones_like).doubt
+
+
 @pytest.mark.parametrize("model", [uc.ParametricPolicy(uc.Affine()), uc.LocallyLinearPolicy()], ids=["affine", "local"])
 def test_regions_that_all_recordings_tell_are_not_doubted_for_being_shown_by_few(model):
     demos, truth = [], np.array([[-1.0, -0.8, 0.0], [0.6, -1.4, 0.1], [0.0, 0.2, -1.1]])

@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..base.arrays import Array
-from ..recordings import Demonstration, Recipe, readers
+from ..learners import robust
+from ..recordings import Demonstration, Recipe, readers, stack
 from .verdicts import ENOUGH, Mark, Verdict
 
 FLAT, ONE = 0.1, 0.03
@@ -47,7 +48,10 @@ def planes_of(demonstrations: Sequence[Demonstration]) -> Array:
 def about_recordings(
     found: Verdict, demos: Sequence[Demonstration], recipe: Recipe, policy: Callable[[Array], Array]
 ) -> Verdict:
-    """Add to a verdict which planes demonstrations keep to and, unless rest is trimmed, where a policy rests amiss."""
+    """Add which planes demonstrations keep to, what they turn about and, unless rest is trimmed, where a policy rests.
+
+    Of a rest that is the policy's own nothing is said.
+    """
     planes, states, trust, doubt = planes_of(demos), recipe.states or (), found.trust, found.doubt
     if len(planes) == 1:
         doubt = f"All demonstrations lie on one plane or parallel ones, of normal {named(planes[0], states)}: none "
@@ -55,7 +59,10 @@ def about_recordings(
     elif len(planes):
         apart = np.degrees(np.arccos(min(float(np.abs(planes @ planes.T).min()), 1.0)))
         trust = f"{trust} Each demonstration lies on a plane of its own, up to {apart:.0f}° from the others.".strip()
-    found = found._replace(trust=trust, doubt=doubt)
+    if (pivot := robust.pivot_of(*stack(demos)[:2])) is not None:
+        about = f"All motion is about {named(pivot.tolist(), states)}, as of a door about its hinge: none tells what "
+        doubt = f"{about}points there; free motion, or motion about another place, would. {doubt}"
+    found = found._replace(trust=trust, doubt=doubt.rstrip())
     return found if recipe.still else _about_rest(found, demos, states, policy)
 
 

@@ -11,6 +11,7 @@ True
 from .constants import SPHERE_HIDDEN_BY_NOISE
 from .learner import Likelihood, NoiseCorrected, Robust, Segments
 from .noise import noise_by_differences
+from .pivot import pivot_of
 from .segments import held_throughout
 
 __all__ = [
@@ -21,4 +22,5 @@ __all__ = [
     "Segments",
     "held_throughout",
     "noise_by_differences",
+    "pivot_of",
 ]
