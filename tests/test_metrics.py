@@ -314,6 +314,10 @@ def test_in_planes_of_their_own_all_errors_but_those_across_are_seen(noise):
         (lambda states: turning(states) * [1.0, 1.0, 0.0], on_plates([(0.0, 0.0, 1.0)], turning)),  # nobody leaves it
         (turning, [uc.Demonstration(np.eye(3), np.eye(3)[[0, 0, 0]])]),  # a line
         (turning, [uc.Demonstration(np.eye(3), turning(np.eye(3)))]),  # free
+        (
+            turning,
+            [replace(one, space=uc.spaces.Euclidean(2) * uc.spaces.Circle()) for one in on_plates(PLATES, turning)],
+        ),
     ],
 )
 def test_what_kept_to_no_plane_is_not_judged_in_one(policy, demos):

@@ -273,8 +273,11 @@ def test_what_is_like_nothing_has_none():
 
 def test_a_score_tells_what_recordings_show_in_all_directions_of_their_planes():
     found, none = verdicts.of_score(0.97, 4), np.full(4, np.nan)
-    fine, poor = (verdicts.of_planes(found, np.array([share, share, share, np.nan])) for share in (0.95, 0.6))
-    assert verdicts.of_planes(found, none) == found
+    motion = np.array([1.0, 1.0, 2.0, 9.0])
+    fine, poor = (
+        verdicts.of_planes(found, share + np.array([0.02, -0.02, 0.0, np.nan]), motion) for share in (0.95, 0.6)
+    )
+    assert verdicts.of_planes(found, none, motion) == found
     assert (fine.mark, fine.said) == (found.mark, found.said)
     assert fine.trust.endswith(
         "In all directions of the planes that 3 of 4 demonstrations kept to, the policy explains 95% of the motion."
@@ -284,7 +287,10 @@ def test_a_score_tells_what_recordings_show_in_all_directions_of_their_planes():
         "But in all directions of the planes that 3 of 4 demonstrations kept to, the policy explains 60% of the "
         "motion, unless more than a plane held them."
     )
-    assert "of the plane that it kept to, the policy explains" in verdicts.of_planes(found, np.array([0.95])).trust
+    assert (
+        "of the plane that it kept to, the policy explains"
+        in verdicts.of_planes(found, np.array([0.95]), motion[:1]).trust
+    )
 
 
 def test_the_command_scores_recordings_in_their_planes(tmp_path):

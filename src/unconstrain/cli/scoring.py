@@ -58,7 +58,7 @@ def score(
     seen = None if known is None else len(known)
     judged = verdicts.of_score(whole["explains"], len(demonstrations), under, seen, notes.get(TOLD))
     judged = verdicts.of_worst(judged, {row["demonstration"]: row["explains"] for row in rows})
-    judged = judged if held is not None else verdicts.of_planes(judged, planes)
+    judged = judged if held is not None else verdicts.of_planes(judged, planes, _motion(demonstrations))
     with shown("running it from the same starts"):
         found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units)
     verdict = verdicts.of_unit(verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0)), _times(learnt, states))
@@ -96,6 +96,13 @@ def _scores(moving: Any, held: Any, of: Sequence[uc.Demonstration], name: str) -
     found = {"demonstration": name, "samples": sum(map(len, of)), "explains": explained(moving, of)}
     found["ninc"] = uc.ninconsistency(moving, of)
     return found if held is None else found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(moving, of, held)}
+
+
+def _motion(demonstrations: Sequence[uc.Demonstration]) -> Any:
+    """Sum of squared actions of each."""
+    import numpy as np
+
+    return np.array([(one.actions**2).sum() for one in demonstrations])
 
 
 def _known(shares: Any) -> list[float | None]:

@@ -24,6 +24,7 @@ from ..base.arrays import Array
 from ..base.errors import InvalidDataError, SettingError
 from ..constraints import Constraint, constraint_matrices
 from ..learners import robust
+from ..models import spaces
 from ..recordings import Demonstration, stack
 from ..risks import action_projection, null_space_projection, project
 from ..risks import along_motion as along
@@ -164,8 +165,9 @@ def explained_in_planes(policy: PolicyLike, demonstrations: Demonstrations) -> A
     """Share of the motion ``1 − Σ ‖N̂ (u − π̃)‖² / Σ ‖u‖²`` that is explained in all directions of its plane.
 
     Of a demonstration that moved much along at least two directions, and along none of the others, in which the policy
-    or other demonstrations move; N̂ projects onto the former. If nothing but that plane held it, this is all of the
-    policy's error that it can show, 1 − nCPE, where :func:`along_motion` sees what is along the path alone.
+    or other demonstrations move; N̂ projects onto the former. Among angles there are no planes. If nothing but that
+    plane held it, this is all of the policy's error that it can show, 1 − nCPE, where :func:`along_motion` sees what is
+    along the path alone.
 
     Returns
     -------
@@ -182,14 +184,15 @@ def explained_in_planes(policy: PolicyLike, demonstrations: Demonstrations) -> A
     """
     demos = _listed(demonstrations)
     (_, actions, groups), predicted = stack(demos), _predicted(policy, demos)
-    noise = np.array([_noise(demo) for demo in demos])[groups]
+    least = robust.LEAST_MISFIT**2 * float((actions**2).mean())  # smoothing hides noise of positions
+    noise = np.maximum([_noise(demo) for demo in demos], least)[groups]
     # What the policy does freely is one movement more: a direction in which it would move is one that was held.
     moved, labels = np.concatenate([actions, predicted]), np.append(groups, np.full(len(actions), len(demos)))
     held, onto = robust.held_throughout(moved, labels, np.append(noise, np.full(len(actions), noise.max())))
     plane = held[: len(groups)] & (np.einsum("naa->n", onto[: len(groups)]) > 1.5)
     missed = (project(onto[: len(groups)], actions - predicted) ** 2).sum(axis=1)
     missed, motion = (np.bincount(groups, each) for each in (missed, (actions**2).sum(axis=1)))
-    kept = np.bincount(groups, plane) > 0
+    kept = (np.bincount(groups, plane) > 0) & isinstance(demos[0].space, spaces.Euclidean)
     return np.where(kept, 1.0 - missed / np.where(kept, motion, 1.0), np.nan)
 
 

@@ -216,15 +216,19 @@ def of_worst(found: Verdict, shares: Mapping[str, float]) -> Verdict:
     return _doubted(found, f"it {_explains(poor[0][0], f'{poor[0][1]} alone')}{more}")._replace(next=then)
 
 
-def of_planes(found: Verdict, shares: Array) -> Verdict:
-    """Add to a score what is explained in all directions of the plane that each recording kept to, NaN of others."""
-    kept = shares[np.isfinite(shares)]
-    if not len(kept):
+def of_planes(found: Verdict, shares: Array, motion: Array) -> Verdict:
+    """Add to a score what is explained in all directions of the plane that each recording kept to, NaN of others.
+
+    Recordings count by their ``motion``, such as the sum of squared actions.
+    """
+    kept = np.isfinite(shares)
+    if not kept.any():
         return found
-    many = f"planes that {len(kept)} of {_count(len(shares))} kept to"
+    share = float(np.average(shares[kept], weights=motion[kept]))
+    many = f"planes that {kept.sum()} of {_count(len(shares))} kept to"
     where = f"in all directions of the {'plane that it kept to' if len(shares) == 1 else many}, the policy "
-    where += _explains(float(kept.mean()), "the motion")
-    if _graded(float(kept.mean()))[0] is Mark.GOOD:
+    where += _explains(share, "the motion")
+    if _graded(share)[0] is Mark.GOOD:
         return found._replace(trust=f"{found.trust} {where[0].upper()}{where[1:]}.".lstrip())
     return _doubted(found, f"{where}, unless more than a plane held {'it' if len(shares) == 1 else 'them'}")
 

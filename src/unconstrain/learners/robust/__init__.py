@@ -8,13 +8,14 @@ Examples
 True
 """
 
-from .constants import SPHERE_HIDDEN_BY_NOISE
+from .constants import LEAST_MISFIT, SPHERE_HIDDEN_BY_NOISE
 from .learner import Likelihood, NoiseCorrected, Robust, Segments
 from .noise import noise_by_differences
 from .pivot import pivot_of
 from .segments import held_throughout
 
 __all__ = [
+    "LEAST_MISFIT",
     "SPHERE_HIDDEN_BY_NOISE",
     "Likelihood",
     "NoiseCorrected",
