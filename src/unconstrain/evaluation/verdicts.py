@@ -121,9 +121,9 @@ def _advice(word: str, learnt: float, spoilt: bool) -> str:
             "does, or it is too flexible. Demonstrate between them, or try another --model."
         )
     return {
-        "fair": "'unconstrain diagnose' says where it fails: by noise, which a wider --window takes out; by motion that "
-        "starts or stops at once, which a narrower one, or --by kalman, follows; or as demonstrations have little in "
-        "common.",
+        "fair": "'unconstrain diagnose' says where it fails: by noise, which a wider --window takes out; by motion "
+        "that starts or stops at once, which a narrower one, or --by kalman, follows; or as demonstrations have little "
+        "in common.",
         "poor": "Look at the recordings ('unconstrain inspect'): columns, clocks or units may be wrong, or they have "
         "too little in common.",
     }.get(word, "Score it on recordings that were held in other ways.")
