@@ -59,7 +59,8 @@ def decide(recipe: Recipe, recording: Recording) -> tuple[Recipe, tuple[Remark, 
 def in_radians(recipe: Recipe, recording: Recording) -> Recipe:
     """A recipe with the columns in degrees: those that it tells, or whose unit or, of angles, whose numbers say so."""
     if recipe.degrees is not None:
-        return replace(recipe, degrees=recording.resolve(recipe.degrees))
+        told = recording.resolve(recipe.degrees)
+        return replace(recipe, degrees=tuple(one for one in told if not recording.units.get(one, "").startswith("rad")))
     used = _used(recipe)
     units = {name: recording.units.get(name, "") for name in used}
     shown = {name for name in used if name in recipe.angles and not units[name]}
@@ -80,6 +81,8 @@ def _about_degrees(asked: Recipe, decided: Recipe, recording: Recording) -> tupl
     degrees, used = decided.degrees or (), _used(decided)
     if others := set(degrees) - {*used, *recording.resolve(asked.actions or ())}:
         raise SettingError(f"degrees: got {', '.join(sorted(others))}, expected some of {', '.join(used)}.")
+    if told := [name for name in recording.resolve(asked.degrees or ()) if name not in degrees]:
+        return (Remark("degrees", f"{', '.join(told)} is in radians, as its unit says, and is left so."),)
     if asked.degrees is not None or not degrees:
         return may_be_degrees(asked, decided, recording)
     return (Remark("degrees", f"{', '.join(degrees)} is taken in radians; degrees=() forbids it."),)

@@ -1,0 +1,87 @@
+"""Angles from the recordings to the robot: in which unit they are, and which columns were taken for none."""
+
+import json
+
+import numpy as np
+import pytest
+
+from test_cli import call, run, write
+from test_newcomer import LINEAR, stroke, text
+
+STATES = ("--state", "x,y,heading", "--differentiate", "--angle", "heading")
+
+
+def turning(number):
+    """Time, position in mm, and an angle in degrees that jumps by 360 as it passes half a turn."""
+    rows = stroke(number)
+    heading = 150.0 + 20.0 * number + 60.0 * (1.0 - np.exp(-rows[:, 0])) + 0.1 * rows[:, 1]
+    return np.column_stack([rows, (heading + 180.0) % 360.0 - 180.0])
+
+
+def recorded(place, head="t,x,y,heading", count=4, made=turning):
+    place.mkdir(exist_ok=True)
+    for k in range(count):
+        write(place / f"w{k}.csv", head, made(k))
+    return place
+
+
+@pytest.fixture(scope="module")
+def turned(tmp_path_factory):
+    """Strokes with an angle in degrees, and a policy learnt from them."""
+    folder = recorded(tmp_path_factory.mktemp("angles") / "w")
+    run("fit", folder, *STATES, *LINEAR, "-o", folder.parent / "p.npz")
+    return folder
+
+
+# The unit of what was learnt
+
+
+def test_everything_that_is_made_of_a_policy_says_that_it_takes_radians(turned, tmp_path):
+    policy = turned.parent / "p.npz"
+    run("export", policy, "-o", tmp_path / "p.c")
+    run("export", policy, "-o", tmp_path / "p.js")
+    run("export", policy, "--ros2", tmp_path / "p")
+    files = ["p.c", "p.h", "p.js", "p/README.md", "p/src/p.c", "p/scripts/p_loop.py"]
+    for said in [run("info", policy), *((tmp_path / one).read_text() for one in files)]:
+        said = " ".join(said.replace(":", " ").split())
+        assert "states x, y, heading (rad)" in said
+        assert "actions vx, vy, vheading (rad/s)" in said
+        assert "recorded in degrees heading" in said
+    compile((tmp_path / "p/scripts/p_loop.py").read_text(), "loop", "exec")
+
+
+@pytest.mark.parametrize(
+    ("head", "states", "actions"),
+    [
+        ("t,x [m],y [m],heading [deg]", "x [m], y [m], heading (rad)", "vx [m/s], vy [m/s], vheading (rad/s)"),
+        ("t,x [m],y [m],heading [rad]", "x [m], y [m], heading [rad]", "vx [m/s], vy [m/s], vheading [rad/s]"),
+    ],
+)
+def test_so_it_does_where_the_name_of_a_column_says_another_unit(tmp_path, head, states, actions):
+    folder = recorded(tmp_path / "w", head, made=lambda k: turning(k) * [1, 1, 1, 1 if "deg" in head else np.pi / 180])
+    run("fit", folder, *STATES, *LINEAR, "-o", tmp_path / "p.npz")
+    told = json.loads(run("info", tmp_path / "p.npz", "--json"))
+    assert (", ".join(told["states"]), ", ".join(told["actions"])) == (states, actions)
+    assert told["recorded in degrees"] == ["heading [deg]"] * ("deg" in head)
+
+
+def test_degrees_where_the_unit_says_radians_are_not_converted_and_that_is_said(tmp_path):
+    folder = recorded(tmp_path / "w", "t,x,y,heading [rad]", made=lambda k: turning(k) * [1, 1, 1, np.pi / 180])
+    given = "fit", folder, *STATES, *LINEAR, "-o", tmp_path / "p.npz"
+    assert "heading [rad] is in radians, as its unit says" in text(call(*given, "--degrees", "heading"))
+    assert "as its unit says" not in text(call(*given, "--force"))
+
+
+def test_a_start_in_degrees_is_told_and_one_in_radians_is_not(turned, tmp_path):
+    given = "rollout", turned.parent / "p.npz", "--least-support", 0, "--steps", 3, "-o", tmp_path / "r.csv", "--force"
+    said = text(call(*given, "--start", "0,0,98.61"))
+    assert "98.61 is far outside radians, which the policy takes for heading; if it is in degrees" in said
+    assert "that is 1.721" in said
+    assert "radians" not in text(call(*given, "--start", "98.61,0,1.721"))
+
+
+def test_a_movement_says_its_unit_and_is_scored_as_what_it_is(turned, tmp_path):
+    moved, policy = tmp_path / "r.csv", turned.parent / "p.npz"
+    run("rollout", policy, "--start", "0,0,1.721", "--least-support", 0, "-o", moved)
+    assert moved.read_text().startswith("t,x,y,heading (rad),vx,vy,vheading (rad/s)\n")
+    assert json.loads(run("score", policy, moved, "--json"))["rows"][0]["explains"] > 0.999
