@@ -309,10 +309,17 @@ def refused(rng):
     return Fault(recordings, recipe, "refused", which, None)
 
 
+def angle_unused(rng):
+    recordings, _ = recorded(*movements(rng, dimensions=3))
+    recordings = [replace(one, columns=("x", "y", str(rng.choice(["theta", "yaw_deg"])))) for one in recordings]
+    return Fault(recordings, uc.Recipe(), "angle-unused", int(rng.integers(len(recordings))), None)
+
+
 FAULTS = (
     nothing, nothing_with_actions, angle_wrap, quaternion_flip, rotation_vector_flip, seam, glitch, clock_unit,
     clock_gap, targets, mixed_units, unit_differs, pause, backwards, at_rest, all_zero, few_demonstrations, row_order,
     other_topic, clock_differs, columns_differ, clock_untold, stale, missing, refused,
+    angle_unused,
 )  # fmt: skip
 
 

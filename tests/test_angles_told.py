@@ -1,6 +1,7 @@
 """Angles from the recordings to the robot: in which unit they are, and which columns were taken for none."""
 
 import json
+import shlex
 
 import numpy as np
 import pytest
@@ -85,3 +86,44 @@ def test_a_movement_says_its_unit_and_is_scored_as_what_it_is(turned, tmp_path):
     run("rollout", policy, "--start", "0,0,1.721", "--least-support", 0, "-o", moved)
     assert moved.read_text().startswith("t,x,y,heading (rad),vx,vy,vheading (rad/s)\n")
     assert json.loads(run("score", policy, moved, "--json"))["rows"][0]["explains"] > 0.999
+
+
+# Columns that are left out
+
+
+@pytest.mark.parametrize(
+    "head", ["t,x,y,heading", "stamp,x,y,theta", "t,x [m],y [m],yaw [deg]", "t,pos_x,pos_y,phi", "t,x,y,gripper"]
+)
+def test_an_angle_that_is_left_out_is_told_by_its_name_or_its_jumps_and_taken_in_as_said(tmp_path, head):
+    name = head.split(",")[-1]
+    said = run("inspect", folder := recorded(tmp_path / "w", head))
+    assert said.startswith("! ")
+    assert "angle-unused" in said
+    assert f"column {name!r}: looks like an angle, and is left out; take it in with" in said
+    [typed] = [line for line in said.splitlines() if line.startswith("    unconstrain fit ")]
+    assert "angle-unused" in text(call("fit", folder, *LINEAR, "-o", tmp_path / "p.npz"))
+    given = [tmp_path / "q.npz" if one == "policy.npz" else one for one in shlex.split(typed)[1:]]
+    told = text(call(*given, *LINEAR))
+    assert f"{name} (an angle) as states" in told
+    assert f"{name} in radians" in told
+    assert "unused" not in told
+
+
+def test_an_angle_in_radians_is_not_taken_for_degrees(tmp_path):
+    folder = recorded(tmp_path / "w", "t,x,y,theta", made=lambda k: turning(k) * [1, 1, 1, np.pi / 180])
+    assert "take it in with --angle theta.\n" in run("inspect", folder)
+
+
+def test_other_columns_that_move_are_a_note_and_clocks_counts_flags_and_constants_are_not(tmp_path):
+    def made(number):
+        rows = stroke(number)
+        count, n = np.arange(len(rows)), len(rows)
+        return np.column_stack([rows, count, 1e3 + rows[:, 0], count > 20, np.full(n, 7.5), np.sin(0.1 * count)])
+
+    folder = recorded(tmp_path / "w", "t,x,y,frame,ticks,touch,status,force", made=made)
+    said = run("inspect", folder)
+    assert "angle-unused" not in said
+    assert "unused: 'w0': force left out; name with --state what makes the state." in said
+    assert "unused: 'w0': force left out" in text(call("fit", folder, *LINEAR, "-o", tmp_path / "p.npz"))
+    assert "unused" not in text(call("inspect", folder, "--state", "x,y", "--differentiate"))
+    assert "unused" not in text(call("inspect", recorded(tmp_path / "v", "t,x,y", made=stroke)))

@@ -6,6 +6,7 @@ from ..base.files import stem
 
 WARNINGS = (
     "angle-wrap",
+    "angle-unused",
     "quaternion-flip",
     "rotation-vector-flip",
     "seam",
