@@ -127,3 +127,35 @@ def test_other_columns_that_move_are_a_note_and_clocks_counts_flags_and_constant
     assert "unused: 'w0': force left out" in text(call("fit", folder, *LINEAR, "-o", tmp_path / "p.npz"))
     assert "unused" not in text(call("inspect", folder, "--state", "x,y", "--differentiate"))
     assert "unused" not in text(call("inspect", recorded(tmp_path / "v", "t,x,y", made=stroke)))
+
+
+# What a turn does to checks
+
+
+def nearby(number, wound=False, size=1.0):
+    """Along one path, the angle near half a turn; ``wound``, of one recording beyond it, so from the other side."""
+    rng, t = np.random.default_rng(number), np.linspace(0, 2, 80)
+    angle = 179 + rng.uniform(-0.5, 0.5) + 0.3 * np.sin(3 * t + rng.uniform(0, 6)) - 358 * (wound and number == 3)
+    table = np.column_stack([t, np.sin(t), t**2 / 3 - t, angle])
+    table[:, 1:3] = size * (table[:, 1:3] + 0.03 * rng.standard_normal(2))
+    return table
+
+
+def test_an_angle_on_another_turn_is_no_sign_that_is_turned(tmp_path):
+    folder = recorded(tmp_path / "w", count=6, made=lambda k: nearby(k, wound=True))
+    assert "columns-differ" not in text(call("inspect", folder, *STATES, "--degrees", "heading"))
+    upside = recorded(tmp_path / "v", count=6, made=lambda k: nearby(k) * ([1, 1, -1, 1] if k == 3 else 1))
+    assert "columns-differ: 'w3', column 'y'" in text(call("inspect", upside, *STATES, "--degrees", "heading"))
+    plain = recorded(tmp_path / "w", "t,x,y,z", count=6, made=lambda k: nearby(k, wound=True))
+    assert "columns-differ: 'w3', column 'z'" in text(call("inspect", plain, "--state", "x,y,z", "--differentiate"))
+
+
+def test_no_scale_is_proposed_beside_angles_which_have_none(tmp_path):
+    folder = recorded(tmp_path / "w", made=lambda k: turning(k) * [1, 1000, 1, 1])
+    for given in (STATES, ("--state", "x,y,heading", "--differentiate"), ()):
+        said = text(call("inspect", folder, *given))
+        assert "mixed-units" in said
+        assert "--angle heading" in said
+        assert "--scale auto -o" not in said
+    assert "angles have no scale: give positions in metres" in text(call("inspect", folder, *STATES))
+    assert "--scale auto -o" in text(call("inspect", folder, "--state", "x,y", "--differentiate"))

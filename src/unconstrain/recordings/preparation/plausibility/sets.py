@@ -59,19 +59,20 @@ def outline(subject: Subject) -> Outline | None:
     """Outline of a recording, None where its columns do not tell the states or it is too short."""
     if not subject.moves:
         return None
-    states = subject.clean
+    states, recipe = subject.clean, subject.recipe
     span = max(1, len(states) // POINTS)
     at = np.arange(0, len(states) - span, span)
     intervals = np.diff(np.empty(0) if subject.stamps is None else subject.stamps)
     return Outline(
         subject.recording.title,
         float(np.median(intervals)) if intervals.size else np.nan,
-        subject.recipe.states or (),
+        recipe.states or (),
         np.ptp(states, axis=0),
         np.maximum(states.max(axis=0), -states.min(axis=0)),
         noise_share(states) > 0.3,
         (states[at] + states[at + span]) / 2,
         np.zeros((0, states.shape[1])) if is_noise(states) else states[at + span] - states[at],
+        frozenset({*recipe.angles, *map(subject.name, subject.wraps)}.union(*recipe.quaternions)),
     )
 
 
@@ -120,7 +121,9 @@ def mixed_units(outlines: Sequence[Outline]) -> list[Remark]:
     if ratio < UNLIKE or extent[large] < UNLIKE / 3 * extent[small]:
         return []
     names = outlines[0].names
-    message = f"is {ratio:.0f} times smaller than {names[large]!r}, which outweighs it; scale='auto' levels them."
+    turning = any(one.turning for one in outlines)
+    cure = "angles have no scale: give positions in metres" if turning else "scale='auto' levels them"
+    message = f"is {ratio:.0f} times smaller than {names[large]!r}, which outweighs it; {cure}."
     return [Remark("mixed-units", message, names[small])]
 
 
