@@ -310,8 +310,11 @@ def refused(rng):
 
 
 def angle_unused(rng):
-    recordings, _ = recorded(*movements(rng, dimensions=3))
-    recordings = [replace(one, columns=("x", "y", str(rng.choice(["theta", "yaw_deg"])))) for one in recordings]
+    tables, dt = movements(rng, dimensions=2)
+    turned = [rng.uniform(-3, 3) + np.sin(rng.uniform(1, 4) * np.linspace(0, 1, len(table))) for table in tables]
+    names = ("x", "y", str(rng.choice(["theta", "yaw_deg", "door_angle"])))
+    recordings, _ = recorded([*map(np.column_stack, zip(tables, turned, strict=True))], dt)
+    recordings = [replace(one, columns=names) for one in recordings]
     return Fault(recordings, uc.Recipe(), "angle-unused", int(rng.integers(len(recordings))), None)
 
 

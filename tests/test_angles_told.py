@@ -159,3 +159,46 @@ def test_no_scale_is_proposed_beside_angles_which_have_none(tmp_path):
         assert "--scale auto -o" not in said
     assert "angles have no scale: give positions in metres" in text(call("inspect", folder, *STATES))
     assert "--scale auto -o" in text(call("inspect", folder, "--state", "x,y", "--differentiate"))
+
+
+# A tracker that saw nothing yet, or no more
+
+
+@pytest.mark.parametrize(
+    ("rows", "value", "row"), [(slice(0, 8), 0.0, 0), (slice(-8, None), 0.0, 72), (slice(-8, None), -500.0, 72)]
+)
+def test_one_value_at_an_end_is_lost_sight_and_no_seam_and_is_left_out_as_said(tmp_path, rows, value, row):
+    def made(number):
+        table = stroke(number, 80)
+        table[rows, 1:] = value if number == 2 else table[rows, 1:]
+        return table
+
+    said = run("inspect", recorded(tmp_path / "w", "t,x,y", made=made))
+    assert f"glitch: 'w2', row {row} " in said
+    assert "8 samples far off their neighbours, all of one value, as where a tracker lost sight" in said
+    assert "fit " + str(tmp_path / "w") + " --glitches drop -o policy.npz" in said
+    assert "seam" not in said
+    given = "fit", tmp_path / "w", *LINEAR, "--glitches", "drop", "-o", tmp_path / "p.npz"
+    assert "4 demonstrations, 312 samples" in (told := text(call(*given)))
+    assert "seam" not in told
+    assert "glitch" not in told
+
+
+def test_rest_at_the_origin_from_which_it_moves_on_is_neither_and_a_jump_between_strokes_is_a_seam(tmp_path):
+    def made(number):
+        table = stroke(number, 80)
+        table[:, 1:] -= table[-1 if number == 1 else 0, 1:]
+        still = np.column_stack([0.05 * np.arange(8), np.zeros((8, 2))])
+        return (
+            np.vstack([still, table + np.array([0.4, 0, 0])])
+            if number != 1
+            else np.vstack([table, still + np.array([4.0, 0, 0])])
+        )
+
+    said = run("inspect", recorded(tmp_path / "w", "t,x,y", made=made))
+    assert "glitch" not in said
+    assert "seam" not in said
+    two = np.vstack([stroke(0, 80), stroke(1, 80) + np.array([4.0, 300, 0])])
+    told = run("inspect", write(tmp_path / "two.csv", "t,x,y", two), "--state", "x,y", "--differentiate")
+    assert "seam: 'two', row 80" in told
+    assert "lost sight" not in told
