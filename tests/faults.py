@@ -318,11 +318,18 @@ def angle_unused(rng):
     return Fault(recordings, uc.Recipe(), "angle-unused", int(rng.integers(len(recordings))), None)
 
 
+def same_recording(rng):
+    tables, dt = movements(rng)
+    which = int(rng.integers(1, len(tables)))
+    tables[which] = tables[int(rng.integers(which))].copy()
+    return Fault(*recorded(tables, dt), "same-recording", which, None)
+
+
 FAULTS = (
     nothing, nothing_with_actions, angle_wrap, quaternion_flip, rotation_vector_flip, seam, glitch, clock_unit,
     clock_gap, targets, mixed_units, unit_differs, pause, backwards, at_rest, all_zero, few_demonstrations, row_order,
     other_topic, clock_differs, columns_differ, clock_untold, stale, missing, refused,
-    angle_unused,
+    angle_unused, same_recording,
 )  # fmt: skip
 
 

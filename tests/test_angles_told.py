@@ -175,7 +175,8 @@ def test_one_value_at_an_end_is_lost_sight_and_no_seam_and_is_left_out_as_said(t
 
     said = run("inspect", recorded(tmp_path / "w", "t,x,y", made=made))
     assert f"glitch: 'w2', row {row} " in said
-    assert "8 samples far off their neighbours, all of one value, as where a tracker lost sight" in said
+    assert "8 samples far off their neighbours, all too many in a row to repair" in said
+    assert "--glitches drop leaves them out. They repeat one value, as where a tracker lost sight." in said
     assert "fit " + str(tmp_path / "w") + " --glitches drop -o policy.npz" in said
     assert "seam" not in said
     given = "fit", tmp_path / "w", *LINEAR, "--glitches", "drop", "-o", tmp_path / "p.npz"

@@ -21,6 +21,7 @@ WARNINGS = (
     "mixed-units",
     "unit-differs",
     "columns-differ",
+    "same-recording",
     "pause",
     "reversed",
     "at-rest",

@@ -221,8 +221,8 @@ def glitch(subject: Subject) -> Remark | None:
         cure = f", {'all' * (kept == many) or kept} too many in a row to repair: kept; glitches='drop' leaves them out."
     first = (left or subject.glitches)[0]
     shown = subject.states[first.start : first.stop]
-    lost = ", all of one value, as where a tracker lost sight" * bool(len(shown) > 1 and (shown == shown[0]).all())
-    said = f"{'1 sample far off its' if many == 1 else f'{many} samples far off their'} neighbours{lost}{cure}"
+    lost = " They repeat one value, as where a tracker lost sight." * bool(len(shown) > 1 and (shown == shown[0]).all())
+    said = f"{'1 sample far off its' if many == 1 else f'{many} samples far off their'} neighbours{cure}{lost}"
     return Remark("glitch", said, subject.name(first.column), subject.row(first.start), cured=not left)
 
 

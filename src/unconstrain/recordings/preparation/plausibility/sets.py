@@ -83,11 +83,12 @@ def compare(outlines: Sequence[Outline | None]) -> list[tuple[Remark, ...]]:
     remarks: list[list[Remark]] = [[] for _ in outlines]
     if known:
         several = [one for _, one in known]
-        remarks[known[0][0]] += [*mixed_units(several), *different_places(several), *same(several)]
+        remarks[known[0][0]] += [*mixed_units(several), *different_places(several)]
         units = unit_differs(several)
         columns = columns_differ(several, {place for place, _ in units})
         against = reversed_among_others(several, {place for place, _ in (*units, *columns)})
-        for place, remark in (*clock_differs(several), *units, *smaller_than_others(several), *columns, *against):
+        each = (*clock_differs(several), *units, *smaller_than_others(several), *columns, *against, *same(several))
+        for place, remark in each:
             remarks[known[place][0]].append(remark)
     return [tuple(each) for each in remarks]
 
@@ -144,15 +145,17 @@ def different_places(outlines: Sequence[Outline]) -> list[Remark]:
     return [Remark("places", said)]
 
 
-def same(outlines: Sequence[Outline]) -> list[Remark]:
-    """Demonstrations that are the same in each number."""
-    titles: dict[bytes, list[str]] = {}
-    for one in outlines:
-        titles.setdefault(one.places.tobytes() + one.steps.tobytes(), []).append(one.title)
-    alike = ", ".join(" and ".join(several) for several in titles.values() if several[1:])
+def same(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
+    """Demonstrations that are the same in each number as another one, whose name is shorter or comes first."""
+    places: dict[bytes, list[int]] = {}
+    for place, one in enumerate(outlines):
+        places.setdefault(one.places.tobytes() + one.steps.tobytes(), []).append(place)
+    several = [each for each in places.values() if each[1:]]
+    alike = ", ".join(" and ".join(outlines[place].title for place in each) for each in several)
     said = f"{alike} hold the same recording, which counts more than once, and tests nothing where its like is learnt "
-    said += "from; leave all but one out with leave_out=."
-    return [Remark("same-recording", said)] if alike else []
+    remark = Remark("same-recording", f"{said}from; leave all but one out with leave_out=.")
+    copies = (sorted(each, key=lambda place: len(outlines[place].title))[1:] for each in several)
+    return [(place, remark) for each in copies for place in each]
 
 
 def clock_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
