@@ -95,19 +95,17 @@ def unused(asked: Recipe, decided: Recipe, recording: Recording) -> tuple[Remark
     large = [name for name in angles if np.nanmax(np.abs(moving[name])) > TURNS[0]]
     degrees = [*(decided.degrees or ()), *(one for one in large if not recording.units.get(one, "").startswith("rad"))]
     cure = f"angles={(*decided.angles, *angles)}" + f" and degrees={tuple(degrees)}" * bool(degrees)
-    others = [name for name in moving if name not in angles]
     told = f"looks like an angle, and is left out; take it in with {cure}."
-    said = f"{listed(others, 8)} left out; name with states= what makes the state."
-    return tuple(Remark("angle-unused", told, one) for one in angles[:1]) + (Remark("unused", said),) * bool(others)
+    others = listed([name for name in moving if name not in angles], 8)
+    note = Remark("unused", f"{others} left out; name with states= what makes the state.")
+    return (*(Remark("angle-unused", told, one) for one in angles[:1]), *[note] * bool(others))
 
 
 def _moves(column: Array) -> bool:
     """Whether a column (T,) takes many values, and does not rise steadily as clocks and counts do."""
     values = column[np.isfinite(column)][:: max(1, len(column) // 200)]
-    if len(np.unique(values)) <= LEAST_ROWS:
-        return False
-    steps = np.diff(values)
-    return not ((steps > 0).all() and np.quantile(np.abs(steps / np.median(steps) - 1.0), 0.9) <= STEADY)
+    steps, many = np.diff(values), len(np.unique(values)) > LEAST_ROWS
+    return many and not ((steps > 0).all() and np.quantile(np.abs(steps / np.median(steps) - 1.0), 0.9) <= STEADY)
 
 
 def _about_degrees(asked: Recipe, decided: Recipe, recording: Recording) -> tuple[Remark, ...]:

@@ -100,8 +100,7 @@ def seams(values: Array) -> list[int]:
     values : ndarray, shape (T, n)
         Without glitches.
     """
-    steps = _steps(values)
-    far = _far(steps)
+    far = _far(steps := _steps(values))
     alone = [start for start, stop in stretches(far) if stop - start == 1 and _stands_out(steps, far, start, stop)]
     return [start + 1 for start in alone if AROUND / 2 <= start + 1 <= len(values) - AROUND / 2]
 
