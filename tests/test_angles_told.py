@@ -203,3 +203,9 @@ def test_rest_at_the_origin_from_which_it_moves_on_is_neither_and_a_jump_between
     told = run("inspect", write(tmp_path / "two.csv", "t,x,y", two), "--state", "x,y", "--differentiate")
     assert "seam: 'two', row 80" in told
     assert "lost sight" not in told
+
+
+def test_the_page_of_recordings_in_degrees_has_radians(tmp_path):
+    folder = recorded(tmp_path / "w", "t,x [m],y [m],heading [deg]")
+    run("look", folder, *STATES, "-o", tmp_path / "look.html")
+    assert '"units":["m","m","rad"]' in (tmp_path / "look.html").read_text()
