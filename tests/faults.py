@@ -309,10 +309,27 @@ def refused(rng):
     return Fault(recordings, recipe, "refused", which, None)
 
 
+def angle_unused(rng):
+    tables, dt = movements(rng, dimensions=2)
+    turned = [rng.uniform(-3, 3) + np.sin(rng.uniform(1, 4) * np.linspace(0, 1, len(table))) for table in tables]
+    names = ("x", "y", str(rng.choice(["theta", "yaw_deg", "door_angle"])))
+    recordings, _ = recorded([*map(np.column_stack, zip(tables, turned, strict=True))], dt)
+    recordings = [replace(one, columns=names) for one in recordings]
+    return Fault(recordings, uc.Recipe(), "angle-unused", int(rng.integers(len(recordings))), None)
+
+
+def same_recording(rng):
+    tables, dt = movements(rng)
+    which = int(rng.integers(1, len(tables)))
+    tables[which] = tables[int(rng.integers(which))].copy()
+    return Fault(*recorded(tables, dt), "same-recording", which, None)
+
+
 FAULTS = (
     nothing, nothing_with_actions, angle_wrap, quaternion_flip, rotation_vector_flip, seam, glitch, clock_unit,
     clock_gap, targets, mixed_units, unit_differs, pause, backwards, at_rest, all_zero, few_demonstrations, row_order,
     other_topic, clock_differs, columns_differ, clock_untold, stale, missing, refused,
+    angle_unused, same_recording,
 )  # fmt: skip
 
 

@@ -337,7 +337,7 @@ def test_an_angle_in_degrees_that_a_later_file_alone_shows_is_said_with_its_cure
     assert told not in text(call("fit", *fit, "--leave-out", "a0"))  # the first tells it then
 
 
-def test_recordings_that_are_the_same_are_named_and_learnt_from_all_the_same(tmp_path):
+def test_recordings_that_are_the_same_are_counted_and_left_out_as_said(tmp_path):
     for k in range(4):
         write(tmp_path / f"w{k}.csv", "t,x,y", stroke(k))
     asked, fit = (tmp_path / "*.csv", *READ), (*LINEAR, "-o", tmp_path / "p.npz", "--force")
@@ -346,7 +346,12 @@ def test_recordings_that_are_the_same_are_named_and_learnt_from_all_the_same(tmp
     with (tmp_path / "w3.csv").open() as file:  # written otherwise
         (tmp_path / "other.csv").write_text(file.read().replace(",", ";"))
     said = "'copy' and 'w0', 'other' and 'w3' hold the same recording, which counts more than once"
-    assert text(call("inspect", *asked)).count(said) == 1
+    shown = text(call("inspect", *asked))
+    assert shown.count(said) == 1
+    assert shown.startswith("! 2 of 6 demonstrations not as it should be: same-recording.")
+    assert f"same-recording: 'copy': {said}" in shown
+    assert "--leave-out copy,other -o" in shown
     assert text(call("fit", *asked, *fit)).count(said) == 1
-    assert run("inspect", *asked).startswith("✔ ")
-    run("fit", *asked, *fit, "--strict")
+    assert "same-recording" not in text(call("inspect", *asked, "--leave-out", "copy,other"))
+    assert "not as it seems (same-recording)" in call("fit", *asked, *fit, "--strict").err
+    assert "same-recording" not in call("fit", *asked, *fit, "--strict", "--leave-out", "copy,other").err

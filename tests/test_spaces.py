@@ -497,7 +497,7 @@ def test_the_command_line_gives_a_policy_its_space(tmp_path):
     state = np.r_[0.0, turning(Rotation.random(random_state=3), "xyzw", flips=False).values[50], 3.0]
     start = (f"--start={','.join(map(str, state))}", "--least-support", "0")  # of another demonstration in each part
     path = run("rollout", saved, *start, "--steps", "20").splitlines()
-    assert path[0] == "t,x,qx,qy,qz,qw,crank,vx,wqx,wqy,wqz,vcrank"
+    assert path[0] == "t,x,qx,qy,qz,qw,crank (rad),vx,wqx,wqy,wqz,vcrank (rad/s)"
     rows = np.array([list(map(float, line.split(","))) for line in path[1:]])
     assert (rows[:, 6] <= np.pi).all()
     assert rows[-1, 6] < 0.0

@@ -67,8 +67,10 @@ def shortened(name: str, most: int = 40) -> str:
 
 
 def with_unit(name: str, unit: str | None) -> str:
-    """A column's name with its unit, ``"x (mm)"``; as it is where it says one, as ``"x [mm]"``."""
-    return f"{name} ({unit})" if unit and bare(name) == name else name
+    """A column's name with its unit, ``"x (mm)"``; as it is where it says one, but ``"yaw [deg]"`` in rad is not."""
+    short = bare(name)
+    turned = bool(unit and unit.startswith("rad")) and re.match(r"\W*(deg|[°º])", name[len(short) :], re.IGNORECASE)
+    return f"{short} ({unit})" if unit and (short == name or turned) else name
 
 
 def bare(name: str) -> str:

@@ -180,6 +180,8 @@ def _cures(surveys: Sequence[Any]) -> dict[str, str]:
         for option, value in options_in(remark.message).items() if cures else ():
             names = (*found.get(option, value).split(","), *value.split(",") * (option in ("--angle", "--degrees")))
             found[option] = ",".join(dict.fromkeys(names))
+    if "--angle" in found:  # which has no scale
+        found.pop("--scale", None)
     return dict(sorted(found.items()))
 
 

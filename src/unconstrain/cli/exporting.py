@@ -36,7 +36,7 @@ _UNIT += "1000.0 for millimetres."
 TARGETS = {
     ".c": Target("C source", "export_c", ("name", "single", "notes"), _NEXT_C),
     ".onnx": Target("ONNX graph", "export_onnx", ("single", "notes"), _NEXT_ONNX),
-    ".js": Target("JavaScript module", "export_javascript", (), "Import 'policy' and 'support' from it."),
+    ".js": Target("JavaScript module", "export_javascript", ("notes",), "Import 'policy' and 'support' from it."),
 }
 """By the suffix of the file."""
 
@@ -68,6 +68,7 @@ def export(
     _check(output, kind, ros2, name, single)
     check_outputs((output, header, ros2), (policy,), force)
     learnt, notes = fitted_policy(policy), uc.storage.load_notes(policy)
+    notes["units"] = uc.Recipe.from_dict(notes.get("recipe", {})).units(notes.get("units", {}))  # as recorded, if old
     written, then = {}, _NEXT_ROS2
     if ros2 is not None:
         learnt.export_ros2(ros2, name, messages=messages, notes=notes)

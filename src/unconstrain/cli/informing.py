@@ -42,7 +42,7 @@ def provenance(paths: Iterable[str | Path], recipe: uc.Recipe, first: uc.Recordi
     return {
         "recipe": recipe.to_dict(),
         **reading_of(**reading).roles,
-        "units": dict(first.units),
+        "units": recipe.units(first.units),
         "sources": [Path(path).name for path in sources],
         "digests": [*map(digest_of, sources)],
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -106,6 +106,7 @@ def _columns(notes: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "states": list(states),
         "actions": list(actions),
+        "recorded in degrees": list(recipe.degrees or ()),
         "centring": "states relative to the mean of each demonstration" if recipe.centre else "none",
         "actions are": "columns" if recipe.actions else f"velocities of the states ({recipe.differentiate})",
         "rate_hz": recipe.rate,

@@ -154,7 +154,7 @@ def _page(seen: Seen, surveys: Sequence[Any], verdict: uc.evaluation.verdicts.Ve
         seen.demonstrations,
         seen.recipe.states or (),
         f"A look at {Path(seen.paths[0]).name}{f' and {more} more' if more else ''}",
-        units=seen.recordings[0].units,
+        units=seen.recipe.units(seen.recordings[0].units),
         marks=[[one._replace(message=as_typed(one.message)) for one in marks_of(*each)] for each in found],
         command=_to_fit(seen.paths, seen.recipe, seen.roles),
         policy=seen.policy,

@@ -33,7 +33,7 @@ CODES = "unconstrain.codes"
 OTHER_UNITS = {"unit-differs", "clock-differs"}
 """Codes of recordings in another unit than others."""
 
-SPOILING = {*OTHER_UNITS, "missing", "refused"}
+SPOILING = {*OTHER_UNITS, "missing", "refused", "same-recording"}
 """Codes of recordings that spoil what is learnt with others, or end it."""
 
 MEANINGS = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -81,7 +82,7 @@ def rollout(
     learnt, recipe = innermost(moving), uc.Recipe.from_dict(notes.get("recipe", {}))
     if len(start) != learnt.n_features_in_:
         raise SettingError(f"--start: got {len(start)} numbers, expected {learnt.n_features_in_}, one for each state.")
-    _check_start(moving, start, how["least_support"])
+    _check_start(moving, recipe, start, how["least_support"])
     places = learnt.n_outputs_ if how["order"] == 2 else len(start)  # what a constraint is a function of
     at = replace(recipe, states=recipe.states and recipe.states[:places])
     held = held_of(plane, constraint, at, [start[:places]], learnt.n_outputs_, "one for each action")
@@ -92,7 +93,7 @@ def rollout(
     kept = "the plane" if plane is not None else getattr(held, "title", "")
     verdict = _supported(moving, path, why, round_, kept, notes)
     accelerations = named.actions or tuple(f"a{name}" for name in (named.states or ())[:places])
-    columns = ["t", *(named.states or ()), *(accelerations if how["order"] == 2 else named.directions)]
+    columns = ["t", *sum(replace(named, actions=accelerations if how["order"] == 2 else None).labels({}), ())]
     if output != "-":
         write(output, _csv(columns, path))
     elif not as_json:
@@ -119,8 +120,12 @@ def _obstacle(given: tuple[float, ...], n: int) -> uc.motion.obstacles.Ellipsoid
         return uc.motion.obstacles.Ellipsoid(np.array(given[:n]), given[n:] if len(given) > n + 1 else given[n])
 
 
-def _check_start(policy: uc.Policy | uc.Guided, start: tuple[float, ...], least: float) -> None:
-    """Refuse to begin where nothing was demonstrated, unless the policy is guided from anywhere."""
+def _check_start(policy: uc.Policy | uc.Guided, recipe: uc.Recipe, start: tuple[float, ...], least: float) -> None:
+    """Note angles that look like degrees; refuse to begin where nothing was demonstrated, unless it is guided."""
+    for name, angle in zip(recipe.states or (), start, strict=False):
+        if name in (recipe.degrees or ()) and abs(angle) > math.tau:
+            said = f"--start: {angle:.4g} is far outside radians, which the policy takes for {name}; if it is in "
+            show_warning(f"{said}degrees, as recorded, that is {math.radians(angle):.4g}.")
     if innermost(policy) is not policy:
         return
     support = float(support_of(policy, [start])[0])

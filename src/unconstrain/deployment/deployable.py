@@ -118,12 +118,15 @@ class Exportable:
     def _after(self, scaler: Scaler | None) -> Callable[[ArrayLike], Array]:
         return self if scaler is None else lambda states: self(scaler.transform(np.asarray(states)))
 
-    def export_javascript(self, path: str | os.PathLike[str], *, scaler: Scaler | None = None) -> None:
+    def export_javascript(
+        self, path: str | os.PathLike[str], *, scaler: Scaler | None = None, notes: Mapping[str, Any] | None = None
+    ) -> None:
         """Write the policy as an ES module that needs nothing else, with ``policy(state)`` and ``support(state)``.
 
-        The scaler and errors are as in :meth:`closed_form`.
+        The scaler and errors are as in :meth:`closed_form`, the notes as in :meth:`export_c`.
         """
-        export_javascript(self.closed_form(scaler), path)
+        form = self.closed_form(scaler)
+        export_javascript(form, path, self.describe(form, notes))
 
     def javascript(self, scaler: Scaler | None = None) -> str:
         """The policy as a JavaScript expression, to put into a page; it is an object of the same two functions.

@@ -46,6 +46,7 @@ class Description:
         given = recipe.get("actions") or [*map(speed_of, recipe.get("states") or ())]
         lines = {"learnt by": learnt, "relative to": ", ".join(f"{value:.6g}" for value in form.origin)}
         lines |= {name: _said(value) for name, value in notes.items()}
+        lines["recorded in degrees"] = ", ".join(recipe.get("degrees") or ())
         lines["guided"] = form.correction.promise if form.correction else ""
         lines["sha256"] = digest(form)
         actions = _named(given, form.sizes[1], "u")

@@ -7,14 +7,16 @@ from typing import Any
 
 from ..base import files
 from ..models import ClosedForm, spaces
+from .description import Description
 from .filling import filled, template
 
 
-def export_javascript(form: ClosedForm, path: str | os.PathLike[str]) -> None:
+def export_javascript(form: ClosedForm, path: str | os.PathLike[str], described: Description) -> None:
     """Write an ES module that exports what :func:`javascript` offers."""
     (_, d, models), n = form.sizes, form.columns
     fill = {
         "what": f"{n} states to {d} actions, {models} model{'s' * (models > 1)}",
+        "about": "\n".join(f" * {line}" for line in described.comment()),
         "n": str(n),
         "d": str(d),
         "runtime": template("policy.js"),

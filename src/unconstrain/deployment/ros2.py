@@ -87,6 +87,7 @@ def _words(package: str, form: ClosedForm, described: Description, kind: Message
         "joints": joints,
         "state_message": received,
         "command_message": sent,
+        "comment": "\n".join(f"# {line}" for line in described.comment()),
         "about": "\n".join(f"- {line}" for line in described.comment()),
         "n": str(form.columns),
         "d": str(form.sizes[1]),

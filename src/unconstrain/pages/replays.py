@@ -84,7 +84,7 @@ def replayed(
         unknown = " Its size and pace over time: not compared, as what held these recordings is not known."
         return Replayed(found._replace(doubt=(found.doubt + unknown).strip()) if runs else found, None, runs)
     extents, paces, lasts, apart = np.array([one[:4] for one in known]).T
-    unit = {units.get(name, "") for name in recipe.states or ()}
+    unit = {recipe.units(units).get(name, "") for name in recipe.states or ()}
     said = f"{np.median(apart):.3g} {(len(unit) == 1 and unit.pop()) or '(unit of the states)'}"
     measured = {"extent": extents, "pace": paces, "last_round": lasts, "apart": apart}
     finite = {name: values[np.isfinite(values)] for name, values in measured.items()}

@@ -6,6 +6,7 @@ from ..base.files import stem
 
 WARNINGS = (
     "angle-wrap",
+    "angle-unused",
     "quaternion-flip",
     "rotation-vector-flip",
     "seam",
@@ -20,6 +21,7 @@ WARNINGS = (
     "mixed-units",
     "unit-differs",
     "columns-differ",
+    "same-recording",
     "pause",
     "reversed",
     "at-rest",

@@ -5,12 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...base.arrays import Array
+from ...base.display import bare, listed
 from ...base.errors import SettingError
 from ..demonstration import Recording
 from ..remarks import Remark
-from ..signals.orientations import TURNS, in_degrees
-from .plausibility.checks import targets
-from .plausibility.subject import Subject
+from ..signals.orientations import TURNS, in_degrees, wraps
+from .plausibility.checks import STEADY, targets
+from .plausibility.subject import LEAST_ROWS, Subject
 from .recipes import Recipe, complete_recipe, stamps
 
 DEGREES = re.compile(r"\s*(deg|degs|degrees?|[°º])\s*((/|per |\*|·)?\s*s(ec|econds?)?(\^?-1|⁻¹)?)?\s*", re.IGNORECASE)
@@ -22,6 +24,11 @@ JOINT = re.compile(
     re.IGNORECASE,
 )
 """How people call a joint: markers at one, such as ``wrist_x``, are positions."""
+
+ANGLE = re.compile(
+    r"(.*[._/ ])?(yaw|pitch|roll|heading|theta|phi|psi|\w*angle)([._ ]?(deg|degrees|rad|radians|\d+))*", re.IGNORECASE
+)
+"""How people call an angle."""
 
 FARTHEST = 2.0
 """Turns from end to end that joints of arms have at most."""
@@ -46,7 +53,7 @@ def decide(recipe: Recipe, recording: Recording) -> tuple[Recipe, tuple[Remark, 
         As :func:`~.recipes.complete_recipe`.
     """
     completed = in_radians(complete_recipe(recipe, recording), recording)
-    said = _about_degrees(recipe, completed, recording)
+    said = (*_about_degrees(recipe, completed, recording), *unused(recipe, completed, recording))
     if completed.actions is None or not (found := targets(Subject(recording, completed))):
         return _of_used_columns(completed), said
     if stamps(recording, completed) is None:  # nothing to differentiate by
@@ -59,7 +66,8 @@ def decide(recipe: Recipe, recording: Recording) -> tuple[Recipe, tuple[Remark, 
 def in_radians(recipe: Recipe, recording: Recording) -> Recipe:
     """A recipe with the columns in degrees: those that it tells, or whose unit or, of angles, whose numbers say so."""
     if recipe.degrees is not None:
-        return replace(recipe, degrees=recording.resolve(recipe.degrees))
+        told = recording.resolve(recipe.degrees)
+        return replace(recipe, degrees=tuple(one for one in told if not recording.units.get(one, "").startswith("rad")))
     used = _used(recipe)
     units = {name: recording.units.get(name, "") for name in used}
     shown = {name for name in used if name in recipe.angles and not units[name]}
@@ -76,10 +84,36 @@ def _used(recipe: Recipe) -> tuple[str, ...]:
     return (*(recipe.states or ()), *(recipe.actions or ()))
 
 
+def unused(asked: Recipe, decided: Recipe, recording: Recording) -> tuple[Remark, ...]:
+    """Remarks on columns that move and are none of the guessed states: on angles how to take them in."""
+    if asked.states is not None or not decided.states:
+        return ()
+    columns, used = zip(recording.columns, recording.values.T, strict=True), _used(decided)
+    moving = {name: column for name, column in columns if name not in used and _moves(column)}
+    angles = [name for name in moving if ANGLE.fullmatch(bare(name)) or wraps(moving[name])]
+    angles = [] if decided.actions else angles  # which have no velocity then
+    large = [name for name in angles if np.nanmax(np.abs(moving[name])) > TURNS[0]]
+    degrees = [*(decided.degrees or ()), *(one for one in large if not recording.units.get(one, "").startswith("rad"))]
+    cure = f"angles={(*decided.angles, *angles)}" + f" and degrees={tuple(degrees)}" * bool(degrees)
+    told = f"looks like an angle, and is left out; take it in with {cure}."
+    others = listed([name for name in moving if name not in angles], 8)
+    note = Remark("unused", f"{others} left out; name with states= what makes the state.")
+    return (*(Remark("angle-unused", told, one) for one in angles[:1]), *[note] * bool(others))
+
+
+def _moves(column: Array) -> bool:
+    """Whether a column (T,) takes many values, and does not rise steadily as clocks and counts do."""
+    values = column[np.isfinite(column)][:: max(1, len(column) // 200)]
+    steps, many = np.diff(values), len(np.unique(values)) > LEAST_ROWS
+    return many and not ((steps > 0).all() and np.quantile(np.abs(steps / np.median(steps) - 1.0), 0.9) <= STEADY)
+
+
 def _about_degrees(asked: Recipe, decided: Recipe, recording: Recording) -> tuple[Remark, ...]:
     degrees, used = decided.degrees or (), _used(decided)
     if others := set(degrees) - {*used, *recording.resolve(asked.actions or ())}:
         raise SettingError(f"degrees: got {', '.join(sorted(others))}, expected some of {', '.join(used)}.")
+    if told := [name for name in recording.resolve(asked.degrees or ()) if name not in degrees]:
+        return (Remark("degrees", f"{', '.join(told)} is in radians, as its unit says, and is left so."),)
     if asked.degrees is not None or not degrees:
         return may_be_degrees(asked, decided, recording)
     return (Remark("degrees", f"{', '.join(degrees)} is taken in radians; degrees=() forbids it."),)

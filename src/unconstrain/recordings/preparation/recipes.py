@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import reduce
@@ -186,11 +187,19 @@ class Recipe:
 
     def labels(self, units: Mapping[str, str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Names of states and actions with the units of their columns: ``x (mm)``, ``vx (mm/s)``."""
-        known = {name: with_unit(name, unit) for name, unit in units.items()}
-        speeds = {speed_of(name): with_unit(speed_of(name), f"{unit}/s") for name, unit in units.items() if unit}
-        actions = [known.get(name, name) for name in self.actions or ()]
-        actions = actions or [speeds.get(name, name) for name in self.directions]
-        return tuple(known.get(name, name) for name in self.states or ()), tuple(actions)
+        known = self.units(units)
+        named = (self.states or (), self.actions or self.directions)
+        states, actions = (tuple(with_unit(name, known.get(name)) for name in names) for names in named)
+        return states, actions
+
+    def units(self, recorded: Mapping[str, str]) -> dict[str, str]:
+        """Units of what is learnt, by those of columns: rad of angles, and of what is in degrees."""
+        told = dict.fromkeys(self.angles, "rad") | {name: unit for name, unit in recorded.items() if unit}
+        for name in self.degrees or ():
+            unit = recorded.get(name) or ("deg/s" if name in (self.actions or ()) else "deg")
+            told[name] = re.sub(r"deg(ree)?s?|[°º]", "rad", unit, flags=re.IGNORECASE)
+        moving = () if self.actions else self.states or ()
+        return told | {speed_of(name): f"{told[name]}/s" for name in moving if name in told}
 
     @property
     def _orientations(self) -> list[tuple[tuple[str, ...], spaces.Sphere]]:
@@ -260,6 +269,7 @@ def _with_columns(recipe: Recipe, recording: Recording) -> Recipe:
     columns = recording.columns
     states = recipe.states and recording.resolve(recipe.states)
     told = replace(recipe, states=states, actions=recipe.actions and recording.resolve(recipe.actions))
+    told = replace(told, angles=recording.resolve(recipe.angles))
     states = states or _with_turning(told, guess_states(columns))
     replace(recording, values=recording.values[:0]).select([*(states or ()), *(told.actions or ())])
     if states and (told.actions or told.differentiate):
@@ -267,7 +277,7 @@ def _with_columns(recipe: Recipe, recording: Recording) -> Recipe:
     actions = states and guess_actions(columns, states)
     if actions:
         return replace(told, states=states, actions=actions)
-    if states and states == _with_turning(recipe, positions_in(columns)):
+    if states and states == _with_turning(told, positions_in(columns)):
         return replace(told, states=states, differentiate="savgol")
     raise SettingError(
         f"'{recording.name}': cannot tell {'the actions' if states else 'states and actions'} from its columns "

@@ -11,7 +11,7 @@ from ...base.display import counted, listed
 from ...base.errors import InvalidDataError, UnconstrainError
 from ..demonstration import Recording
 from ..remarks import Remark, titled
-from .decisions import in_radians, may_be_degrees
+from .decisions import in_radians, may_be_degrees, unused
 from .movements import Gap, find_gaps, prepare_one, window_used
 from .plausibility.checks import examine, once
 from .plausibility.sets import compare, outline, too_few
@@ -121,7 +121,8 @@ def _survey(subject: Subject, asked: Recipe) -> Survey:
     known = np.empty(0) if times is None else times[np.isfinite(times)]
     gaps = find_gaps(known - known[:1], asked.max_gap_s)
     left, refused = _prepared(subject)
-    remarks = (*examine(subject), *may_be_degrees(asked, subject.recipe, recording), *refused)
+    guessed = (*may_be_degrees(asked, subject.recipe, recording), *unused(asked, subject.recipe, recording))
+    remarks = (*examine(subject), *guessed, *refused)
     steady = _steady_intervals(known, gaps)
     typical = float(np.median(steady)) if steady.size else None
     bad_cells = len(recording) - np.count_nonzero(np.isfinite(recording.values), axis=0)

@@ -58,7 +58,7 @@ def glitches(values: Array) -> list[Glitch]:
         for column in rough
         for start, stop in sorted({*_single(values[:, column]), *_bursts(values[:, column])})
     ]
-    return sorted(found, key=lambda glitch: (glitch.start, glitch.column))
+    return sorted({*found, *_unseen(values)}, key=lambda glitch: (glitch.start, glitch.column))
 
 
 def _rough(values: Array) -> list[int]:
@@ -100,17 +100,28 @@ def seams(values: Array) -> list[int]:
     values : ndarray, shape (T, n)
         Without glitches.
     """
-    extent = np.ptp(values, axis=0)
-    moving = extent > 0
-    if not moving.any():
-        return []
-    squares = np.zeros(len(values) - 1)
-    for column in np.flatnonzero(moving):
-        squares += (np.diff(values[:, column]) / extent[column]) ** 2
-    steps = np.sqrt(squares)
-    far = _far(steps)
+    far = _far(steps := _steps(values))
     alone = [start for start, stop in stretches(far) if stop - start == 1 and _stands_out(steps, far, start, stop)]
     return [start + 1 for start in alone if AROUND / 2 <= start + 1 <= len(values) - AROUND / 2]
+
+
+def _steps(values: Array) -> Array:
+    """Lengths (T − 1,) of steps, each column in its extent."""
+    extent = np.ptp(values, axis=0)
+    squares = np.zeros(len(values) - 1)
+    for column in np.flatnonzero(extent > 0):
+        squares += (np.diff(values[:, column]) / extent[column]) ** 2
+    return np.sqrt(squares)
+
+
+def _unseen(values: Array) -> Iterator[Glitch]:
+    """Rows at an end that repeat one value in all columns, a jump away: a tracker did not see yet, or any more."""
+    steps = _steps(values) if len(values) else np.zeros(0)
+    far, moved = _far(steps), np.flatnonzero(steps)
+    ends = [(moved[0], 0, moved[0] + 1), (moved[-1], moved[-1] + 1, len(values))] if moved.size else []
+    for jump, start, stop in ends:
+        if 1 < stop - start <= len(values) / 2 and far[jump] and _stands_out(steps, far, jump, jump + 1):
+            yield from (Glitch(int(column), int(start), int(stop)) for column in np.flatnonzero(np.ptp(values, axis=0)))
 
 
 def _single(signal: Array) -> Iterator[tuple[int, int]]:

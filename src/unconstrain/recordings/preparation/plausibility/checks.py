@@ -219,8 +219,10 @@ def glitch(subject: Subject) -> Remark | None:
         cure = ", repaired by a straight line; glitches='keep' takes what was recorded, glitches='drop' leaves it out."
     elif subject.recipe.glitches == "auto":
         cure = f", {'all' * (kept == many) or kept} too many in a row to repair: kept; glitches='drop' leaves them out."
-    said = f"{'1 sample far off its' if many == 1 else f'{many} samples far off their'} neighbours{cure}"
     first = (left or subject.glitches)[0]
+    shown = subject.states[first.start : first.stop]
+    lost = " They repeat one value, as where a tracker lost sight." * bool(len(shown) > 1 and (shown == shown[0]).all())
+    said = f"{'1 sample far off its' if many == 1 else f'{many} samples far off their'} neighbours{cure}{lost}"
     return Remark("glitch", said, subject.name(first.column), subject.row(first.start), cured=not left)
 
 

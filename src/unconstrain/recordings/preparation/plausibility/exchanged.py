@@ -23,11 +23,12 @@ With a second factor of 4, none of 630 recorded movements is so beside others of
 
 def exchanged(outlines: Sequence[Outline]) -> tuple[int, list[tuple[int, int]]] | None:
     """The demonstration, and pairs of columns, the same one twice if its sign is turned; None where there is none."""
-    columns = range(len(outlines[0].extent))
-    if len(outlines) < FEWEST or len(columns) > MOST_COLUMNS:
+    turning = frozenset[str]().union(*(one.turning for one in outlines))  # a turn more is no difference
+    columns = [at for at, name in enumerate(outlines[0].names) if name not in turning]
+    if len(outlines) < FEWEST or not 0 < len(columns) <= MOST_COLUMNS:
         return None
     usual = np.median([one.extent for one in outlines], axis=0)
-    scale = np.where(usual > 0, usual, 1.0) / 2.0
+    scale = np.where([name in turning for name in outlines[0].names], np.inf, np.where(usual > 0, usual, 1.0) / 2.0)
     others = [_table(one, scale) for one in outlines]
     far = [_off(one, [*others[:place], *others[place + 1 :]]) for place, one in enumerate(others)]
     odd = int(np.argmax(far))

@@ -12,7 +12,8 @@ class Outline(NamedTuple):
     """A demonstration in a few numbers.
 
     ``extent`` and ``size`` (n,) of its states, which of them are ``noisy`` (n,), and some ``places`` with the ``steps``
-    made there (k, n); its ``title``, and the seconds between samples, NaN where not known.
+    made there (k, n); its ``title``, and the seconds between samples, NaN where not known. Of its ``turning`` columns,
+    angles and orientations, several numbers stand for one place.
     """
 
     title: str
@@ -23,6 +24,7 @@ class Outline(NamedTuple):
     noisy: NDArray[np.bool_]
     places: Array
     steps: Array
+    turning: frozenset[str] = frozenset()
 
     @property
     def push(self) -> float:

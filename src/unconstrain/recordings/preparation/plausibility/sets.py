@@ -59,19 +59,20 @@ def outline(subject: Subject) -> Outline | None:
     """Outline of a recording, None where its columns do not tell the states or it is too short."""
     if not subject.moves:
         return None
-    states = subject.clean
+    states, recipe = subject.clean, subject.recipe
     span = max(1, len(states) // POINTS)
     at = np.arange(0, len(states) - span, span)
     intervals = np.diff(np.empty(0) if subject.stamps is None else subject.stamps)
     return Outline(
         subject.recording.title,
         float(np.median(intervals)) if intervals.size else np.nan,
-        subject.recipe.states or (),
+        recipe.states or (),
         np.ptp(states, axis=0),
         np.maximum(states.max(axis=0), -states.min(axis=0)),
         noise_share(states) > 0.3,
         (states[at] + states[at + span]) / 2,
         np.zeros((0, states.shape[1])) if is_noise(states) else states[at + span] - states[at],
+        frozenset({*recipe.angles, *map(subject.name, subject.wraps)}.union(*recipe.quaternions)),
     )
 
 
@@ -82,11 +83,12 @@ def compare(outlines: Sequence[Outline | None]) -> list[tuple[Remark, ...]]:
     remarks: list[list[Remark]] = [[] for _ in outlines]
     if known:
         several = [one for _, one in known]
-        remarks[known[0][0]] += [*mixed_units(several), *different_places(several), *same(several)]
+        remarks[known[0][0]] += [*mixed_units(several), *different_places(several)]
         units = unit_differs(several)
         columns = columns_differ(several, {place for place, _ in units})
         against = reversed_among_others(several, {place for place, _ in (*units, *columns)})
-        for place, remark in (*clock_differs(several), *units, *smaller_than_others(several), *columns, *against):
+        each = (*clock_differs(several), *units, *smaller_than_others(several), *columns, *against, *same(several))
+        for place, remark in each:
             remarks[known[place][0]].append(remark)
     return [tuple(each) for each in remarks]
 
@@ -120,7 +122,9 @@ def mixed_units(outlines: Sequence[Outline]) -> list[Remark]:
     if ratio < UNLIKE or extent[large] < UNLIKE / 3 * extent[small]:
         return []
     names = outlines[0].names
-    message = f"is {ratio:.0f} times smaller than {names[large]!r}, which outweighs it; scale='auto' levels them."
+    turning = any(one.turning for one in outlines)
+    cure = "angles have no scale: give positions in metres" if turning else "scale='auto' levels them"
+    message = f"is {ratio:.0f} times smaller than {names[large]!r}, which outweighs it; {cure}."
     return [Remark("mixed-units", message, names[small])]
 
 
@@ -141,15 +145,17 @@ def different_places(outlines: Sequence[Outline]) -> list[Remark]:
     return [Remark("places", said)]
 
 
-def same(outlines: Sequence[Outline]) -> list[Remark]:
-    """Demonstrations that are the same in each number."""
-    titles: dict[bytes, list[str]] = {}
-    for one in outlines:
-        titles.setdefault(one.places.tobytes() + one.steps.tobytes(), []).append(one.title)
-    alike = ", ".join(" and ".join(several) for several in titles.values() if several[1:])
+def same(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
+    """Demonstrations that are the same in each number as another one, whose name is shorter or comes first."""
+    places: dict[bytes, list[int]] = {}
+    for place, one in enumerate(outlines):
+        places.setdefault(one.places.tobytes() + one.steps.tobytes(), []).append(place)
+    several = [each for each in places.values() if each[1:]]
+    alike = ", ".join(" and ".join(outlines[place].title for place in each) for each in several)
     said = f"{alike} hold the same recording, which counts more than once, and tests nothing where its like is learnt "
-    said += "from; leave all but one out with leave_out=."
-    return [Remark("same-recording", said)] if alike else []
+    remark = Remark("same-recording", f"{said}from; leave all but one out with leave_out=.")
+    copies = (sorted(each, key=lambda place: len(outlines[place].title))[1:] for each in several)
+    return [(place, remark) for each in copies for place in each]
 
 
 def clock_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
