@@ -634,7 +634,7 @@ def test_score_is_the_inconsistency_by_hand(files, tmp_path):
         missed += (length - action @ (found_A @ state + found_b) / length) ** 2
     variance = len(rows) * rows[:, 3:].var(axis=0).sum()
     assert found["rows"][0] | {"explains": 1} == {
-        "demonstration": "swing_0", "samples": 40, "explains": 1, "ninc": pytest.approx(missed / variance)
+        "demonstration": "swing_0", "samples": 40, "fast": 40, "explains": 1, "ninc": pytest.approx(missed / variance)
     }  # fmt: skip
     assert found["all"]["ninc"] == pytest.approx(missed / variance)
     assert found["policy"] == str(tmp_path / "p.npz")

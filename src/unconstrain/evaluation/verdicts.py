@@ -207,7 +207,7 @@ def of_score(
 
 def of_worst(found: Verdict, shares: Mapping[str, float]) -> Verdict:
     """Add to a score which recordings by themselves are explained poorly, by name, and far worse than is usual."""
-    far = min(FAIR, float(np.median([*shares.values()])) - (GOOD - FAIR))
+    far = min(FAIR, float(np.median([*shares.values()] or [GOOD])) - (GOOD - FAIR))
     poor = sorted((share, f"'{name}'") for name, share in shares.items() if share < far)
     if not poor:
         return found
@@ -442,8 +442,10 @@ def _measured(*given: Sequence[float] | Array) -> dict[str, Array]:
 
 def _times(ratios: Array) -> str:
     """The middle one, and the range of several that differ."""
-    least, middle, most = (f"{value:.2f}" for value in (ratios.min(), np.median(ratios), ratios.max()))
-    return f"{middle} times" if least == most else f"{middle} times ({least} to {most})"
+    every = (float(one) for one in (ratios.min(), np.median(ratios), ratios.max()))
+    least, middle, most = (f"{abs(one):.2f}{{}}{' the other way' if one < 0 else ''}" for one in every)
+    middle, ends = middle.format(" times"), [least.format(""), most.format("")]
+    return middle if ends[0] == ends[1] else f"{middle} ({ends[0]} to {ends[1]})"
 
 
 def of_divergence(found: Verdict) -> Verdict:
