@@ -205,6 +205,12 @@ def of_score(
     )
 
 
+def of_slow() -> Verdict:
+    """Say that motion is too slow, beside its noise, for a score."""
+    said = "Too slow to be judged: all is below ten times its noise."
+    return Verdict(Mark.DOUBTFUL, said, next="Score faster motion, or take more noise out (a wider --window).")
+
+
 def of_worst(found: Verdict, shares: Mapping[str, float]) -> Verdict:
     """Add to a score which recordings by themselves are explained poorly, by name, and far worse than is usual."""
     far = min(FAIR, float(np.median([*shares.values()] or [GOOD])) - (GOOD - FAIR))
