@@ -123,30 +123,22 @@ def _aim(to: str | tuple[float, ...]) -> tuple[Any, Literal["shown"] | None]:
     return None if isinstance(to, str) else to, "shown" if to == "cycle" else None
 
 
-def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None, to: str | tuple[float, ...] | None) -> uc.Policy:
-    """Fit here, or on the cluster of a scheduler; first see whether there is anything to guide it to.
-
-    The model "auto", of features by estimated error, gives way to the default where that explains more held out.
-    """
+def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None, to: Any) -> uc.Policy:
+    """Fit here or on a cluster, if there is a goal; of "auto" and the default take what explains more held out."""
     if to is not None:
         with of_option("--guided"):
             uc.Guided.goes_round(stream.beginning(), *_aim(to))
     if scheduler is None:
         policy.fit_batches(stream)
         check_enough(stream.beginning())
-        return _better(policy, lambda one: one.fit_batches(stream))
-    uc.cluster.check_learner(policy.learner)  # before anybody is waited for
-    if stream.leave_out - {stem(path) for path in stream.paths}:  # workers know their own files only
-        uc.readers.check_left_out(sorted(stream.leave_out), [one.name for one in recordings_of(stream)])
-    with uc.cluster.connected(scheduler) as client:
-        uc.cluster.fit_batches(policy, stream.parts(), client=client)
-        return _better(policy, lambda one: uc.cluster.fit_batches(one, stream.parts(), client=client))
-
-
-def _better(policy: uc.Policy, fit: Callable[[uc.Policy], Any]) -> uc.Policy:
-    """Of the model "auto" and the default, fitted as it was, what explains more where held out; others as they are."""
+    else:
+        uc.cluster.check_learner(policy.learner)  # before anybody is waited for
+        if stream.leave_out - {stem(path) for path in stream.paths}:  # workers know their own files only
+            uc.readers.check_left_out(sorted(stream.leave_out), [one.name for one in recordings_of(stream)])
+        with uc.cluster.connected(scheduler) as client:
+            uc.cluster.fit_batches(policy, stream.parts(), client=client)
     if getattr(policy, "features", None) != "auto":
         return policy
-    settings = {name: getattr(policy, name) for name in ("learner", "validation", "scale")}
-    fit(usual := uc.LocallyLinearPolicy(**settings))
+    same = {name: getattr(policy, name) for name in ("learner", "validation", "scale")}
+    usual = learn(uc.LocallyLinearPolicy(**same), stream, scheduler, None)
     return usual if usual.held_out_score() > policy.held_out_score() else policy

@@ -61,7 +61,7 @@ def score(
     known, under = learnt_from(learnt, notes, recordings), None if held is None else 1.0 - whole["ncpe"]
     seen = None if known is None else len(known)
     judged = verdicts.of_score(whole["explains"], len(demonstrations), under, seen, notes.get(TOLD))
-    judged = judged if whole["fast"] >= LEAST else verdicts.of_slow()
+    judged = judged if whole["fast"] >= LEAST else verdicts.TOO_SLOW
     judged = verdicts.of_worst(judged, {one["demonstration"]: one["explains"] for one in rows if one["fast"] >= LEAST})
     judged = judged if held is not None else verdicts.of_planes(judged, planes)
     with shown("running it from the same starts"):

@@ -162,16 +162,15 @@ def along_motion(policy: PolicyLike, demonstrations: Demonstrations, usual: floa
 
 
 def with_noise(demonstrations: Sequence[Demonstration], recipe: Recipe) -> list[Demonstration]:
-    """Demonstrations with the noise of velocities that a recipe's filter took of positions; others as they are.
-
-    It is smooth in time, so that differences of velocities miss it: that of positions, by their fourth differences or
-    of their rounding where that is more, times the filter's gain.
-    """
+    """With the noise of positions, times the gain, where a recipe's filter makes it smooth, which differences miss."""
     if recipe.actions or recipe.differentiate not in ("savgol", "central"):
         return [*demonstrations]
     paths = [one.space.unrolled(one.states) for one in demonstrations]
-    rounding = [_rounding(column) for column in np.vstack(paths).T]
-    white = [np.sqrt(np.maximum([_by_differences(column[:, None]) for column in path.T], rounding)) for path in paths]
+    rounding, one_group = [_rounding(column) for column in np.vstack(paths).T], np.zeros(max(map(len, paths)), np.intp)
+    noise = [
+        [robust.noise_by_differences(column[:, None], one_group[: len(column)]) for column in path.T] for path in paths
+    ]
+    white = np.sqrt(np.maximum(noise, rounding))
     return [replace(one, noise=_gain(one, recipe) * own) for one, own in zip(demonstrations, white, strict=True)]
 
 
@@ -329,11 +328,7 @@ def _noise(demo: Demonstration) -> float:
     """Variance of the noise on each action coordinate: as known, or by differences; zero where these are too few."""
     if demo.noise is not None:
         return float(np.mean(demo.noise**2))
-    return _by_differences(demo.actions)
-
-
-def _by_differences(rows: Array) -> float:
-    found = robust.noise_by_differences(rows, np.zeros(len(rows), dtype=np.intp))
+    found = robust.noise_by_differences(demo.actions, np.zeros(len(demo), dtype=np.intp))
     return found if np.isfinite(found) else 0.0
 
 

@@ -99,6 +99,11 @@ class Verdict(NamedTuple):
         return said
 
 
+TOO_SLOW = Verdict(
+    Mark.DOUBTFUL, "Too slow to be judged: all is below ten times its noise.", next="Score faster motion."
+)
+
+
 def _graded(share: float, good: float = GOOD, fair: float = FAIR, told: float | None = None) -> tuple[Mark, str]:
     if share >= good and told is not None and told < PARTLY:
         return Mark.DOUBTFUL, "good along the motion, but across it recordings tell too little"
@@ -203,12 +208,6 @@ def of_score(
         if mark is Mark.GOOD
         else "'unconstrain diagnose' says what to record.",
     )
-
-
-def of_slow() -> Verdict:
-    """Say that motion is too slow, beside its noise, for a score."""
-    said = "Too slow to be judged: all is below ten times its noise."
-    return Verdict(Mark.DOUBTFUL, said, next="Score faster motion, or take more noise out (a wider --window).")
 
 
 def of_worst(found: Verdict, shares: Mapping[str, float]) -> Verdict:
