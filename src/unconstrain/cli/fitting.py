@@ -16,8 +16,7 @@ from ..base.files import stem
 from .printing import of_option
 from .reading import check_enough, numbers, of_words, recordings_of, with_options
 
-CENTRES, CLEARLY = 25, 1.1
-"""Kernels; and of motion missed where held out, how many times what another model misses is more than chance."""
+CENTRES = 25
 
 MODELS: dict[str, Callable[..., uc.Policy]] = {
     "local": lambda **chosen: uc.LocallyLinearPolicy(**chosen),
@@ -142,5 +141,4 @@ def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None, to: Any) 
         return policy
     same = {name: getattr(policy, name) for name in ("learner", "validation", "scale")}
     usual = learn(uc.LocallyLinearPolicy(**same), stream, scheduler, None)
-    misses, less = (1.0 - one.held_out_score() for one in (policy, usual))
-    return usual if misses > CLEARLY * less + 1e-6 else policy
+    return usual if usual.held_out_score() > policy.held_out_score() + 1e-6 else policy  # more than by rounding
