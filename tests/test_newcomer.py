@@ -254,6 +254,82 @@ def test_a_stroke_that_hardly_moves_has_no_score_and_spoils_no_mean(folder, poli
     assert "hardly moved" not in text(shown)
 
 
+def test_a_stroke_of_too_few_samples_has_no_score_and_stops_no_other(folder, policy, tmp_path):
+    moving, rows = folder / "unseen" / "w7.csv", stroke(6)
+    rows[:, 1:] = rows[0, 1:] + 0.1 * (rows[:, 1:] - rows[0, 1:])
+    slow = write(tmp_path / "slow.csv", HEAD, rows)
+    states = ("X [mm]", "Y [mm]")
+    [demo] = uc.prepare(uc.read([slow]), uc.Recipe(states=states, differentiate="savgol"))
+    *_, second, fastest = np.sort(np.linalg.norm(demo.actions, axis=1))
+    still = ("--still", (second + fastest) / 2)
+    shown = call("score", policy, moving, slow, *still)
+    assert re.search(r"^slow +too short: no score *$", shown.out, re.MULTILINE)
+    both, one = (json.loads(run("score", policy, *of, *still, "--json")) for of in ((moving, slow), (moving,)))
+    assert (both["too_short"], one["too_short"]) == (["slow"], [])
+    assert both["rows"] == one["rows"]
+    assert "no demonstration has 5 samples or more" in refused("score", policy, slow, *still)
+
+
+def test_motion_at_one_pace_is_scored_though_nothing_normalises_its_inconsistency(tmp_path):
+    rows = [[k / 10, k / 10, 0, 1, 0] for k in range(20)]
+    line = write(tmp_path / "line.csv", "t,x,y,vx,vy", rows)
+    run("fit", line, "--action", "vx,vy", *LINEAR, "-o", tmp_path / "p.npz")
+    [row] = json.loads(run("score", tmp_path / "p.npz", line, "--json"))["rows"]
+    assert row["ninc"] is None
+    assert row["explains"] == pytest.approx(1.0)
+
+
+def test_samples_slower_than_the_noise_of_their_positions_spoil_no_score(folder, policy, tmp_path):
+    rows = stroke(8, 160)  # which comes to rest
+    exact = write(tmp_path / "exact.csv", HEAD, rows)
+    rows[:, 1:] = rows[:, 1:].round()
+    whole = write(tmp_path / "whole.csv", HEAD, rows)
+    (true, _), (found, verdict) = (
+        (told["rows"][0], told["verdict"])
+        for told in (json.loads(run("score", policy, one, "--json")) for one in (exact, whole))
+    )
+    assert (true["fast"], true["samples"]) == (160, 160)
+    assert 5 <= found["fast"] < 80
+    assert found["explains"] == pytest.approx(true["explains"], abs=0.05)
+    assert verdict["mark"] == "good"
+    assert f" {found['fast']} of 160 " in call("score", policy, whole).out
+    rows[:, 1:] = rows[::-1, 1:] * [1.0, -1.0]  # another way
+    other = write(tmp_path / "other.csv", HEAD, rows)
+    assert json.loads(run("score", policy, other, "--json"))["rows"][0]["explains"] < 0
+
+
+def test_what_is_slow_beside_its_noise_throughout_is_not_judged_alone(folder, policy, tmp_path):
+    moving, rows = folder / "unseen" / "w6.csv", stroke(7)
+    rows[:, 1:] += 3.0 * np.random.default_rng(0).standard_normal((40, 2))
+    noisy = write(tmp_path / "noisy.csv", HEAD, rows)
+    shown = call("score", policy, moving, noisy)
+    assert re.search(r"^noisy +\d of 40 +slow: cannot be judged ", shown.out, re.MULTILINE)
+    assert "'noisy' alone" not in text(shown)
+    alone = json.loads(run("score", policy, noisy, "--json"))["verdict"]
+    assert alone["mark"] == "doubtful"
+    assert alone["said"].startswith("Too slow to be judged: all is below ten times its noise.")
+
+
+@pytest.mark.parametrize(("explained", "kind"), [(1.0, "LocallyLinearPolicy"), (-1.0, "ParametricPolicy")])
+def test_auto_takes_the_default_model_where_that_explains_more_held_out(folder, tmp_path, monkeypatch, explained, kind):
+    monkeypatch.setattr(uc.LocallyLinearPolicy, "held_out_score", lambda _: explained)
+    run("fit", folder / "w1.csv", folder / "w2.csv", folder / "w3.csv", "--model", "auto", "-o", tmp_path / "p.npz")
+    assert json.loads(run("info", tmp_path / "p.npz", "--json"))["holds"] == kind
+
+
+def test_fit_prints_the_shares_that_its_json_holds(folder, tmp_path):
+    how = ("fit", folder / "w1.csv", folder / "w2.csv", folder / "w3.csv", *LINEAR, "-o", tmp_path / "p.npz", "--force")
+    found = json.loads(run(*how, "--json"))
+    said = f"explained, where slow samples count less, as in the verdict: {found['training']:.4g} on the training data"
+    assert f"{said}, {found['held_out']:.4g} where held out." in text(call(*how))
+
+
+def test_what_turns_the_other_way_has_no_negative_pace():
+    told = uc.evaluation.verdicts.size_and_pace(np.ones(3), np.array([-0.33, -0.5, 0.8]))
+    assert "pace 0.33 times the other way (0.50 the other way to 0.80) the demonstrated" in told
+    assert "the other way" not in uc.evaluation.verdicts.size_and_pace(np.ones(2), np.array([0.33, 0.5]))
+
+
 def test_a_score_says_that_motion_along_the_recorded_actions_alone_is_judged_but_where_a_constraint_is_given(
     folder, policy
 ):

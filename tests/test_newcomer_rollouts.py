@@ -315,6 +315,12 @@ def test_one_swing_may_be_a_habit_and_then_the_directions_learnt_are_followed(do
     assert "Learn it from several" not in door[1]
     assert "rollout --constraint follows the directions that were learnt" in said
     assert "held by" not in uc.storage.load_notes(tmp_path / "c.npz")
+    start = ("rollout", place / "p.npz", "--start", ",".join(map(str, swing(0)[0, 1:])), "--steps", 3)
+    for ran in (start, ("score", place / "p.npz", place / "1.csv")):
+        told = " ".join(call(*ran, "--constraint", tmp_path / "c.npz").err.split())
+        assert told.count("c.npz: Whether anything was held cannot be told") == 1
+        assert "Do not trust: That 1 of 3 are held." in told
+        assert "Whether anything was held" not in call(*ran, "--constraint", place / "c.npz").err
 
 
 @pytest.mark.parametrize(("by", "said"), [(0.3, False), (30.0, True)])

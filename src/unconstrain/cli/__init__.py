@@ -266,7 +266,7 @@ def fit(
     with shown("reading, placing, learning") as progress:
         stream = stream_of(paths, speed_power, progress, **reading)
         with of_files(recordings_of(stream)):
-            learn(fitted, stream, scheduler, to)
+            fitted = learn(fitted, stream, scheduler, to)
             moving = guided(fitted, to, stream)
             judged = judge_fit(moving, stream, told := uc.evaluation.diagnosis.states_told(fitted), scheduler)
     if not as_json:

@@ -15,7 +15,7 @@ import unconstrain as uc
 from ..base.display import bare, listed
 from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
-from .informing import HELD_BY, OF, SHOWN, WHERE, WOUND, provenance
+from .informing import HELD_BY, OF, SHOWN, WHERE, WOUND, provenance, verdict_of
 from .printing import of_option, option_for_json, print_table, refuse_warnings, say_verdict, say_written
 from .progress import shown
 from .reading import loaded, numbers, of_words, options_for_reading, prepared, said_recipe, with_options
@@ -229,6 +229,8 @@ def held_of(
         raise SettingError(f"{path}: is of {_said_states(own)}, expected {_said_states(recipe)}, as the policy.")
     if said := said_elsewhere(notes, at):
         click.echo(f"Note: {path}: {said}", err=True)
+    if (judged := verdict_of(learnt, notes)).mark is not uc.evaluation.verdicts.Mark.GOOD:
+        click.echo(f"Note: {path}: {judged.said} {f'Do not trust: {judged.doubt}' * bool(judged.doubt)}", err=True)
     return learnt if learnt.task or HELD_BY not in notes else uc.constraints.mechanisms.restored(notes[HELD_BY])
 
 

@@ -47,7 +47,9 @@ def _levelled(_: click.Context, __: click.Parameter, scale: Any) -> Any:
 LEVELS: dict[str, Any] = {"type": scale_of, "default": "none", "metavar": "AUTO|NONE|A,B,...", "callback": _levelled}
 
 options_for_model = with_options(
-    of_words("--model", " ".join(MODELS), "Model of the policy; auto takes the one of least estimated error.", "local"),
+    of_words(
+        "--model", " ".join(MODELS), "Model of the policy; auto takes what explains most where held out.", "local"
+    ),
     click.option(
         "--variance",
         type=float,
@@ -121,17 +123,22 @@ def _aim(to: str | tuple[float, ...]) -> tuple[Any, Literal["shown"] | None]:
     return None if isinstance(to, str) else to, "shown" if to == "cycle" else None
 
 
-def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None, to: str | tuple[float, ...] | None) -> None:
-    """Fit here, or on the cluster of a scheduler; first see whether there is anything to guide it to."""
+def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None, to: Any) -> uc.Policy:
+    """Fit here or on a cluster, if there is a goal; of "auto" and the default take what explains more held out."""
     if to is not None:
         with of_option("--guided"):
             uc.Guided.goes_round(stream.beginning(), *_aim(to))
     if scheduler is None:
         policy.fit_batches(stream)
         check_enough(stream.beginning())
-        return
-    uc.cluster.check_learner(policy.learner)  # before anybody is waited for
-    if stream.leave_out - {stem(path) for path in stream.paths}:  # workers know their own files only
-        uc.readers.check_left_out(sorted(stream.leave_out), [one.name for one in recordings_of(stream)])
-    with uc.cluster.connected(scheduler) as client:
-        uc.cluster.fit_batches(policy, stream.parts(), client=client)
+    else:
+        uc.cluster.check_learner(policy.learner)  # before anybody is waited for
+        if stream.leave_out - {stem(path) for path in stream.paths}:  # workers know their own files only
+            uc.readers.check_left_out(sorted(stream.leave_out), [one.name for one in recordings_of(stream)])
+        with uc.cluster.connected(scheduler) as client:
+            uc.cluster.fit_batches(policy, stream.parts(), client=client)
+    if getattr(policy, "features", None) != "auto":
+        return policy
+    same = {name: getattr(policy, name) for name in ("learner", "validation", "scale")}
+    usual = learn(uc.LocallyLinearPolicy(**same), stream, scheduler, None)
+    return usual if usual.held_out_score() > policy.held_out_score() + 1e-6 else policy  # more than by rounding

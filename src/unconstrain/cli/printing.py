@@ -37,8 +37,8 @@ SPOILING = {*OTHER_UNITS, "missing", "refused", "same-recording"}
 """Codes of recordings that spoil what is learnt with others, or end it."""
 
 MEANINGS = {
-    "explains": "share of the motion that the policy explains; go by this, as the verdict does: slow samples, whose "
-    "direction is mostly noise, count less",
+    "explains": "weighted share of the squared motion, along the recorded directions, that the policy explains; go by "
+    "this, as the verdict does: slow samples count less, and below ten times their noise, where known, not at all",
     "normalised inconsistency": "the paper's squared error along the motion, over the variance of the actions; slow "
     "samples count as much as fast ones, so it may look worse; 0 is perfect",
     "nUPE": "squared error of the whole policy, over the variance of the actions; 0 is perfect",
@@ -258,13 +258,9 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
     elif learner != "direct":
         _say_determined(solution, learner)
     click.echo(
-        "share of the motion left unexplained, where slow samples count less, as in the verdict: "
-        + (f"{1.0 - judged.training:.4g} on the training data, " if known else "")
-        + (
-            f"{1.0 - judged.held_out:.4g} where held out."
-            if isfinite(judged.held_out)
-            else "nothing could be held out."
-        )
+        "share of the motion explained, where slow samples count less, as in the verdict: "
+        + (f"{judged.training:.4g} on the training data, " if known else "")
+        + (f"{judged.held_out:.4g} where held out." if isfinite(judged.held_out) else "nothing could be held out.")
     )
     for note in solution.notes:
         click.echo(note)

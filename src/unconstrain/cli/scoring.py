@@ -12,12 +12,15 @@ import click
 import unconstrain as uc
 
 from ..base.display import innermost, listed, percent
-from ..base.errors import SettingError
+from ..base.errors import InvalidDataError, SettingError
 from .constraining import held_of, options_for_held
 from .informing import TOLD, learnt_from
-from .printing import explained, option_for_json, print_table, refuse_warnings, say_verdict
+from .printing import explained, number, option_for_json, print_table, refuse_warnings, say_verdict
 from .progress import shown
 from .reading import fitted_policy, options_for_reading, prepared
+
+LEAST, SLOW = 5, 10.0
+"""Samples that it takes to tell noise, and standard deviations of it below which a direction cannot be judged."""
 
 
 @click.command(epilog="\b\nExample:\n  unconstrain score wipe.npz other.csv --plane 0,0.3,1 --json")
@@ -36,7 +39,7 @@ def score(
     """Score how well POLICY explains recordings.
 
     The demonstrations in each FILE are read and prepared as the training data of the policy was, but for what options
-    say.
+    say. What it explains is a weighted share of the squared motion, along the recorded directions alone.
     """
     from ..pages.fit import replayed
 
@@ -50,14 +53,16 @@ def score(
     if 2 * (support_of(learnt, states) < uc.models.SUPPORTED).sum() > len(states):
         click.echo(f"Note: {policy}: learnt far from most of these states: are they of another task?", err=True)
     with shown("scoring"):
-        demonstrations, still = _moved(moving, demonstrations)
+        short = [one.name for one in demonstrations if len(one) < LEAST]
+        demonstrations, still = _moved(moving, _with_noise(demonstrations, recipe))
         rows = [_scores(moving, held, [demo], demo.name) for demo in demonstrations]
         whole = _scores(moving, held, demonstrations, "all")
         planes = uc.evaluation.metrics.explained_in_planes(moving, demonstrations)
     known, under = learnt_from(learnt, notes, recordings), None if held is None else 1.0 - whole["ncpe"]
     seen = None if known is None else len(known)
     judged = verdicts.of_score(whole["explains"], len(demonstrations), under, seen, notes.get(TOLD))
-    judged = verdicts.of_worst(judged, {row["demonstration"]: row["explains"] for row in rows})
+    judged = judged if whole["fast"] >= LEAST else verdicts.TOO_SLOW
+    judged = verdicts.of_worst(judged, {one["demonstration"]: one["explains"] for one in rows if one["fast"] >= LEAST})
     judged = judged if held is not None else verdicts.of_planes(judged, planes, _motion(demonstrations))
     with shown("running it from the same starts"):
         found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units)
@@ -65,20 +70,31 @@ def score(
     if as_json:
         told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known, "hardly_moved": still}
         more = {"in_planes": _known(planes), "replayed": found.medians, "verdict": verdict.to_json()}
-        click.echo(json.dumps(told | more, indent=2))
+        click.echo(json.dumps(told | {"too_short": short} | more, indent=2))
         return
     say_verdict(verdict)
-    _print_scores(rows, whole, still)
+    _print_scores(rows, whole, {"hardly moved": still, "too short": short})
 
 
-def _print_scores(rows: Sequence[dict[str, Any]], whole: dict[str, Any], still: Sequence[str]) -> None:
-    """Scores of each demonstration and of all, and those that hardly moved."""
-    head = ["demonstration", "samples", "explains", "normalised inconsistency", "nPOE", "nCPE"][: len(whole)]
-    each = [
-        [name, str(size), percent(share) if share >= -1 else "worse than standing still", *map("{:.4g}".format, rest)]
-        for name, size, share, *rest in (one.values() for one in (*rows, whole))
-    ]
-    print_table(head, [*each[:-1], *([name, "", "hardly moved: no score"] for name in still), each[-1]])
+def _print_scores(rows: Sequence[dict[str, Any]], whole: dict[str, Any], left: dict[str, list[str]]) -> None:
+    """Scores of each demonstration and of all, and why others have none."""
+    head = ["demonstration", "samples", "explains", "normalised inconsistency", "nPOE", "nCPE"][: len(whole) - 1]
+    each = [_row(*one.values()) for one in (*rows, whole)]
+    none = [[name, "", f"{why}: no score"] for why, names in left.items() for name in names]
+    print_table(head, [*each[:-1], *none, each[-1]])
+
+
+def _row(name: str, size: int, fast: int, share: float, *rest: float | None) -> list[str]:
+    said = percent(share) if share >= -1 else "worse than standing still"
+    said = said if fast >= LEAST else "slow: cannot be judged"
+    return [name, f"{fast} of {size}" if fast < size else str(size), said, *(number(one, "{:.4g}") for one in rest)]
+
+
+def _with_noise(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe) -> list[uc.Demonstration]:
+    """Those that are long enough, with the noise of their actions."""
+    if not (enough := [one for one in demonstrations if len(one) >= LEAST]):
+        raise InvalidDataError(f"no demonstration has {LEAST} samples or more: nothing to score. Trim less of them.")
+    return uc.evaluation.metrics.with_noise(enough, recipe)
 
 
 def _moved(moving: Any, demonstrations: list[uc.Demonstration]) -> tuple[list[uc.Demonstration], list[str]]:
@@ -93,8 +109,14 @@ def _moved(moving: Any, demonstrations: list[uc.Demonstration]) -> tuple[list[uc
 
 
 def _scores(moving: Any, held: Any, of: Sequence[uc.Demonstration], name: str) -> dict[str, Any]:
-    found = {"demonstration": name, "samples": sum(map(len, of)), "explains": explained(moving, of)}
-    found["ninc"] = uc.ninconsistency(moving, of)
+    slow = [0.0 if one.noise is None else SLOW**2 * (one.noise**2).mean() for one in of]
+    kept = [(one.actions**2).sum(axis=1) >= least for one, least in zip(of, slow, strict=True)]
+    fast = [one[rows] for one, rows in zip(of, kept, strict=True) if rows.any()]
+    count = sum(map(len, fast))
+    found = {"demonstration": name, "samples": sum(map(len, of)), "fast": count}
+    found |= {"explains": explained(moving, fast if count >= LEAST else of), "ninc": None}
+    with suppress(InvalidDataError):  # constant actions have no variance to normalise by
+        found["ninc"] = uc.ninconsistency(moving, of)
     return found if held is None else found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(moving, of, held)}
 
 

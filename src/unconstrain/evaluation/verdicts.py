@@ -99,6 +99,11 @@ class Verdict(NamedTuple):
         return said
 
 
+TOO_SLOW = Verdict(
+    Mark.DOUBTFUL, "Too slow to be judged: all is below ten times its noise.", next="Score faster motion."
+)
+
+
 def _graded(share: float, good: float = GOOD, fair: float = FAIR, told: float | None = None) -> tuple[Mark, str]:
     if share >= good and told is not None and told < PARTLY:
         return Mark.DOUBTFUL, "good along the motion, but across it recordings tell too little"
@@ -208,7 +213,7 @@ def of_score(
 
 def of_worst(found: Verdict, shares: Mapping[str, float]) -> Verdict:
     """Add to a score which recordings by themselves are explained poorly, by name, and far worse than is usual."""
-    far = min(FAIR, float(np.median([*shares.values()])) - (GOOD - FAIR))
+    far = min(FAIR, float(np.median([*shares.values()] or [GOOD])) - (GOOD - FAIR))
     poor = sorted((share, f"'{name}'") for name, share in shares.items() if share < far)
     if not poor:
         return found
@@ -447,8 +452,10 @@ def _measured(*given: Sequence[float] | Array) -> dict[str, Array]:
 
 def _times(ratios: Array) -> str:
     """The middle one, and the range of several that differ."""
-    least, middle, most = (f"{value:.2f}" for value in (ratios.min(), np.median(ratios), ratios.max()))
-    return f"{middle} times" if least == most else f"{middle} times ({least} to {most})"
+    every = (float(one) for one in (ratios.min(), np.median(ratios), ratios.max()))
+    least, middle, most = (f"{abs(one):.2f}{{}}{' the other way' if one < 0 else ''}" for one in every)
+    middle, ends = middle.format(" times"), [least.format(""), most.format("")]
+    return middle if ends[0] == ends[1] else f"{middle} ({ends[0]} to {ends[1]})"
 
 
 def of_divergence(found: Verdict) -> Verdict:
