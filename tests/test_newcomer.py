@@ -290,7 +290,7 @@ def test_samples_slower_than_the_noise_of_their_positions_spoil_no_score(folder,
     )
     assert (true["fast"], true["samples"]) == (160, 160)
     assert 5 <= found["fast"] < 80
-    assert found["explains"] == pytest.approx(true["explains"], abs=0.05)
+    assert found["explains"] == pytest.approx(true["explains"], abs=0.1)
     assert verdict["mark"] == "good"
     assert f" {found['fast']} of 160 " in call("score", policy, whole).out
     rows[:, 1:] = rows[::-1, 1:] * [1.0, -1.0]  # another way

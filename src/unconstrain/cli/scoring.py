@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import click
@@ -19,8 +20,9 @@ from .printing import explained, number, option_for_json, print_table, refuse_wa
 from .progress import shown
 from .reading import fitted_policy, options_for_reading, prepared
 
-LEAST, SLOW = 5, 10.0
-"""Samples that it takes to tell noise, and standard deviations of it below which a direction cannot be judged."""
+LEAST, SLOW, ENOUGH = 5, 10.0, 5.0
+"""Samples that it takes to tell noise, and standard deviations of it below which a direction cannot be judged: of half
+a usual action so many are enough."""
 
 
 @click.command(epilog="\b\nExample:\n  unconstrain score wipe.npz other.csv --plane 0,0.3,1 --json")
@@ -91,10 +93,17 @@ def _row(name: str, size: int, fast: int, share: float, *rest: float | None) -> 
 
 
 def _with_noise(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe) -> list[uc.Demonstration]:
-    """Those that are long enough, with the noise of their actions."""
+    """Those that are long enough, with the noise of their actions, of which :data:`ENOUGH` may reach half a usual one."""
     if not (enough := [one for one in demonstrations if len(one) >= LEAST]):
         raise InvalidDataError(f"no demonstration has {LEAST} samples or more: nothing to score. Trim less of them.")
-    return uc.evaluation.metrics.with_noise(enough, recipe)
+    found, usual = uc.evaluation.metrics.with_noise(enough, recipe), (uc.stack(enough).actions ** 2).sum(axis=1).mean()
+    half = 0.5 * usual**0.5
+    return [one if one.noise is None else replace(one, noise=_judged(one.noise, half)) for one in found]
+
+
+def _judged(noise: Any, half: float) -> Any:
+    """Noise, of which :data:`SLOW` times are half a usual action at most, but for what is more than that itself."""
+    return noise.clip(max=max(half / SLOW, float((noise**2).mean() ** 0.5) * ENOUGH / SLOW))
 
 
 def _moved(moving: Any, demonstrations: list[uc.Demonstration]) -> tuple[list[uc.Demonstration], list[str]]:
