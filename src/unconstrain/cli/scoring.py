@@ -93,7 +93,7 @@ def _row(name: str, size: int, fast: int, share: float, *rest: float | None) -> 
 
 
 def _with_noise(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe) -> list[uc.Demonstration]:
-    """Those that are long enough, with the noise of their actions, of which :data:`ENOUGH` may reach half a usual one."""
+    """Those that are long enough, with the noise of their actions, :data:`ENOUGH` of which may be half a usual one."""
     if not (enough := [one for one in demonstrations if len(one) >= LEAST]):
         raise InvalidDataError(f"no demonstration has {LEAST} samples or more: nothing to score. Trim less of them.")
     found, usual = uc.evaluation.metrics.with_noise(enough, recipe), (uc.stack(enough).actions ** 2).sum(axis=1).mean()
