@@ -324,7 +324,7 @@ def test_fit_says_what_it_did(files, tmp_path):
         "8 demonstrations, 320 samples.",
         "The inconsistency determined 100% of 6 weight directions.",
     ]
-    assert re.fullmatch(r"share of the motion explained, .*: 1 on the training data, 1 where held out\.", lines[3])
+    assert re.fullmatch(r"Share of the motion explained, .*: 1 on the training data, 1 where held out\.", lines[3])
     assert lines[4] == f"policy: {tmp_path / 'p.npz'}"
 
 

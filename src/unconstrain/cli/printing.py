@@ -258,7 +258,7 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
     elif learner != "direct":
         _say_determined(solution, learner)
     click.echo(
-        "share of the motion explained, where slow samples count less, as in the verdict: "
+        "Share of the motion explained, where slow samples count less, as in the verdict: "
         + (f"{judged.training:.4g} on the training data, " if known else "")
         + (f"{judged.held_out:.4g} where held out." if isfinite(judged.held_out) else "nothing could be held out.")
     )
