@@ -13,7 +13,7 @@ import naive
 import unconstrain as uc
 from samples import draw, rotation, samples_of
 from unconstrain.learners.hybrid import SOFTNESSES, chosen_softness
-from unconstrain.learners.robust.choice import Comparison, leverage
+from unconstrain.learners.robust.choice import Comparison
 from unconstrain.learners.robust.consistent import _nearest
 from unconstrain.learners.robust.constants import ANGULAR_SPREADS
 from unconstrain.learners.robust.likelihood import exceeds_error
@@ -360,18 +360,6 @@ def test_noise_makes_actions_longer_and_no_policy_that_is_too_long_the_best(nois
     others = [replace(right, name=str(times), held_out=times * policy) for times in (0.9, 1.05)]
     found = Comparison([right, *others], np.full(count, noise**2), samples).judged()
     assert found["direct"].loss < min(found["0.9"].loss, found["1.05"].loss)
-
-
-def test_models_of_several_widths_are_judged_where_the_best_told_of_them_is_told():
-    data = draw()
-    views = [
-        uc.LocallyLinearPolicy(variance, learner=uc.Robust()).fit(*data[:2], groups=data.groups).training_.samples
-        for variance in (0.5, 0.05)
-    ]
-    first = [replace(softened(view)[0], name=name) for view, name in zip(views, ("wide", "narrow"), strict=True)]
-    each = [leverage(view) for view in views]
-    assert (each[1] > 2.0 * each[0]).any()
-    assert_allclose(Comparison(first, np.zeros(len(data.groups)), views)._leverage, np.minimum(*each))
 
 
 def test_changes_of_the_constraint_are_found():

@@ -49,9 +49,7 @@ a factor of standard deviation κ. Samples are weighted by its inverse up to
 ‖π‖², so that the weight saturates at ``‖u‖ = σ / κ``, and by the inverse of
 ``1 + h`` with the leverage h of a held-out state, which is the factor of its
 variance from estimating the weights: predictions far from all other
-demonstrations say little. Where candidates are of several models, it is that of
-the model in which h is least: fields too narrow to be told by the others are
-judged by what they miss there.
+demonstrations say little.
 """
 
 from __future__ import annotations
@@ -115,7 +113,7 @@ class Comparison:
         self._held_out = np.stack([one.held_out for one in candidates])
         self._residuals = self._lengths - (self._held_out * self._directions).sum(axis=2)
         self._places = slice(None, None, -(-len(samples) // COMPARED_STATES))
-        self._leverage = np.min([leverage(one) for one in dict.fromkeys(self._views)], axis=0)
+        self._leverage = np.max([leverage(one) for one in dict.fromkeys(self._views)], axis=0)
         self._noise, self._variation = self._variances(noise)
 
     def judged(self) -> dict[str, Judged]:
