@@ -196,7 +196,7 @@ class TestCommand:
         said = run("diagnose", data, *AS_NAMED, *MOTION, "--model", "linear", "-o", page)
         for words in (
             "12 demonstrations, 360 samples",
-            "Noise: ",
+            "Noise and misfit: ",
             "Learnt as likelihood: ",
             "Estimated squared error of other ways to learn, as times that of this (more is worse): ",
             "demonstrate around (x = ",

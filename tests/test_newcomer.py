@@ -317,6 +317,21 @@ def test_auto_takes_the_default_model_where_that_explains_more_held_out(folder, 
     assert json.loads(run("info", tmp_path / "p.npz", "--json"))["holds"] == kind
 
 
+def test_the_page_of_a_fit_says_which_model_was_taken(folder, tmp_path):
+    run("fit", folder, "-o", tmp_path / "p.npz", "--report", tmp_path / "p.html")
+    assert "Affine policy" in (tmp_path / "p.html").read_text()
+    run("fit", folder, "-o", tmp_path / "q.npz", "--variance", "2e4", "--report", tmp_path / "q.html")
+    assert "Locally linear policy" in (tmp_path / "q.html").read_text()
+
+
+def test_files_of_which_nobody_said_what_is_what_are_not_to_be_left_out(tmp_path):
+    for k in range(2):
+        write(tmp_path / f"s{k}.csv", "t,a,b", stroke(k))
+    said = refused("look", tmp_path / "s0.csv", tmp_path / "s1.csv", "-o", tmp_path / "l.html")
+    assert said.endswith("with --by savgol. 'unconstrain inspect' proposes a command.")
+    assert "--leave-out" not in said
+
+
 def test_fit_prints_the_shares_that_its_json_holds(folder, tmp_path):
     how = ("fit", folder / "w1.csv", folder / "w2.csv", folder / "w3.csv", *LINEAR, "-o", tmp_path / "p.npz", "--force")
     found = json.loads(run(*how, "--json"))

@@ -271,6 +271,7 @@ def of_files(recordings: Iterable[uc.Recording]) -> Iterator[None]:
                 others = len(came) > len(files) and str(error)[named.end()] in ",:"  # all may lack what it has not
                 left_out = ",".join([*click.get_current_context().params["leave_out"], named[1]])
                 cure = f" Or leave it out: --leave-out {shlex.quote(left_out)}" if others else ""
+                cure = " 'unconstrain inspect' proposes a command." if "cannot tell states" in str(error) else cure
                 error.args = (f"{title}{str(error)[named.end() :]}{cure}", *error.args[1:])
         raise
 

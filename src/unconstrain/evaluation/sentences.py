@@ -53,8 +53,8 @@ def _about_noise(found: Diagnosis) -> str:
     verdict = "little" if found.noise_share < SMALL else "some" if found.noise_share < 3 * SMALL else "much"
     too_much = found.noise_share > robust.SPHERE_HIDDEN_BY_NOISE
     hidden = " So much noise makes the following unreliable." if too_much else ""
-    said = f"Noise: {verdict}, {found.noise:.3g} on each action coordinate, {found.noise_share:.1%} of a typical "
-    said += f"action ({found.typical:.3g}) in all.{hidden}"
+    said = f"Noise and misfit: {verdict}, {found.noise:.3g} on each action coordinate, {found.noise_share:.1%} of a "
+    said += f"typical action ({found.typical:.3g}) in all.{hidden}"
     if found.noise_share < 0.5 * SMALL or found.noise < MISFIT * found.jitter:
         return said
     return said + (

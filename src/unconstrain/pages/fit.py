@@ -97,7 +97,8 @@ def policy_page(
 
 
 def _lead(policy: Policy, learner: str, states: Sequence[str], actions: Sequence[str]) -> html.Markup:
-    kind = "Locally linear" if hasattr(policy, "fields_") else "Parametric"
+    kind = {np.inf: "Affine", "cubic": "Cubic"}.get(getattr(policy, "variance_", None), "Locally linear")
+    kind = kind if hasattr(policy, "fields_") else "Parametric"
     return html.words("fit_lead", kind=kind, learner=learner, states=", ".join(states), actions=", ".join(actions))
 
 
