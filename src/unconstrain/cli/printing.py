@@ -223,7 +223,8 @@ def _least_known(policy: uc.Policy, demonstrations: Sequence[uc.Demonstration], 
     states, _, groups = uc.stack(demos)
     row = int(np.linalg.norm(policy.uncertainty(states).undetermined, axis=1).argmax())
     place = uc.evaluation.diagnosis.named(states[row].tolist(), recipe.states or ())
-    least = f"Record more where least is known, held in other ways: near {place}, as in '{demos[groups[row]].name}'."
+    passed = f"near {place}, where '{demos[groups[row]].name}' passed"
+    least = f"Record more where least is known, held in other ways: {passed}."
     return f"{least} All such places:\n{next_command('diagnose')}"
 
 
