@@ -452,10 +452,13 @@ def _measured(*given: Sequence[float] | Array) -> dict[str, Array]:
 
 def _times(ratios: Array) -> str:
     """The middle one, and the range of several that differ."""
-    every = (float(one) for one in (ratios.min(), np.median(ratios), ratios.max()))
-    least, middle, most = (f"{abs(one):.2f}{{}}{' the other way' if one < 0 else ''}" for one in every)
-    middle, ends = middle.format(" times"), [least.format(""), most.format("")]
-    return middle if ends[0] == ends[1] else f"{middle} ({ends[0]} to {ends[1]})"
+    least, middle, most = (float(one) for one in (ratios.min(), np.median(ratios), ratios.max()))
+    ends, said = (_either_way(least), _either_way(most)), _either_way(middle, " times")
+    return said if ends[0] == ends[1] else f"{said} ({ends[0]} to {ends[1]})"
+
+
+def _either_way(ratio: float, times: str = "") -> str:
+    return f"{abs(ratio):.2f}{times}{' the other way' if ratio < 0 else ''}"
 
 
 def of_divergence(found: Verdict) -> Verdict:

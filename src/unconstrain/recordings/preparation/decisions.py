@@ -67,7 +67,7 @@ def in_radians(recipe: Recipe, recording: Recording) -> Recipe:
     """A recipe with the columns in degrees: those that it tells, or whose unit or, of angles, whose numbers say so."""
     if recipe.degrees is not None:
         told = recording.resolve(recipe.degrees)
-        return replace(recipe, degrees=tuple(one for one in told if not recording.units.get(one, "").startswith("rad")))
+        return replace(recipe, degrees=tuple(one for one in told if not _says_radians(recording, one)))
     used = _used(recipe)
     units = {name: recording.units.get(name, "") for name in used}
     shown = {name for name in used if name in recipe.angles and not units[name]}
@@ -78,6 +78,10 @@ def in_radians(recipe: Recipe, recording: Recording) -> Recipe:
 def _of_used_columns(recipe: Recipe) -> Recipe:
     """Without degrees of columns that are not used, such as actions that are states to come."""
     return replace(recipe, degrees=tuple(name for name in recipe.degrees or () if name in _used(recipe)))
+
+
+def _says_radians(recording: Recording, name: str) -> bool:
+    return recording.units.get(name, "").startswith("rad")
 
 
 def _used(recipe: Recipe) -> tuple[str, ...]:
@@ -93,7 +97,7 @@ def unused(asked: Recipe, decided: Recipe, recording: Recording) -> tuple[Remark
     angles = [name for name in moving if ANGLE.fullmatch(bare(name)) or wraps(moving[name])]
     angles = [] if decided.actions else angles  # which have no velocity then
     large = [name for name in angles if np.nanmax(np.abs(moving[name])) > TURNS[0]]
-    degrees = [*(decided.degrees or ()), *(one for one in large if not recording.units.get(one, "").startswith("rad"))]
+    degrees = [*(decided.degrees or ()), *(one for one in large if not _says_radians(recording, one))]
     cure = f"angles={(*decided.angles, *angles)}" + f" and degrees={tuple(degrees)}" * bool(degrees)
     told = f"looks like an angle, and is left out; take it in with {cure}."
     others = listed([name for name in moving if name not in angles], 8)

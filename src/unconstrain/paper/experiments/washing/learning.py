@@ -96,11 +96,11 @@ def recorded_rows(splits: Sequence[Split]) -> list[dict[str, Any]]:
     """Error of each method on each tilt held out, with each kind of normal, and the least of any candidate there."""
     rows = []
     for split in splits:
+        robust = split.policies["robust"]
+        every = [candidate_of(robust, name) for name in robust.solution_.candidates]
         for surface in split.held_out:
             for kind in surface.normals[0]:
                 found = {name: _ncpe_of_bouts(policy, surface, kind) for name, policy in split.policies.items()}
-                robust = split.policies["robust"]
-                every = [candidate_of(robust, name) for name in robust.solution_.candidates]
                 found[BEST] = min(_ncpe_of_bouts(one, surface, kind) for one in every)
                 where = {"surface": surface.name, "seen": False, "normal": kind}
                 rows += [{"method": method, **where, "ncpe": error, "nupe": None} for method, error in found.items()]
