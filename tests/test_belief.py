@@ -152,6 +152,42 @@ class TestWithoutAnyTwo:
         assert surely(np.stack([np.eye(3)] * 2), 0.0).shape == (3, 0)
 
 
+class TestPlates:
+    """Who is held in a plane all the time shows all components in it."""
+
+    TILTS = ((0.2, 0.1), (0.1, 0.45), (-0.4, 0.4), (-0.25, -0.1), (-0.1, -0.45), (0.25, -0.2))
+
+    def open_at(self, demos):
+        """Median standard deviation of what is undetermined on each demonstration, as a share of a typical action."""
+        policy = uc.LocallyLinearPolicy(learner=uc.Robust()).fit_demonstrations(demos)
+        assert policy.solution_.method == "segments"
+        typical = np.sqrt((uc.stack(demos).actions ** 2).sum(axis=1).mean())
+        spread = [np.linalg.norm(policy.uncertainty(one.states).undetermined, axis=1) for one in demos]
+        return np.array([np.median(one) for one in spread]) / typical
+
+    def demonstrated(self, place, tilts, seed=0):
+        """Strokes about a place on plates of some tilts, with little noise."""
+        rng, demos = np.random.default_rng(seed), []
+        for tilt in tilts:
+            plate = uc.constraints.Plane(np.array([*tilt, 1.0]))
+            one = uc.rollout(wanted, place + rng.uniform(-1, 1, 3), 120, 0.02, plate)
+            noisy = one.actions + 0.01 * rng.standard_normal(one.actions.shape)
+            demos.append(uc.Demonstration(one.states, noisy, one.times))
+        return demos
+
+    def test_six_plates_of_other_tilts_tell_the_policy_whichever_two_are_left_out(self):
+        assert np.median(self.open_at(self.demonstrated(np.zeros(3), self.TILTS))) < 0.05
+
+    def test_two_of_three_plates_do_not(self):
+        assert self.open_at(self.demonstrated(np.zeros(3), self.TILTS[:3])).min() > 0.3
+
+    def test_where_all_strokes_are_on_one_plate_what_points_out_of_it_stays_open(self):
+        many, far = self.demonstrated(np.zeros(3), self.TILTS), np.array([4.0, 4.0, 0.5])
+        open_ = self.open_at(many + self.demonstrated(far, self.TILTS[:1] * 3))
+        assert np.median(open_[:6]) < 0.05
+        assert open_[6:].min() > 0.3
+
+
 def swung(seed, dimensions=2):
     """Doors that are opened about one hinge, held at radii that differ a little."""
     rng, found, time = np.random.default_rng(seed), [], np.arange(200) * 0.01

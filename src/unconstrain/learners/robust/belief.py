@@ -54,7 +54,7 @@ def solution(
     policy = samples.predict(chosen.weights)
     variance, mixture = mixture_of(samples, policy)
     free = free_probability(everything, everything.predict(chosen.weights), variance, mixture)
-    evidence = shown(samples, policy, variance, free[everything.counts > 0.0])
+    evidence = shown(samples, policy, variance, free[everything.counts > 0.0], chosen.by_segments)
     priors = _Priors(samples, evidence.seen, chosen.smoothness)
     models = counted_off(range(len(chosen.weights)), "uncertainty: local model")
     away = pointing(samples)

@@ -33,6 +33,8 @@ class Candidate:
         constraints than their actions.
     spread : float, optional
         Mean variance of the predictions, where refits do not tell it; see :mod:`.agreement`.
+    by_segments : bool
+        Whether demonstrations that were held in the same way all the time show it more than samples along themselves.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Candidate:
     refits: Array
     softness: float = 0.0
     spread: float | None = None
+    by_segments: bool = False
 
 
 def scaled(posterior: Posterior, variance: Array) -> Posterior:

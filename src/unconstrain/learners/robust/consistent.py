@@ -87,7 +87,7 @@ def by_segments(samples: Samples, projections: Array) -> Candidate:
     Predictions are cross-validated by fold, except for the projections: each is from all samples of its segment.
     """
     errors = [part.constrained(projections[samples.folds == fold]) for fold, part in enumerate(samples.by_fold())]
-    found = least_error("segments", samples, errors)
+    found = replace(least_error("segments", samples, errors), by_segments=True)
     return where_agreed(found, samples, projections) or found
 
 

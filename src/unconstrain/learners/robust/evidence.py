@@ -1,7 +1,11 @@
 """What the actions show of the policy, whatever the constraints and the prior; the basis of what counts as determined.
 
 An action shows the policy along itself only. Noise adds a component along directions in which nobody ever moved; its
-expectation is subtracted. A direction that a learner may call determined must be shown by more than two
+expectation is subtracted. To a learner by segments, a demonstration that was held in one plane all the time shows all
+components in it. Along a bent rail in that plane it would look the same; but where nothing else is recorded, what
+points out of the plane stays open.
+
+A direction that a learner may call determined must be shown by more than two
 demonstrations: constraints that one or two met, or that all had in common, may have hidden anything there.
 
 That samples look free is evidence too, but free and always held in the same way look alike. It counts along those
@@ -21,7 +25,17 @@ from ...base.display import counted_off
 from ...risks import Quadratic, inconsistency
 from ...training import Samples
 from .constants import EIGENVALUE_STANDARD_ERRORS, LEAST_MISFIT, LEFT_OUT, MOST_PARTS
-from .noise import consistency_residuals, corrected, correlation_time, inefficiency, noise_by_differences
+from .noise import (
+    beyond_misfit,
+    consistency_residuals,
+    corrected,
+    correlation_time,
+    inefficiency,
+    most_noise,
+    noise_by_differences,
+    noise_of_each,
+)
+from .segments import held_throughout
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +45,8 @@ class Evidence:
     Parameters
     ----------
     consistent : list of Quadratic
-        −2 times the log-likelihood of the part's actions along themselves, less what noise adds to it.
+        −2 times the log-likelihood of the part's actions along themselves, less what noise adds to it, or along all
+        directions in which a demonstration moved that was held in the same way all the time.
     free : ndarray, shape (K, M, P, P)
         Information of its samples as far as they look free.
     seen : ndarray, shape (M, d, d)
@@ -55,7 +70,7 @@ class Evidence:
         return np.stack([one.linear - np.einsum("mij,mj->mi", one.hessian, weights) for one in self.consistent])
 
 
-def shown(samples: Samples, policy: Array, variance: float, free: Array) -> Evidence:
+def shown(samples: Samples, policy: Array, variance: float, free: Array, by_segments: bool = False) -> Evidence:
     """The evidence of all samples.
 
     Parameters
@@ -67,6 +82,8 @@ def shown(samples: Samples, policy: Array, variance: float, free: Array) -> Evid
         Of the residuals per action coordinate.
     free : ndarray, shape (N,)
         Probability that each sample was free.
+    by_segments : bool
+        Whether demonstrations that were held in the same way all the time show more than samples along themselves.
     """
     least = min(variance, noise_by_differences(samples.actions, samples.groups))
     noise = max(least, LEAST_MISFIT**2 * samples.energy)  # variance on each coordinate
@@ -74,15 +91,31 @@ def shown(samples: Samples, policy: Array, variance: float, free: Array) -> Evid
     unit, parts = _residual(samples, policy, noise, time), parts_of(samples)
     seen = _seen(samples, parts, noise, time)
     consistent, as_free, free = [], [], _of_free_demonstrations(samples, free)
+    each = beyond_misfit(noise_of_each(samples.actions, samples.groups, most_noise(samples), samples.noise), samples)
+    held, moved = held_throughout(samples.actions, samples.groups, each)
+    held &= by_segments
+    missed = _missed(samples[held], policy[held], moved[held], noise)
     for part in counted_off(range(int(parts.max()) + 1), "evidence: part"):
         rows = parts == part
-        some = samples[rows]
-        ones = np.ones(len(some))
-        weighted, plain = (some.moments(some.actions, by) for by in ((some.actions**2).sum(axis=1), ones))
-        consistent.append((1.0 / unit) * inconsistency(corrected(weighted, plain, noise)))
+        some, turned = samples[rows], np.where(held[rows], 0.0, 1.0)
+        weighted, plain = (some.moments(some.actions, turned * by) for by in ((some.actions**2).sum(axis=1), 1.0))
+        own = (1.0 / unit) * inconsistency(corrected(weighted, plain, noise))
+        throughout = samples[rows & held].constrained(moved[rows & held]) if held[rows].any() else 0.0 * own
+        consistent.append(own + (1.0 / missed) * throughout)
         as_free.append(_as_free(some, free[rows] / (max(variance, noise) * time), noise, seen))
     error = EIGENVALUE_STANDARD_ERRORS * noise * np.sqrt(2.0 * time / np.maximum(samples.sizes, 1.0)) / unit
     return Evidence(consistent, np.stack(as_free), seen, error)
+
+
+def _missed(samples: Samples, policy: Array, moved: Array, noise: float) -> Array:
+    """Variance of what a policy misses along ``moved`` (N, d, d), per coordinate, times its inefficiency, (M,)."""
+    if not len(samples):
+        return np.ones(samples.memberships.shape[1])
+    off = np.einsum("nab,nb->na", moved, samples.actions - policy)
+    coordinates = float(samples.counts @ np.einsum("naa->n", moved))
+    square = max(float(samples.counts @ np.vecdot(off, off)) / coordinates, noise)
+    time = correlation_time(off, samples.groups)
+    return np.asarray(time * noise + inefficiency(time, samples) * (square - noise))
 
 
 def _as_free(samples: Samples, precision: Array, noise: float, seen: Array) -> Array:

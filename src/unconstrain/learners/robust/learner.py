@@ -29,7 +29,7 @@ from .constants import LEAST_INFORMATIVE, LEAST_MISFIT, LONG
 from .held_out import held_out_together
 from .kinematics import Jacobian, with_jacobian
 from .likelihood import maximise
-from .noise import beyond_misfit, hides_sphere, noise_by_differences, noise_of_each
+from .noise import beyond_misfit, hides_sphere, most_noise, noise_of_each
 from .posterior import Posterior
 from .segments import found_segments, held_throughout, projections_of
 from .softened import softened
@@ -231,7 +231,7 @@ class Segments(SampleLearner):
         """The policy of least constrained error."""
         if self.labels == "groups" and samples.groups.max() == 0:
             raise SettingError("labels: 'groups' needs groups=, one name for each demonstration, at least two.")
-        most = _most_noise(samples)
+        most = most_noise(samples)
         known = float(np.sqrt(most)) if self.noise is None else self.noise
         found = self.labels == "found"
         labels = found_segments(samples.actions, samples.groups, known) if found else samples.groups
@@ -306,7 +306,7 @@ class Robust(_Maximising):
     def compared(self, samples: Samples, training: Training) -> Comparison:
         """All candidates; those that use the Jacobian if they are as consistent as the best that does not, or more."""
         _say_if_long(samples)
-        corrected, most = noise_corrected(samples), _most_noise(samples)
+        corrected, most = noise_corrected(samples), most_noise(samples)
         noise = noise_of_each(samples.actions, samples.groups, most, samples.noise)
         learnt = [*softened(samples), corrected, noise_corrected(samples, worth=1.0)]
         each = samples.actions, samples.groups, beyond_misfit(noise, samples)
@@ -385,7 +385,7 @@ def _trusted(training: Training) -> tuple[Training, NDArray[np.intp]]:
 def _compared(best: Mapping[str, Candidate], views: Mapping[str, Samples]) -> Comparison:
     """Candidates by name, each learnt from its own view of the samples."""
     each, any_ = [views[name] for name in best], next(iter(views.values()))
-    noise = noise_of_each(any_.actions, any_.groups, _most_noise(any_), any_.noise)
+    noise = noise_of_each(any_.actions, any_.groups, most_noise(any_), any_.noise)
     return Comparison(list(best.values()), np.minimum(noise, min(one.variance for one in best.values())), each)
 
 
@@ -406,14 +406,9 @@ def _say_if_long(samples: Samples) -> None:
         )
 
 
-def _most_noise(samples: Samples) -> float:
-    """Variance of the noise by differences in time over all demonstrations, at most that of the actions."""
-    return min(noise_by_differences(samples.actions, samples.groups), samples.energy)
-
-
 def _explained(samples: Samples, policy: Candidate) -> float:
     """Share of the squared motion explained along it where held out; slow samples count less."""
-    noise = noise_of_each(samples.actions, samples.groups, _most_noise(samples), samples.noise)
+    noise = noise_of_each(samples.actions, samples.groups, most_noise(samples), samples.noise)
     noise = np.minimum(noise, policy.variance)  # constraints that change at every sample look like noise
     missed, motion = along_motion(samples.actions, policy.held_out, samples.counts, noise=noise)
     return 1.0 - missed / motion

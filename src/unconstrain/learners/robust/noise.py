@@ -64,6 +64,11 @@ def noise_by_differences(actions: Array, groups: NDArray[np.intp]) -> float:
     return float(np.median(lengths) / median / (weights**2).sum())
 
 
+def most_noise(samples: Samples) -> float:
+    """Variance of the noise by differences in time over all demonstrations, at most that of the actions."""
+    return min(noise_by_differences(samples.actions, samples.groups), samples.energy)
+
+
 def noise_of_each(actions: Array, labels: NDArray[np.intp], most: float, known: Array | None = None) -> Array:
     """Noise variance of each sample, (N,): what is known, or of its segment by differences, where it is long enough.
 
