@@ -214,7 +214,7 @@ def test_a_folder_stands_for_its_own_files_and_says_what_lies_below(folder, tmp_
 def test_what_holds_of_many_recordings_is_said_once_and_counted(tmp_path):
     for k in range(4):
         write(tmp_path / f"w{k}.csv", HEAD, stroke(k, jitter=0.2))
-    ran = call("fit", tmp_path, *LINEAR, "-o", tmp_path.parent / "p.npz")
+    ran = call("fit", tmp_path, *LINEAR, "-o", tmp_path.parent / "jittery.npz")
     first, others = [line for line in ran.err.splitlines() if "irregular" in line]
     assert first.startswith(
         "Note: irregular: 'w0': time stamps are irregular, so it is resampled to its median rate of"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import shlex
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -18,7 +17,16 @@ import click
 import unconstrain as uc
 
 from ..base.display import bare, counted, innermost
-from ..base.errors import NOTHING_LEFT, InvalidDataError, ModelFileError, ReadError, SettingError, UnconstrainError
+from ..base.errors import (
+    NOTHING_LEFT,
+    InvalidDataError,
+    LackingError,
+    ModelFileError,
+    ReadError,
+    SettingError,
+    UnconstrainError,
+    UntoldError,
+)
 from ..base.files import stem
 from .progress import Progress
 
@@ -261,18 +269,17 @@ def of_files(recordings: Iterable[uc.Recording]) -> Iterator[None]:
     try:
         yield
     except (InvalidDataError, SettingError) as error:
-        named = re.match(r"'(.+?)'(?=,|:| has )", str(error))
         with suppress(UnconstrainError):
             came = {(one.name, one.file): None for one in recordings}
-            files = {file: None for name, file in came if named and name == named[1] and file}
-            if named and files:
-                own = any(stem(file) == named[1] for file in files)
-                title = " or ".join(files) if own else f"{named[0]} of {' or '.join(files)}"
-                others = len(came) > len(files) and str(error)[named.end()] in ",:"  # all may lack what it has not
-                left_out = ",".join([*click.get_current_context().params["leave_out"], named[1]])
-                cure = f" Or leave it out: --leave-out {shlex.quote(left_out)}" if others else ""
-                cure = " 'unconstrain inspect' proposes a command." if "cannot tell states" in str(error) else cure
-                error.args = (f"{title}{str(error)[named.end() :]}{cure}", *error.args[1:])
+            named = max((name for name, _ in came if str(error).startswith(f"'{name}'")), key=len, default="")
+            if named and (files := {file: None for name, file in came if name == named and file}):
+                own = any(stem(file) == named for file in files)
+                title = " or ".join(files) if own else f"'{named}' of {' or '.join(files)}"
+                left_out = ",".join([*click.get_current_context().params["leave_out"], named])
+                cure = f" Or leave it out: --leave-out {shlex.quote(left_out)}" if len(came) > len(files) else ""
+                cure = "" if isinstance(error, LackingError) else cure
+                cure = " 'unconstrain inspect' proposes a command." if isinstance(error, UntoldError) else cure
+                error.args = (f"{title}{str(error)[len(named) + 2 :]}{cure}", *error.args[1:])
         raise
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...base.arrays import Array, check_at_least
 from ...base.display import listed, speed_of, with_unit
-from ...base.errors import SettingError
+from ...base.errors import SettingError, UntoldError
 from ...models import spaces
 from ..demonstration import Recording
 from .guesses import guess_actions, guess_states, positions_in
@@ -279,7 +279,7 @@ def _with_columns(recipe: Recipe, recording: Recording) -> Recipe:
         return replace(told, states=states, actions=actions)
     if states and states == _with_turning(told, positions_in(columns)):
         return replace(told, states=states, differentiate="savgol")
-    raise SettingError(
+    raise UntoldError(
         f"'{recording.name}': cannot tell {'the actions' if states else 'states and actions'} from its columns "
         f"{listed(columns)}. Say which with states= and actions=, or take the velocity "
         "of the states with differentiate='savgol'."
