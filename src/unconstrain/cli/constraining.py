@@ -15,7 +15,7 @@ import unconstrain as uc
 from ..base.display import bare, listed
 from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
-from .informing import HELD_BY, OF, SHOWN, WHERE, WOUND, provenance, verdict_of
+from .informing import HELD_BY, NAMED, OF, SHOWN, WHERE, WOUND, provenance, verdict_of
 from .printing import of_option, option_for_json, print_table, refuse_warnings, say_verdict, say_written
 from .progress import shown
 from .reading import loaded, numbers, of_words, options_for_reading, prepared, said_recipe, with_options
@@ -32,6 +32,7 @@ LENGTHS = ("", "m", "mm", "cm", "um", "km", "in", "ft")
 
 FOLLOWED = "rollout --constraint and score --constraint hold to that mechanism, in parallel through the start."
 NOT_FOLLOWED = "That names the positions; rollout --constraint follows the directions that were learnt, as said first."
+MAY_LEAVE = "holds to the directions that were learnt, not to {}, which was named: a movement may leave that."
 
 FEATURES = ("auto", "constant", "affine", "quadratic", "rbf")
 
@@ -94,7 +95,7 @@ def constraint(
         _say(learnt, "distance from it" if surface else "action", named)
     notes = provenance(paths, recipe, first, **reading) | {WOUND: wound}
     for name, place in outputs.items():
-        uc.save(learnt[name], place, notes | _of(name, named, demonstrations))
+        uc.save(learnt[name], place, notes | _of(name, learnt[name], named, demonstrations))
     written = {f"constraint of {name}" if name else "constraint": place for name, place in outputs.items()}
     if report is not None:
         _report(report, learnt, demonstrations, recipe.labels(first.units)[0], named, verdict)
@@ -102,14 +103,16 @@ def constraint(
     say_written(written, _told(learnt, verdict, named) if as_json else None)
 
 
-def _of(name: str, named: Named | None, demonstrations: Sequence[uc.Demonstration]) -> dict[str, Any]:
+def _of(
+    name: str, learnt: uc.LearntConstraint, named: Named | None, demonstrations: Sequence[uc.Demonstration]
+) -> dict[str, Any]:
     """What a file notes of the demonstration that it is of, of where that was, and of the mechanism."""
     states = uc.stack([one for one in demonstrations if name in ("", one.name)]).states
     where = {WHERE: [states.min(axis=0).tolist(), states.max(axis=0).tolist()]}
     return (
         where
         | {OF: [name] if name else [one.name for one in demonstrations]}
-        | ({} if named is None else named.notes(name))
+        | ({} if named is None else named.notes(name, learnt))
     )
 
 
@@ -120,7 +123,7 @@ def _judged(
     shown, rank = None if named is None else named.shown, max(one.rank_ for one in learnt.values())
     found = uc.evaluation.verdicts.of_constraint(*learnt.values(), shown=shown, wound=wound)
     judged = uc.evaluation.verdicts.of_mechanism
-    return found if named is None else judged(found, rank, named.found.mechanism, bool(named.shown))
+    return found if named is None else judged(found, rank, named.found.mechanism, named.is_followed(learnt))
 
 
 def _report(
@@ -231,6 +234,8 @@ def held_of(
         click.echo(f"Note: {path}: {said}", err=True)
     if (judged := verdict_of(learnt, notes)).mark is not uc.evaluation.verdicts.Mark.GOOD:
         click.echo(f"Note: {path}: {judged.said} {f'Do not trust: {judged.doubt}' * bool(judged.doubt)}", err=True)
+    if notes.get(NAMED):
+        click.echo(f"Note: {path}: {MAY_LEAVE.format(notes[NAMED])}", err=True)
     return learnt if learnt.task or HELD_BY not in notes else uc.constraints.mechanisms.restored(notes[HELD_BY])
 
 
@@ -278,12 +283,20 @@ class Named(NamedTuple):
         decided = self.found.decided and self.found.mechanism.rank
         return False if not decided else None if self.found.doubt else True
 
-    def notes(self, name: str) -> dict[str, Any]:
+    def is_followed(self, learnt: Mapping[str, uc.LearntConstraint]) -> bool:
+        """Whether each of what was learnt, by name, is held by the mechanism, not by the directions learnt."""
+        one = len(self.found.candidates[0].mechanisms) == 1
+        return bool(self.shown) and all((one or name) and not each.task for name, each in learnt.items())
+
+    def notes(self, name: str, learnt: uc.LearntConstraint) -> dict[str, Any]:
         """What goes into the file of one demonstration, or of all together: words, and numbers where it is sure."""
         mechanisms = self.found.candidates[0].mechanisms
         own = mechanisms[self.names.index(name)] if name and len(mechanisms) > 1 else mechanisms[0]
         told = {"mechanism": dict(self.each).get(name, self.found.summary), SHOWN: self.shown}
-        return told | ({HELD_BY: own.numbers()} if self.shown and (name or len(mechanisms) == 1) else {})
+        if self.is_followed({name: learnt}):
+            return told | {HELD_BY: own.numbers()}
+        more = self.shown is not False and (own.rank > learnt.rank_ or own.form.straight is not None)
+        return told | ({NAMED: own.title} if more else {})
 
     @property
     def each(self) -> list[tuple[str, str]]:
@@ -337,7 +350,7 @@ def _say(learnt: Mapping[str, uc.LearntConstraint], what: str, named: Named | No
     else:
         click.echo("Each demonstration has its own: one constraint for all misses more where held out.")
     if named is not None:
-        click.echo("\n".join([*named.sentences, FOLLOWED if named.shown else NOT_FOLLOWED]))
+        click.echo("\n".join([*named.sentences, FOLLOWED if named.is_followed(learnt) else NOT_FOLLOWED]))
     head, rows = table_of(learnt, named)
     if rows:
         print_table(head, rows)

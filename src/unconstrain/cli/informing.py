@@ -32,6 +32,9 @@ MARK = "verdict"
 OF, HELD_BY, SHOWN, WHERE, WOUND = "of", "held by", "shown by positions", "least and largest states", "winding"
 """Notes of a constraint: of which demonstrations; mechanism; if that is sure; where; if they turn more than free."""
 
+NAMED = "named, but not held to"
+"""Note of the mechanism that positions may keep to, where the directions that were learnt are followed all the same."""
+
 ENDS = 2**16
 """Bytes at either end of a file by which it is known again."""
 
