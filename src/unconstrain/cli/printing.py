@@ -9,7 +9,7 @@ import sys
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from math import inf, isfinite
+from math import inf, isfinite, radians, tau
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
@@ -377,6 +377,14 @@ def show_warning(message: Warning | str, *_: Any) -> None:
         if len(titles) > 1:
             return
     click.echo(f"Note: {as_typed(str(message))}", err=True)
+
+
+def doubt_degrees(option: str, states: Sequence[float], recipe: uc.Recipe) -> None:
+    """Note angles of an option that look like degrees, where a policy takes radians of columns recorded in degrees."""
+    for name, angle in zip(recipe.states or (), states, strict=False):
+        if name in (recipe.degrees or ()) and abs(angle) > tau:
+            said = f"{option}: {angle:.4g} is far outside radians, which the policy takes for {name}; if it is in "
+            show_warning(f"{said}degrees, as recorded, that is {radians(angle):.4g}.")
 
 
 def say_others() -> None:

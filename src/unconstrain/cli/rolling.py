@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -20,7 +19,7 @@ from ..base.errors import DivergedError, InvalidDataError, SettingError, Support
 from ..base.files import write
 from .constraining import held_of, options_for_held
 from .informing import TOLD, doubted
-from .printing import of_option, option_for_json, say_verdict, say_written, show_warning
+from .printing import doubt_degrees, of_option, option_for_json, say_verdict, say_written, show_warning
 from .reading import fitted_policy, numbers, of_words
 from .scoring import support_of
 from .writing import check_outputs, option_for_force
@@ -122,10 +121,7 @@ def _obstacle(given: tuple[float, ...], n: int) -> uc.motion.obstacles.Ellipsoid
 
 def _check_start(policy: uc.Policy | uc.Guided, recipe: uc.Recipe, start: tuple[float, ...], least: float) -> None:
     """Note angles that look like degrees; refuse to begin where nothing was demonstrated, unless it is guided."""
-    for name, angle in zip(recipe.states or (), start, strict=False):
-        if name in (recipe.degrees or ()) and abs(angle) > math.tau:
-            said = f"--start: {angle:.4g} is far outside radians, which the policy takes for {name}; if it is in "
-            show_warning(f"{said}degrees, as recorded, that is {math.radians(angle):.4g}.")
+    doubt_degrees("--start", start, recipe)
     if innermost(policy) is not policy:
         return
     support = float(support_of(policy, [start])[0])
