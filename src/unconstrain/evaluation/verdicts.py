@@ -104,9 +104,15 @@ TOO_SLOW = Verdict(
 )
 
 
-def _graded(share: float, good: float = GOOD, fair: float = FAIR, told: float | None = None) -> tuple[Mark, str]:
+def _graded(
+    share: float,
+    good: float = GOOD,
+    fair: float = FAIR,
+    told: float | None = None,
+    where: str = "along the motion, but across it",
+) -> tuple[Mark, str]:
     if share >= good and told is not None and told < PARTLY:
-        return Mark.DOUBTFUL, "good along the motion, but across it recordings tell too little"
+        return Mark.DOUBTFUL, f"good {where} recordings tell too little"
     if share >= good:
         return Mark.GOOD, "good"
     return (Mark.DOUBTFUL, "fair") if share >= fair else (Mark.BAD, "poor")
@@ -183,21 +189,26 @@ def of_score(
     """Judge how much of recordings that were not learnt from a policy explains; one is enough to see it fail.
 
     ``under`` is the same under their constraint, 1 − nCPE, where that is known: then the smaller one is judged. Of
-    ``learnt`` of them, where that is known, the policy learnt; ``told`` is as ``determined`` in :func:`of_explained`.
+    ``learnt`` of them, where that is known, the policy learnt; ``told`` is as ``determined`` in :func:`of_explained`,
+    and makes any score doubtful where it is small: under the constraint given, too, others are not told.
     """
-    mark, word = _graded(share, told=told) if under is None else _graded(min(share, under))
+    mark, word = _graded(share, told=told)
+    if under is not None:
+        mark, word = _graded(min(share, under), told=told, where="under this one, but of movement under others")
     few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
     least = "nothing" if under is not None and under < -1 else percent(under or 0)
     known = "" if under is None else f", and {least} under the constraint given (1 − nCPE)"
-    more = "Movement under other constraints. Noise, and motion faster or slower than learnt, count as missed in nCPE."
+    untold = of_untold(1 - told) if told is not None and told < MOSTLY else ""
+    more = (
+        f"Movement under other constraints{untold and f': {untold}'}. Noise, and motion faster or slower than learnt, "
+    )
+    more += "count as missed in nCPE."
     if learnt:
         said = f"The policy {_explains(share, 'the motion')}{known}, but it learnt from {learnt} of "
         said += f"{_count(demonstrations)}: a score on what was learnt from is too good."
         return Verdict(Mark.DOUBTFUL, said, next="Hold some out of the fit (--leave-out, --episodes), and score these.")
     unknown = ", if none of it was learnt from" if learnt is None else ""
-    across = "What constraints hid in these recordings, too"
-    if told is not None and told < MOSTLY:
-        across = f"Across the motion: {of_untold(1 - told)}"
+    across = f"Across the motion: {untold}" if untold else "What constraints hid in these recordings, too"
     across += ". Only motion along the recorded actions is judged; what held these recordings, given with --plane or "
     across += "--constraint (one by one, if each was held in its own way), tells more: all directions that were free."
     return Verdict(
