@@ -257,6 +257,13 @@ def of_told(found: Verdict, told: float | None) -> Verdict:
     return _doubted(found, "across the motion recordings tell the policy too little")
 
 
+def of_look(found: Verdict, across: Verdict) -> Verdict:
+    """Say of how recordings look who judges what they tell; ``across`` adds what they plainly do not."""
+    if across.doubt != found.doubt:
+        across = _doubted(across, "they tell no policy across their motion")
+    return across._replace(said=f"{across.said} What recordings tell of a policy, 'unconstrain diagnose' judges.")
+
+
 def of_fit(found: Verdict, doubted: str) -> Verdict:
     """Add to a verdict on a movement what ``fit`` doubted of its policy, the rest of a sentence, if anything."""
     then = found.next or "Look at the policy beside its demonstrations ('unconstrain look')."
