@@ -12,7 +12,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import bare, listed
+from ..base.display import bare, listed, unit_of
 from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
 from .informing import HELD_BY, NAMED, OF, SHOWN, WHERE, WOUND, provenance, verdict_of
@@ -92,7 +92,7 @@ def constraint(
     if not as_json:
         say_verdict(verdict)
         click.echo(f"Learnt from {said_recipe(recipe, first)}.")
-        _say(learnt, "distance from it" if surface else "action", named)
+        _say(learnt, _of_what(surface, *recipe.labels(first.units)), named)
     notes = provenance(paths, recipe, first, **reading) | {WOUND: wound}
     for name, place in outputs.items():
         uc.save(learnt[name], place, notes | _of(name, learnt[name], named, demonstrations))
@@ -324,7 +324,7 @@ def mechanism_of(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe, 
     positions, groups = positions[moves], groups[moves]
     every = -(-len(positions) // MOST_POSITIONS)
     try:
-        unit = _unit_of([first.units.get(name, "") for name in names])
+        unit = _length_of([recipe.units(first.units).get(name, "") for name in names])
         found = uc.constraints.identify(positions[::every], groups=groups[::every], unit=unit)
         if found.mechanism.rank == len(names):
             raise InvalidDataError("positions keep to a point, which would hold every motion.")
@@ -334,7 +334,7 @@ def mechanism_of(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe, 
     return Named(found, [demonstrations[number].name for number in sorted({*groups[::every].tolist()})], names[-1])
 
 
-def _unit_of(units: Sequence[str]) -> str:
+def _length_of(units: Sequence[str]) -> str:
     """Of lengths, as the columns say it; empty where they do not."""
     [unit, *others] = dict.fromkeys(unit.lower() for unit in units)
     if others or unit not in LENGTHS:
@@ -358,12 +358,17 @@ def _say(learnt: Mapping[str, uc.LearntConstraint], what: str, named: Named | No
         click.echo("Where each is: --json, and --report draws it.")
 
 
+def _of_what(surface: bool, states: Sequence[str], actions: Sequence[str]) -> str:
+    """What noise is of, after its unit where columns tell it."""
+    return f"{unit_of(states if surface else actions)} of {'distance from it' if surface else 'action'}".lstrip()
+
+
 def _say_one(learnt: uc.LearntConstraint, what: str) -> None:
     choice = learnt.choice_
     smooth = f", smoothed with {choice.smoothness:g}" if choice.smoothness else ""
     click.echo(f"Learnt: {learnt.rank_} of {choice.actions} directions held, by {choice.name} features{smooth}.")
     click.echo(
-        f"Noise and misfit along them are about {learnt.noise_:.3g} of {what}, and where held out "
+        f"Noise and misfit along them are about {learnt.noise_:.3g} {what}, and where held out "
         f"{choice.held_out:.3g} of its mean square."
     )
     rows = [[name, f"{share:.3g}"] for name, share in choice.candidates.items()]

@@ -9,14 +9,14 @@ import sys
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from math import inf, isfinite, radians, tau
+from math import isfinite, radians, tau
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 import unconstrain as uc
 
-from ..base.display import bare, counted, innermost, listed, percent
+from ..base.display import counted, innermost, listed, percent, unit_of
 from ..base.errors import InvalidDataError, ModelFileError, ReadError, SettingError, WriteError
 from .endings import REFUSED, ending
 from .reading import next_command, said_recipe, say_left
@@ -228,15 +228,6 @@ def _least_known(policy: uc.Policy, demonstrations: Sequence[uc.Demonstration], 
     return f"{least} All such places:\n{next_command('diagnose')}"
 
 
-def models_of(policy: uc.Policy) -> str:
-    """Number and width of the local models, or the features of the one."""
-    if isinstance(policy, uc.LocallyLinearPolicy) and policy.variance_ in (inf, "cubic"):
-        return f"one {'cubic' if policy.variance_ == 'cubic' else 'affine'} model for all states"
-    if isinstance(policy, uc.LocallyLinearPolicy):
-        return f"{counted(len(policy.solution_.weights), 'local model')} of σ² {policy.variance_:.4g}"
-    return str(policy.features_)
-
-
 def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, learner: str, verbose: bool) -> None:
     """Print a verdict, what a policy was learnt from and explains, and what the data determined."""
     say_verdict(judged.verdict)
@@ -246,7 +237,7 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
     if moving is not policy:
         click.echo(f"Guided: {moving.aim_.promise}")
     solution, known = policy.solution_, isfinite(judged.training)
-    models = models_of(policy) if hasattr(policy, "fields_") else ""
+    models = uc.evaluation.diagnosis.models_of(policy) if hasattr(policy, "fields_") else ""
     counts = f"{counted(judged.demonstrations, 'demonstration')}, {counted(judged.samples, 'sample')}" if known else ""
     if counts or models:
         click.echo(f"{', '.join(filter(None, (counts, models)))}.")
@@ -310,8 +301,7 @@ def _say_suspects(rows: NDArray[np.intp], stream: uc.Stream | None) -> None:
 
 def _said_of_samples(solution: uc.Solution, actions: Sequence[str]) -> str:
     """The candidate that a robust learner took, and its estimates of noise and free samples."""
-    units = {name[len(bare(name)) :].strip(" ()[]") for name in actions}
-    where = f"{max(units)} on each action" if len(units) == 1 and max(units) else "on each action, in its unit"
+    where = f"{unit} on each action" if (unit := unit_of(actions)) else "on each action, in its unit"
     risks, share = {name: one.risk for name, one in solution.candidates.items()}, solution.believed.undecided_share
     undecided = f" ({percent(share)} free or always held in the same way, which looks alike)" if share >= 0.01 else ""
     return (

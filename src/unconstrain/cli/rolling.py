@@ -14,7 +14,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import counted, innermost
+from ..base.display import counted, innermost, unit_of
 from ..base.errors import DivergedError, InvalidDataError, SettingError, SupportEndsWarning
 from ..base.files import write
 from .constraining import held_of, options_for_held
@@ -156,7 +156,9 @@ def _supported(
     untold = None if told >= verdicts.MOSTLY else uc.evaluation.diagnosis.untold(policy, path)
     found = verdicts.of_support(support_of(policy, path.states), path.times, untold)
     found = verdicts.of_early_end(found, why) if why else found
-    passes = f" {held[:1].upper()}{held[1:]} passes through the start." * bool(held) + _off_goal(moving, path, held)
+    passes = f" {held[:1].upper()}{held[1:]} passes through the start." * bool(held) + _off_goal(
+        moving, path, held, notes
+    )
     found = verdicts.of_fit(found._replace(said=f"{found.said}{passes}"), doubted(moving, notes))
     if not obstacles:
         return found
@@ -167,7 +169,7 @@ def _supported(
     )
 
 
-def _off_goal(moving: Any, path: uc.Demonstration, held: str, near: float = 0.02) -> str:
+def _off_goal(moving: Any, path: uc.Demonstration, held: str, notes: Mapping[str, Any], near: float = 0.02) -> str:
     """A sentence on where off its goal a guided movement ends, by more than ``near`` of how far it was, and why."""
     if not isinstance(getattr(moving, "aim_", None), uc.motion.descent.Descent):
         return ""
@@ -175,7 +177,9 @@ def _off_goal(moving: Any, path: uc.Demonstration, held: str, near: float = 0.02
     rests = speeds[-1] <= near * speeds.max()
     why = "it rests there" if rests else "it is still on its way (--steps)"
     why += f", {'as' if rests else 'and may come to rest where'} {held} holds it off" if held else ""
-    return f" It ends {far[-1]:.3g} (unit of the states) from the goal: {why}." if far[-1] > near * far.max() else ""
+    recipe = uc.Recipe.from_dict(notes.get("recipe", {}))
+    unit = unit_of(recipe.labels(notes.get("units", {}))[0]) or "(unit of the states)"
+    return f" It ends {far[-1]:.3g} {unit} from the goal: {why}." if far[-1] > near * far.max() else ""
 
 
 def _csv(header: Sequence[str], path: uc.Demonstration) -> str:

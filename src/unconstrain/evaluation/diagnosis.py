@@ -23,6 +23,7 @@ from .sentences import FREE as FREE
 from .sentences import about_choice as about_choice
 from .sentences import about_suspects as about_suspects
 from .sentences import in_words as in_words
+from .sentences import models_of as models_of
 from .sentences import sentences as sentences
 from .shown import FLAT as FLAT
 from .shown import about_recordings as about_recordings

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.display import percent
+from ..base.display import counted, percent
 from ..learners import robust
 from .shown import named
 from .verdicts import ENOUGH, SMALL, regions_left
@@ -28,10 +28,10 @@ MOST_NAMED = 8
 """So many samples that look wrong are named."""
 
 
-def sentences(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> list[str]:
-    """The diagnosis in sentences, with the names of the columns."""
+def sentences(found: Diagnosis, states: Sequence[str], actions: Sequence[str], unit: str = "") -> list[str]:
+    """The diagnosis in sentences, with the names of the columns, and the unit of the actions if they have one."""
     return [
-        _about_noise(found),
+        _about_noise(found, f" {unit}".rstrip()),
         about_choice(found.method, found.candidates),
         *_about_regions(found, states, actions),
         _about_freedom(found),
@@ -49,18 +49,18 @@ def about_suspects(places: Sequence[Place]) -> list[str]:
     return [f"{number} wrong beside the neighbours in time, and counted nothing: {named}{more}."]
 
 
-def _about_noise(found: Diagnosis) -> str:
+def _about_noise(found: Diagnosis, unit: str) -> str:
     verdict = "little" if found.noise_share < SMALL else "some" if found.noise_share < 3 * SMALL else "much"
     too_much = found.noise_share > robust.SPHERE_HIDDEN_BY_NOISE
     hidden = " So much noise makes the following unreliable." if too_much else ""
-    said = f"Noise and misfit: {verdict}, {found.noise:.3g} on each action coordinate, {found.noise_share:.1%} of a "
-    said += f"typical action ({found.typical:.3g}) in all.{hidden}"
+    said = (
+        f"Noise and misfit: {verdict}, {found.noise:.3g}{unit} on each action coordinate, {found.noise_share:.1%} of a "
+    )
+    said += f"typical action ({found.typical:.3g}{unit}) in all.{hidden}"
     if found.noise_share < 0.5 * SMALL or found.noise < MISFIT * found.jitter:
         return said
-    return said + (
-        f" Only {found.jitter:.3g} of it changes from sample to sample; the rest is what the model does not follow, or "
-        "people who vary."
-    )
+    rest = "the rest is what the model does not follow, or people who vary."
+    return f"{said} Only {found.jitter:.3g}{unit} of it changes from sample to sample; {rest}"
 
 
 _WAYS = {
@@ -77,6 +77,15 @@ _WAYS = {
 def in_words(method: str) -> str:
     """What is told of a way of learning, by its name with or without a softness after a comma; empty of others."""
     return _WAYS.get(method.partition(", ")[0], "")
+
+
+def models_of(policy: Any) -> str:
+    """Number and width of a fitted policy's local models, or the one for all states; of others their features."""
+    if not hasattr(policy, "fields_"):
+        return str(policy.features_)
+    if policy.variance_ in (np.inf, "cubic"):
+        return f"one {'cubic' if policy.variance_ == 'cubic' else 'affine'} model for all states"
+    return f"{counted(len(policy.solution_.weights), 'local model')} of σ² {policy.variance_:.4g}"
 
 
 def about_choice(method: str, candidates: Mapping[str, float]) -> str:
