@@ -9,8 +9,9 @@ import numpy as np
 
 from ..base.display import counted, percent
 from ..learners import robust
+from .marks import ENOUGH, SMALL
 from .shown import named
-from .verdicts import ENOUGH, SMALL, regions_left
+from .verdicts import regions_left
 
 if TYPE_CHECKING:
     from .diagnosis import Diagnosis, Place, Region

@@ -9,7 +9,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..learners import robust
 from ..recordings import Demonstration, Recipe, readers, stack
-from .verdicts import ENOUGH, Mark, Verdict
+from .marks import ENOUGH, Mark, Verdict
 
 FLAT, ONE = 0.1, 0.03
 """Held are directions of less spread than the first share of the longest, and all on one plane below the second."""
