@@ -16,7 +16,7 @@ from seen import below
 from unconstrain import cli
 from unconstrain.base.errors import InvalidDataError
 from unconstrain.evaluation import diagnosis, verdicts
-from unconstrain.evaluation.verdicts import FAIR, GOOD, Mark
+from unconstrain.evaluation.marks import FAIR, GOOD, Mark
 from unconstrain.recordings import Recording
 
 shares = st.floats(-1.0, 1.0)

@@ -76,8 +76,7 @@ def with_unit(name: str, unit: str | None) -> str:
 
 def unit_of(names: Iterable[str]) -> str:
     """The unit that all names of columns say, ``"mm"`` of ``"x [mm]"`` and ``"x_mm"``; empty where they say none."""
-    ends = {name: re.search(r"_(mm|cm|deg|rad)$", name) for name in names}
-    units = {end[1] if end else name[len(bare(name)) :].strip(" ()[]") for name, end in ends.items()}
+    units = {"".join(re.findall(r"_(mm|cm|deg|rad)$", one)) or one[len(bare(one)) :].strip(" ()[]") for one in names}
     return units.pop() if len(units) == 1 else ""
 
 

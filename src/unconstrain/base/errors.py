@@ -61,9 +61,13 @@ class SettingError(UnconstrainError, ValueError):
 class UntoldError(SettingError):
     """Columns of a recording that do not tell which are states and which actions."""
 
+    cure = " 'unconstrain inspect' proposes a command."
+
 
 class LackingError(InvalidDataError, SettingError):
-    """A column or time stamps that a recording lacks, and those beside it may lack too."""
+    """A column or time stamps that a recording lacks, and those beside it may lack too: left out, nothing is cured."""
+
+    cure = ""
 
 
 class MissingBeliefError(SettingError, AttributeError):

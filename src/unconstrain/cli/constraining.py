@@ -92,7 +92,7 @@ def constraint(
     if not as_json:
         say_verdict(verdict)
         click.echo(f"Learnt from {said_recipe(recipe, first)}.")
-        _say(learnt, _of_what(surface, *recipe.labels(first.units)), named)
+        _say(learnt, surface, recipe.labels(first.units), named)
     notes = provenance(paths, recipe, first, **reading) | {WOUND: wound}
     for name, place in outputs.items():
         uc.save(learnt[name], place, notes | _of(name, learnt[name], named, demonstrations))
@@ -108,12 +108,9 @@ def _of(
 ) -> dict[str, Any]:
     """What a file notes of the demonstration that it is of, of where that was, and of the mechanism."""
     states = uc.stack([one for one in demonstrations if name in ("", one.name)]).states
-    where = {WHERE: [states.min(axis=0).tolist(), states.max(axis=0).tolist()]}
-    return (
-        where
-        | {OF: [name] if name else [one.name for one in demonstrations]}
-        | ({} if named is None else named.notes(name, learnt))
-    )
+    told = {WHERE: [states.min(axis=0).tolist(), states.max(axis=0).tolist()]}
+    told[OF] = [name] if name else [one.name for one in demonstrations]
+    return told if named is None else told | named.notes(name, learnt)
 
 
 def _judged(
@@ -344,7 +341,10 @@ def _length_of(units: Sequence[str]) -> str:
     return unit
 
 
-def _say(learnt: Mapping[str, uc.LearntConstraint], what: str, named: Named | None) -> None:
+def _say(
+    learnt: Mapping[str, uc.LearntConstraint], surface: bool, labels: Sequence[Sequence[str]], named: Named | None
+) -> None:
+    what = f"{unit_of(labels[not surface])} of {'distance from it' if surface else 'action'}".lstrip()
     if "" in learnt:
         _say_one(learnt[""], what)
     else:
@@ -358,19 +358,12 @@ def _say(learnt: Mapping[str, uc.LearntConstraint], what: str, named: Named | No
         click.echo("Where each is: --json, and --report draws it.")
 
 
-def _of_what(surface: bool, states: Sequence[str], actions: Sequence[str]) -> str:
-    """What noise is of, after its unit where columns tell it."""
-    return f"{unit_of(states if surface else actions)} of {'distance from it' if surface else 'action'}".lstrip()
-
-
 def _say_one(learnt: uc.LearntConstraint, what: str) -> None:
     choice = learnt.choice_
     smooth = f", smoothed with {choice.smoothness:g}" if choice.smoothness else ""
     click.echo(f"Learnt: {learnt.rank_} of {choice.actions} directions held, by {choice.name} features{smooth}.")
-    click.echo(
-        f"Noise and misfit along them are about {learnt.noise_:.3g} {what}, and where held out "
-        f"{choice.held_out:.3g} of its mean square."
-    )
+    missed = f"where held out {choice.held_out:.3g} of its mean square"
+    click.echo(f"Noise and misfit along them are about {learnt.noise_:.3g} {what}, and {missed}.")
     rows = [[name, f"{share:.3g}"] for name, share in choice.candidates.items()]
     print_table(["features", "missed where held out"], rows)
 

@@ -85,11 +85,8 @@ def info(file: str, as_json: bool) -> None:
     A policy, guided or not, or a constraint.
     """
     held, notes = loaded(file, uc.Policy | uc.LearntConstraint | uc.Guided), uc.storage.load_notes(file)
-    rest = {
-        name: value
-        for name, value in notes.items()
-        if name not in ("recipe", "units", "digests", MARK, HELD_BY, SHOWN, WHERE, WOUND)
-    }
+    inner = ("recipe", "units", "digests", MARK, HELD_BY, SHOWN, WHERE, WOUND)
+    rest = {name: value for name, value in notes.items() if name not in inner}
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held, notes), **rest}
     if as_json:
         click.echo(json.dumps(told | {"verdict": verdict_of(held, notes).to_json()}, indent=2))

@@ -250,9 +250,8 @@ def _to_fit(paths: Sequence[str | Path], recipe: uc.Recipe, roles: Mapping[str, 
     told = ["unconstrain", "fit", *map(str, paths)]
     if not context.params["state"]:
         told += ["--state", ",".join(recipe.states or ())]
-        told += (
-            ["--by", recipe.differentiate or ""] if recipe.actions is None else ["--action", ",".join(recipe.actions)]
-        )
+        by = ["--by", recipe.differentiate or ""]
+        told += by if recipe.actions is None else ["--action", ",".join(recipe.actions)]
     given = typed("files", "output", "force", "leave_out", "rrd", "robot", "tip")
     for option in context.command.params:
         role = roles.get(option.name or "")

@@ -137,9 +137,8 @@ def say_surveys(surveys: Sequence[Any], needed: str, then: str) -> None:
             click.echo(f"{found.title}: time does not increase at row {found.non_increasing[0]}.")
     each = [(found.title, remark) for found in surveys for remark in (*found.warnings, *found.notes)]
     several = {title for title, remark in each if remark.code == "several-in-one"}
-    each = [
-        (title, one) for title, one in each if title not in several or one.code not in uc.evaluation.verdicts.SAME_CAUSE
-    ]
+    same = uc.evaluation.verdicts.SAME_CAUSE
+    each = [(title, one) for title, one in each if title not in several or one.code not in same]
     for code in dict.fromkeys(remark.code for _, remark in sorted(each, key=lambda one: not one[1].warns)):
         titles = {title: remark for title, remark in reversed(each) if remark.code == code}
         *others, first = titles
@@ -249,11 +248,9 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
             _say_suspects(solution.belief.suspects, stream)
     elif learner != "direct":
         _say_determined(solution, learner)
-    click.echo(
-        "Share of the motion explained, where slow samples count less, as in the verdict: "
-        + (f"{judged.training:.4g} on the training data, " if known else "")
-        + (f"{judged.held_out:.4g} where held out." if isfinite(judged.held_out) else "nothing could be held out.")
-    )
+    seen = f"{judged.training:.4g} on the training data, " if known else ""
+    rest = f"{judged.held_out:.4g} where held out." if isfinite(judged.held_out) else "nothing could be held out."
+    click.echo(f"Share of the motion explained, where slow samples count less, as in the verdict: {seen}{rest}")
     for note in solution.notes:
         click.echo(note)
     if verbose and solution.belief is not None:
@@ -265,14 +262,11 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
 
 
 def _say_determined(solution: uc.Solution, learner: str) -> None:
-    rest = "."
+    said = f"{percent(solution.determined_share)} of {solution.directions} weight directions"
+    said += " of each model" * (len(solution.weights) > 1)
     if learner == "hybrid" and solution.determined_share < 1:
-        rest = "; along the others the policy is as close to the recorded actions as can be."
-    click.echo(
-        f"The inconsistency determined {percent(solution.determined_share)} of {solution.directions} weight directions"
-        + (" of each model" if len(solution.weights) > 1 else "")
-        + rest
-    )
+        said += "; along the others the policy is as close to the recorded actions as can be"
+    click.echo(f"The inconsistency determined {said}.")
     if solution.determined_share == 0.0:
         click.echo("Note: nothing was determined, so this is the same as --learner direct.", err=True)
 
@@ -283,8 +277,7 @@ def say_scale(policy: uc.Policy, recipe: uc.Recipe) -> None:
         click.echo("Note: --scale auto: angles and orientations have none; give positions in metres.", err=True)
     if policy.scale_ is None:
         return
-    states = recipe.states or ()
-    names = states if recipe.actions is None else (*states, *recipe.actions)
+    names = *(recipe.states or ()), *(recipe.actions or ())
     sizes = [*policy.scale_.states, *policy.scale_.actions]
     told = ", ".join(f"{size:.4g} of {name}" for name, size in zip(names, sizes, strict=False))
     click.echo(f"As one count {told} (--scale); noise and features are in these units, predictions as in the files.")
@@ -294,8 +287,7 @@ def _say_suspects(rows: NDArray[np.intp], stream: uc.Stream | None) -> None:
     """Name the samples that look wrong, in a further walk if there are any."""
     if len(rows) and stream is not None:
         named = ((name.partition("/")[2], demo) for name, demo in stream.named_demonstrations())
-        places = uc.evaluation.diagnosis.places_of(rows, named)
-        for line in uc.evaluation.diagnosis.about_suspects(places):
+        for line in uc.evaluation.diagnosis.about_suspects(uc.evaluation.diagnosis.places_of(rows, named)):
             click.echo(f"Note: {line}", err=True)
 
 
@@ -304,11 +296,9 @@ def _said_of_samples(solution: uc.Solution, actions: Sequence[str]) -> str:
     where = f"{unit} on each action" if (unit := unit_of(actions)) else "on each action, in its unit"
     risks, share = {name: one.risk for name, one in solution.candidates.items()}, solution.believed.undecided_share
     undecided = f" ({percent(share)} free or always held in the same way, which looks alike)" if share >= 0.01 else ""
-    return (
-        f"{uc.evaluation.diagnosis.about_choice(solution.method, risks)} Noise and misfit are about "
-        f"{solution.noise:.3g} {where}, and {percent(solution.free_share)} of the samples were free, or "
-        f"held by less than that{undecided}."
-    )
+    said = f"{uc.evaluation.diagnosis.about_choice(solution.method, risks)} Noise and misfit are about "
+    said += f"{solution.noise:.3g} {where}, and {percent(solution.free_share)} of the samples were free, or "
+    return f"{said}held by less than that{undecided}."
 
 
 def explained(policy: Any, demonstrations: Sequence[uc.Demonstration]) -> float:

@@ -17,16 +17,7 @@ import click
 import unconstrain as uc
 
 from ..base.display import bare, counted, innermost
-from ..base.errors import (
-    NOTHING_LEFT,
-    InvalidDataError,
-    LackingError,
-    ModelFileError,
-    ReadError,
-    SettingError,
-    UnconstrainError,
-    UntoldError,
-)
+from ..base.errors import NOTHING_LEFT, InvalidDataError, ModelFileError, ReadError, SettingError, UnconstrainError
 from ..base.files import stem
 from .progress import Progress
 
@@ -276,10 +267,9 @@ def of_files(recordings: Iterable[uc.Recording]) -> Iterator[None]:
                 own = any(stem(file) == named for file in files)
                 title = " or ".join(files) if own else f"'{named}' of {' or '.join(files)}"
                 left_out = ",".join([*click.get_current_context().params["leave_out"], named])
-                cure = f" Or leave it out: --leave-out {shlex.quote(left_out)}" if len(came) > len(files) else ""
-                cure = "" if isinstance(error, LackingError) else cure
-                cure = " 'unconstrain inspect' proposes a command." if isinstance(error, UntoldError) else cure
-                error.args = (f"{title}{str(error)[len(named) + 2 :]}{cure}", *error.args[1:])
+                leave = f" Or leave it out: --leave-out {shlex.quote(left_out)}" * (len(came) > len(files))
+                said = f"{title}{str(error)[len(named) + 2 :]}{getattr(error, 'cure', leave)}"
+                error.args = (said, *error.args[1:])
         raise
 
 
@@ -323,10 +313,8 @@ def typed(*without: str) -> list[str]:
             continue
         value = context.params[name]
         for one in value if getattr(option, "multiple", False) else [value]:
-            told += [
-                option.opts[0],
-                *([] if one is True else [",".join(map(str, one))] if isinstance(one, tuple) else [str(one)]),
-            ]
+            plain = ",".join(map(str, one)) if isinstance(one, tuple) else str(one)
+            told += [option.opts[0]] if one is True else [option.opts[0], plain]
     return told
 
 

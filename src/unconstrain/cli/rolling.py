@@ -156,20 +156,18 @@ def _supported(
     untold = None if told >= verdicts.MOSTLY else uc.evaluation.diagnosis.untold(policy, path)
     found = verdicts.of_support(support_of(policy, path.states), path.times, untold)
     found = verdicts.of_early_end(found, why) if why else found
-    passes = f" {held[:1].upper()}{held[1:]} passes through the start." * bool(held) + _off_goal(
-        moving, path, held, notes
-    )
+    unit = unit_of(uc.Recipe.from_dict(notes.get("recipe", {})).labels(notes.get("units", {}))[0])
+    passes = f" {held[:1].upper()}{held[1:]} passes through the start." * bool(held)
+    passes += _off_goal(moving, path, held, unit or "(unit of the states)")
     found = verdicts.of_fit(found._replace(said=f"{found.said}{passes}"), doubted(moving, notes))
     if not obstacles:
         return found
     nearest = min((float(one(path.states)[0].min()), number) for number, one in enumerate(obstacles, start=1))
-    return found._replace(
-        said=f"{found.said} It keeps clear of {counted(len(obstacles), 'obstacle')}, at the nearest of number "
-        f"{nearest[1]} by {nearest[0]:.0%} of its radius."
-    )
+    clear = f"It keeps clear of {counted(len(obstacles), 'obstacle')}, at the nearest of number {nearest[1]} by "
+    return found._replace(said=f"{found.said} {clear}{nearest[0]:.0%} of its radius.")
 
 
-def _off_goal(moving: Any, path: uc.Demonstration, held: str, notes: Mapping[str, Any], near: float = 0.02) -> str:
+def _off_goal(moving: Any, path: uc.Demonstration, held: str, unit: str, near: float = 0.02) -> str:
     """A sentence on where off its goal a guided movement ends, by more than ``near`` of how far it was, and why."""
     if not isinstance(getattr(moving, "aim_", None), uc.motion.descent.Descent):
         return ""
@@ -177,16 +175,13 @@ def _off_goal(moving: Any, path: uc.Demonstration, held: str, notes: Mapping[str
     rests = speeds[-1] <= near * speeds.max()
     why = "it rests there" if rests else "it is still on its way (--steps)"
     why += f", {'as' if rests else 'and may come to rest where'} {held} holds it off" if held else ""
-    recipe = uc.Recipe.from_dict(notes.get("recipe", {}))
-    unit = unit_of(recipe.labels(notes.get("units", {}))[0]) or "(unit of the states)"
     return f" It ends {far[-1]:.3g} {unit} from the goal: {why}." if far[-1] > near * far.max() else ""
 
 
 def _csv(header: Sequence[str], path: uc.Demonstration) -> str:
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows([f"{value:.9g}" for value in row] for row in _rows(path))
+    rows = ([f"{value:.9g}" for value in row] for row in _rows(path))
+    csv.writer(text, lineterminator="\n").writerows([header, *rows])
     return text.getvalue()
 
 

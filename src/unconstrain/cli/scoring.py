@@ -21,8 +21,7 @@ from .progress import shown
 from .reading import fitted_policy, options_for_reading, prepared
 
 LEAST, ENOUGH = 5, 5.0
-"""Samples that it takes to tell noise, and standard deviations of it that half a usual action has to be for a direction
-to be judged there; of others it takes as many as :data:`~unconstrain.evaluation.metrics.TURNED`."""
+"""Samples that it takes to tell noise, and standard deviations of it that are enough in half a usual action."""
 
 
 @click.command(epilog="\b\nExample:\n  unconstrain score wipe.npz other.csv --plane 0,0.3,1 --json")

@@ -78,14 +78,11 @@ class Verdict(NamedTuple):
 
 
 def graded(
-    share: float,
-    good: float = GOOD,
-    fair: float = FAIR,
-    told: float | None = None,
-    where: str = "along the motion, but across it",
+    share: float, good: float = GOOD, fair: float = FAIR, told: float | None = None, under: bool = False
 ) -> tuple[Mark, str]:
     """The mark of a share, and a word for it; where recordings tell too little of a policy, in what they do."""
     if share >= good and told is not None and told < PARTLY:
+        where = "under this one, but of movement under others" if under else "along the motion, but across it"
         return Mark.DOUBTFUL, f"good {where} recordings tell too little"
     if share >= good:
         return Mark.GOOD, "good"
@@ -94,9 +91,8 @@ def graded(
 
 def doubted(found: Verdict, how: str) -> Verdict:
     """Go on in a sentence that leaves a verdict no better than doubtful."""
-    return found._replace(
-        mark=no_better(found.mark), said=f"{found.said} {'But' if found.mark is Mark.GOOD else 'And'} {how}."
-    )
+    joined = f"{found.said} {'But' if found.mark is Mark.GOOD else 'And'} {how}."
+    return found._replace(mark=no_better(found.mark), said=joined)
 
 
 def no_better(mark: Mark) -> Mark:

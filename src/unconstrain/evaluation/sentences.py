@@ -45,9 +45,8 @@ def about_suspects(places: Sequence[Place]) -> list[str]:
     if not places:
         return []
     number = "1 sample looks" if len(places) == 1 else f"{len(places)} samples look"
-    more = ", ..." if len(places) > MOST_NAMED else ""
-    named = ", ".join(map(str, places[:MOST_NAMED]))
-    return [f"{number} wrong beside the neighbours in time, and counted nothing: {named}{more}."]
+    named = ", ".join(map(str, places[:MOST_NAMED])) + ", ..." * (len(places) > MOST_NAMED)
+    return [f"{number} wrong beside the neighbours in time, and counted nothing: {named}."]
 
 
 def _about_noise(found: Diagnosis, unit: str) -> str:
@@ -140,6 +139,5 @@ def _about_freedom(found: Diagnosis) -> str:
     means = np.array([one.free for one in found.movements], dtype=np.float64)
     free, held = int((means > FREE).sum()), int((means < CONSTRAINED).sum())
     between = len(means) - free - held
-    return f"{said}. Of {len(means)} demonstrations, {free} look free and {held} constrained" + (
-        f"; of {between} that is not certain." if between else "."
-    )
+    rest = f"; of {between} that is not certain." if between else "."
+    return f"{said}. Of {len(means)} demonstrations, {free} look free and {held} constrained{rest}"

@@ -13,12 +13,9 @@ from numpy.typing import NDArray
 from ..base.arrays import Array
 from ..base.display import counted, percent
 from ..models import SUPPORTED
-from .marks import ENOUGH as ENOUGH
-from .marks import FAIR as FAIR
-from .marks import FAR_OFF, FORBIDDEN, NEARBY, OTHERWISE, UNITS, doubted, graded, no_better
+from .marks import ENOUGH, FAIR, FAR_OFF, FORBIDDEN, NEARBY, OTHERWISE, PARTLY, UNITS, doubted, graded, no_better
 from .marks import GOOD as GOOD
 from .marks import MOSTLY as MOSTLY
-from .marks import PARTLY as PARTLY
 from .marks import SMALL as SMALL
 from .marks import WIDTH as WIDTH
 from .marks import Mark as Mark
@@ -89,10 +86,9 @@ def of_explained(
         across += "." if there else "; 'unconstrain diagnose' says where."
     much = f"{percent(lost)} less" if lost and round(lost, 2) else "as much"
     (alone, word), (mark, _) = (graded(each, told=determined) for each in (share, share - (lost or 0.0)))
-    retold = (
-        f" {'Guided' if mark is alone else 'But guided'}, it explains {much} of the demonstrations it was fitted to"
-    )
-    retold = "" if lost is None else f"{retold}; that says nothing of new starts."
+    guided = "Guided" if mark is alone else "But guided"
+    retold = f" {guided}, it explains {much} of the demonstrations it was fitted to; that says nothing of new starts."
+    retold *= lost is not None
     if demonstrations < ENOUGH or not np.isfinite(share):
         seen = f"The policy {_explains(share)}, but no" if np.isfinite(share) else "No"
         few = f"{seen} verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
@@ -113,9 +109,7 @@ def of_score(
     ``learnt`` of them, where that is known, the policy learnt; ``told`` is as ``determined`` in :func:`of_explained`,
     and makes any score doubtful where it is small: under the constraint given, too, others are not told.
     """
-    mark, word = graded(share, told=told)
-    if under is not None:
-        mark, word = graded(min(share, under), told=told, where="under this one, but of movement under others")
+    mark, word = graded(share if under is None else min(share, under), told=told, under=under is not None)
     few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
     least = "nothing" if under is not None and under < -1 else percent(under or 0)
     known = "" if under is None else f", and {least} under the constraint given (1 − nCPE)"
@@ -132,15 +126,10 @@ def of_score(
     across = f"Across the motion: {untold}" if untold else "What constraints hid in these recordings, too"
     across += ". Only motion along the recorded actions is judged; what held these recordings, given with --plane or "
     across += "--constraint (one by one, if each was held in its own way), tells more: all directions that were free."
-    return Verdict(
-        mark,
-        f"The policy {_explains(share)}{known}{unknown}: {word}.",
-        "" if mark is Mark.BAD else "Movement like this, along the directions that were recorded.",
-        across if under is None else more,
-        f"Score it under other constraints.{few}"
-        if mark is Mark.GOOD
-        else "'unconstrain diagnose' says what to record.",
-    )
+    said, good = f"The policy {_explains(share)}{known}{unknown}: {word}.", mark is Mark.GOOD
+    trust = "" if mark is Mark.BAD else "Movement like this, along the directions that were recorded."
+    then = f"Score it under other constraints.{few}" if good else "'unconstrain diagnose' says what to record."
+    return Verdict(mark, said, trust, across if under is None else more, then)
 
 
 def of_worst(found: Verdict, shares: Mapping[str, float]) -> Verdict:
