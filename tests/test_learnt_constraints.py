@@ -199,6 +199,25 @@ def test_a_direction_that_may_be_held_with_more_noise_is_said(noise):
     assert (found.rank_, True) == (told[noise][0], told[noise][1] in " ".join(found.choice_.doubts))
 
 
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_across_a_free_policy_that_is_a_function_of_the_state_nothing_is_surely_held(seed):
+    """One direction in three varies with the state and looks held, though nothing was."""
+    rng = np.random.default_rng(seed)
+
+    def stirring(x):
+        inwards = x[:, :2] * (1.0 - np.linalg.norm(x[:, :2], axis=1, keepdims=True))
+        return np.hstack([x[:, 1::-1] * [-1.5, 1.5] + inwards, -x[:, 2:]])
+
+    demos = uc.rollout(stirring, rng.uniform(-1.5, 1.5, (8, 3)), 150, 0.03)
+    noisy = [uc.Demonstration(d.states, d.actions + 0.02 * rng.standard_normal(d.actions.shape)) for d in demos]
+    states, actions, groups = uc.stack(noisy)
+    found = uc.LearntConstraint().fit(states, actions, groups=groups)
+    assert found.rank_ == 1
+    assert "a free policy that is a function of the state looks the same" in " ".join(found.choice_.doubts)
+    constant = uc.LearntConstraint().fit(*held.drawn(uc.constraints.Plane([0.0, 0.6, 0.8]), rng)[:2])
+    assert (constant.choice_.name, constant.choice_.doubts) == ("constant", ())
+
+
 @pytest.mark.parametrize("grouped", [True, False])
 @pytest.mark.parametrize("features", ["affine", "rbf", "auto"])
 def test_streamed_is_at_once(features, grouped):

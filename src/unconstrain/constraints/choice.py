@@ -109,8 +109,13 @@ class Choice:
 
     @property
     def one_way(self) -> bool:
-        """Whether the motion is one function of the state, with or without anything that holds it."""
-        return self.fields.rank == self.actions - 1 and self.explained > ONE_WAY
+        """Whether the motion is one function of the state, with or without anything that holds it.
+
+        Across it there always is a direction that varies with the state: of an affine motion, its product with any
+        skew-symmetric matrix. A constant direction is no matter of course, nor is a surface that all points are on.
+        """
+        anyway = self.fields.rank == self.actions - 1 or not self.form.constant
+        return anyway and self.explained > ONE_WAY
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -121,7 +126,7 @@ class Choice:
                 "At each state only one direction was seen: a free policy that is a function of the state looks the "
                 "same. Record movements that cross each other, or name the features."
             )
-        elif self.fields.next < HELD:
+        if self.fields.next < HELD and self.fields.rank < self.actions - 1:
             said.append(
                 f"One direction more moves by only {self.fields.next:.1g} of what is free: it is held, too, with more "
                 "noise, or nobody wanted to move along it."

@@ -141,6 +141,11 @@ class Form:
         surface = Surface(features, 1e-4 * np.where(spread > 0.0, spread, 1.0))
         return cls(Model(Constant(), Everywhere()), surface)
 
+    @property
+    def constant(self) -> bool:
+        """Whether one set of coefficients holds at all states, in the chart."""
+        return isinstance(self.model.features, Constant)
+
     def lift(self, states: Array, actions: Array) -> Lifted:
         """Samples of any array library; where Φ is not the identity, as NumPy's."""
         phi, (motions, matrices) = self.model.design(states), self.chart.lift(states, actions)
