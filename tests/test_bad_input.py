@@ -204,7 +204,11 @@ FORMS = {
 @pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
 def test_the_form_of_the_numbers_does_not_matter(policy, form, data):
     plain = clone(policy).fit(data.states, data.actions).predict(data.states)
-    other = clone(policy).fit(form(data.states), form(data.actions), form(np.ones(90))).predict(form(data.states))
+    other = (
+        clone(policy)
+        .fit(form(data.states), form(data.actions), sample_weight=form(np.ones(90)))
+        .predict(form(data.states))
+    )
     assert_allclose(other, plain, atol=1e-9)
 
 
@@ -257,12 +261,12 @@ def test_states_of_any_size_give_a_finite_policy(size, data):
 
 @pytest.mark.parametrize("weight", [1e-300, 1e-30, 1e29])
 def test_weights_of_any_size_give_a_finite_policy(policy, weight, data):
-    policy.fit(data.states, data.actions, np.full(90, weight))
+    policy.fit(data.states, data.actions, sample_weight=np.full(90, weight))
     assert_finite(policy, data.states)
 
 
 def test_weights_of_very_different_size_give_a_finite_policy(policy, data):
-    assert_finite(policy.fit(data.states, data.actions, np.logspace(-300, 10, 90)), data.states)
+    assert_finite(policy.fit(data.states, data.actions, sample_weight=np.logspace(-300, 10, 90)), data.states)
 
 
 def test_a_single_wild_state_does_not_spoil_the_others(data):

@@ -2,6 +2,7 @@
 
 import pickle
 from dataclasses import replace
+from inspect import signature
 
 import numpy as np
 import pandas as pd
@@ -144,7 +145,22 @@ def test_the_score_is_the_share_of_observed_motion_that_is_explained(data):
     weights = np.random.default_rng(0).uniform(0, 1, 90)
     missed = naive.inconsistency(data.actions, policy.predict(data.states), weights)
     moved = sum(w * u @ u for w, u in zip(weights, data.actions, strict=True))
-    assert policy.score(data.states, data.actions, weights) == pytest.approx(1 - missed / moved)
+    assert policy.score(data.states, data.actions, sample_weight=weights) == pytest.approx(1 - missed / moved)
+
+
+@pytest.mark.parametrize("method", ["fit", "partial_fit", "score"])
+def test_groups_are_never_taken_for_weights(data, method):
+    demos = [uc.Demonstration(data.states[data.groups == g], data.actions[data.groups == g]) for g in range(6)]
+    policy = uc.ParametricPolicy(learner="hybrid").fit(data.states, data.actions)
+    with pytest.raises(SettingError, match=rf"{method}: got 3 arrays.*{method}\(states, actions, groups=groups\)"):
+        getattr(policy, method)(*uc.stack(demos))
+    assert list(signature(getattr(policy, method)).parameters)[:2] == ["X", "y"]
+    getattr(policy, method)(X=data.states, y=data.actions, sample_weight=np.ones(90))
+
+
+def test_groups_are_never_taken_for_weights_on_a_cluster(data):
+    with pytest.raises(SettingError, match=r"fit\(states, actions, groups=groups\)"):
+        uc.cluster.fit(uc.ParametricPolicy(learner="hybrid"), data.states, data.actions, data.groups)
 
 
 def test_a_score_of_no_motion_is_zero(data):
@@ -214,7 +230,7 @@ def test_only_so_many_samples_place_the_features():
 def test_samples_without_weight_place_nothing(data):
     weights = np.ones(90)
     far = np.vstack([data.states, [[1e6, 1e6]]])
-    policy = uc.ParametricPolicy().fit(far, np.vstack([data.actions, [[0, 0]]]), np.append(weights, 0.0))
+    policy = uc.ParametricPolicy().fit(far, np.vstack([data.actions, [[0, 0]]]), sample_weight=np.append(weights, 0.0))
     plain = uc.ParametricPolicy().fit(data.states, data.actions)
     assert_allclose(policy.predict(data.states), plain.predict(data.states), atol=1e-7)
 
@@ -332,7 +348,9 @@ def test_speed_power_is_a_sample_weight():
     demos = uc.rollout(LimitCycle(), [[0.1, 0.9], [0.5, -0.5], [-1.0, 0.2]], 30, 0.05)
     states, actions, groups = uc.stack(demos)
     weighted = uc.LocallyLinearPolicy(None).fit_demonstrations(demos, speed_power=2.0)
-    by_hand = uc.LocallyLinearPolicy(None, learner=uc.Hybrid()).fit(states, actions, (actions**2).sum(axis=1), groups)
+    by_hand = uc.LocallyLinearPolicy(None, learner=uc.Hybrid()).fit(
+        states, actions, sample_weight=(actions**2).sum(axis=1), groups=groups
+    )
     assert_allclose(weighted.predict(states), by_hand.predict(states), rtol=1e-6, atol=1e-9)
 
 

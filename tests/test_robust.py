@@ -363,8 +363,8 @@ def test_a_demonstration_at_rest_does_not_choose_the_softness():
 def test_a_common_factor_of_small_weights_changes_nothing(sampler):
     data = draw(samples=200)
     policy = uc.ParametricPolicy(uc.Affine(), sampler)
-    once = clone(policy).fit(data.states, data.actions, np.full(200, 1.0), data.groups)
-    small = clone(policy).fit(data.states, data.actions, np.full(200, 1 / 200), data.groups)
+    once = clone(policy).fit(data.states, data.actions, sample_weight=np.full(200, 1.0), groups=data.groups)
+    small = clone(policy).fit(data.states, data.actions, sample_weight=np.full(200, 1 / 200), groups=data.groups)
     assert_allclose(small.predict(data.states), once.predict(data.states), atol=1e-9)
     assert_allclose(small.uncertainty(data.states).total, once.uncertainty(data.states).total, rtol=1e-6)
 
@@ -438,7 +438,7 @@ def test_free_has_an_entry_for_each_sample_of_no_weight_too(sampler):
     weights[[3, 50, 51, 199]] = 0.0
     weights[groups == 4] = 0.0  # a whole demonstration
     policy = uc.ParametricPolicy(uc.Affine(), sampler)
-    weighted = clone(policy).fit(states, actions, weights, groups)
+    weighted = clone(policy).fit(states, actions, sample_weight=weights, groups=groups)
     counting = weights > 0
     without = clone(policy).fit(states[counting], actions[counting], groups=groups[counting])
     assert weighted.solution_.free.shape == (200,)

@@ -108,9 +108,9 @@ def _check(form: ClosedForm, kind: Messages, described: Description) -> None:
     if n != d or _of_second_order(described):
         raise SettingError(
             f"ros2: the node takes positions, and commands their velocities; this policy takes {n} states "
-            f"({', '.join(described.states)}) to {d} actions ({', '.join(described.actions)}), which are not that: to a "
-            "robot commanded by velocities, accelerations are wrong. Export it as C, ONNX or JavaScript, and use it "
-            "in a controller of yours that takes such actions; or learn velocities, with positions as states."
+            f"({', '.join(described.states)}) to {d} actions ({', '.join(described.actions)}), which are not that: "
+            "to a robot commanded by velocities, accelerations are wrong. Export it as C, ONNX or JavaScript, for use "
+            "in a controller that takes such actions; or learn velocities, with positions as states."
         )
     if kind == "pose" and (n, d) != (3, 3):
         raise SettingError(f"ros2: got {n} states and {d} actions, expected three of each for the position of a pose.")

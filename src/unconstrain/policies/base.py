@@ -17,7 +17,7 @@ from ..base.arrays import Array, Groups, beside, check_at_least, namespace, on_h
 from ..base.display import ShownWithSolution
 from ..base.errors import InvalidDataError, SettingError
 from ..base.estimators import checked_states
-from ..base.parameters import Parameters
+from ..base.parameters import Parameters, others_by_name
 from ..deployment import Deployable
 from ..learners import Learner, Robust, Solution, Uncertainty, named
 from ..models import FeatureMap, Model, Scale, spaces
@@ -73,8 +73,9 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
 
     # Learning: each works on a draft, which takes this policy's place when all has gone well.
 
+    @others_by_name
     def fit(
-        self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, groups: Groups | None = None
+        self, X: ArrayLike, y: ArrayLike, *, sample_weight: ArrayLike | None = None, groups: Groups | None = None
     ) -> Self:
         """Learn the unconstrained policy. If anything fails, this policy is as it was.
 
@@ -103,8 +104,9 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         began = draft._began(look, learner, more=False, seen=[checked])
         return self._become(began._learnt([checked], learner))
 
+    @others_by_name
     def partial_fit(
-        self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, groups: Groups | None = None
+        self, X: ArrayLike, y: ArrayLike, *, sample_weight: ArrayLike | None = None, groups: Groups | None = None
     ) -> Self:
         """Learn from a further batch; the sums are those of all batches at once.
 
@@ -253,7 +255,8 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         actions = self.predict(states)
         return actions[:, None] if self._flat else actions
 
-    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
+    @others_by_name
+    def score(self, X: ArrayLike, y: ArrayLike, *, sample_weight: ArrayLike | None = None) -> float:
         """Share of the observed motion that the policy, projected onto each action, explains.
 
         ``1 − E_i / Σ w uᵀu`` (eq. 4); 1 is best; parameters as in :meth:`fit`. R² punishes what constraints took.
