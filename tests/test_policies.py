@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from sklearn import config_context
 from sklearn.base import clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.exceptions import NotFittedError
@@ -143,9 +144,61 @@ def test_a_long_table_is_predicted_in_blocks_as_in_one(policy_of, data):
 def test_the_score_is_the_share_of_observed_motion_that_is_explained(data):
     policy = uc.ParametricPolicy().fit(data.states, data.actions)
     weights = np.random.default_rng(0).uniform(0, 1, 90)
-    missed = naive.inconsistency(data.actions, policy.predict(data.states), weights)
-    moved = sum(w * u @ u for w, u in zip(weights, data.actions, strict=True))
+    usual = np.sqrt(sum(w * u @ u for w, u in zip(weights, data.actions, strict=True)) / weights.sum())
+    weights_by_speed = [
+        w * min(1.0, np.linalg.norm(u) / (0.5 * usual)) ** 2 for w, u in zip(weights, data.actions, strict=True)
+    ]
+    missed = naive.inconsistency(data.actions, policy.predict(data.states), weights_by_speed)
+    moved = sum(w * u @ u for w, u in zip(weights_by_speed, data.actions, strict=True))
     assert policy.score(data.states, data.actions, sample_weight=weights) == pytest.approx(1 - missed / moved)
+
+
+def test_rest_does_not_spoil_the_score_of_the_true_policy():
+    rng = np.random.default_rng(0)
+    states = rng.uniform(-1, 1, (400, 2))
+    held = np.arange(400) % 2 == 0  # against a wall, where the policy pushes on, and what is recorded is noise
+    actions = np.where(held[:, None], 0.0, -states) + 1e-3 * rng.standard_normal((400, 2))
+    true = uc.ParametricPolicy(uc.Affine(), "direct").fit(states, -states)
+    plain = 1 - naive.inconsistency(actions, -states, np.ones(400)) / (actions**2).sum()
+    assert plain < 0.7
+    assert true.score(states, actions) > 0.99
+    wrong = uc.ParametricPolicy(uc.Affine(), "direct").fit(states, states)
+    assert wrong.score(states, actions) < 0
+
+
+def test_a_score_is_the_same_in_blocks_and_with_repetitions(data, monkeypatch):
+    policy = uc.ParametricPolicy(uc.Affine(), "direct").fit(data.states, data.actions)
+    actions = data.actions * np.logspace(-3, 0, 90)[:, None]
+    times = np.arange(90) % 3
+    whole = policy.score(data.states, actions, sample_weight=times)
+    assert whole == pytest.approx(policy.score(np.repeat(data.states, times, 0), np.repeat(actions, times, 0)))
+    monkeypatch.setattr("unconstrain.training.batches.BLOCK_ROWS", 7)
+    assert whole == pytest.approx(policy.score(data.states, actions, sample_weight=times))
+
+
+def test_a_score_of_no_motion_is_zero(data):
+    policy = uc.ParametricPolicy().fit(data.states, data.actions)
+    assert policy.score(data.states, np.zeros_like(data.actions)) == 0.0
+
+
+def test_groups_reach_every_fit_of_a_search_and_of_a_cross_validation(data):
+    seen = []
+
+    class Told(uc.LocallyLinearPolicy):
+        def fit(self, X, y, *, sample_weight=None, groups=None):
+            seen.append(None if groups is None else len(set(groups)))
+            return super().fit(X, y, sample_weight=sample_weight, groups=groups)
+
+    told = {"X": data.states, "y": data.actions, "cv": GroupKFold(3), "groups": data.groups}
+    cross_val_score(Told(learner="hybrid"), **told, params={"groups": data.groups})
+    assert seen == [4, 4, 4]
+    with config_context(enable_metadata_routing=True):
+        policy = Told(learner="hybrid").set_fit_request(groups=True)
+        grid = {"variance": [0.3, 3.0]}
+        GridSearchCV(policy, grid, cv=GroupKFold(3)).fit(data.states, data.actions, groups=data.groups)
+        assert seen[3:] == [4] * 6 + [6]
+        make_pipeline(StandardScaler(), policy).fit(data.states, data.actions, groups=data.groups)
+        assert seen[-1] == 6
 
 
 @pytest.mark.parametrize("method", ["fit", "partial_fit", "score"])
@@ -161,11 +214,6 @@ def test_groups_are_never_taken_for_weights(data, method):
 def test_groups_are_never_taken_for_weights_on_a_cluster(data):
     with pytest.raises(SettingError, match=r"fit\(states, actions, groups=groups\)"):
         uc.cluster.fit(uc.ParametricPolicy(learner="hybrid"), data.states, data.actions, data.groups)
-
-
-def test_a_score_of_no_motion_is_zero(data):
-    policy = uc.ParametricPolicy().fit(data.states, data.actions)
-    assert policy.score(data.states, np.zeros_like(data.actions)) == 0.0
 
 
 def test_demonstrations_are_groups(data):

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
-from ..base.arrays import Array, Groups, beside, check_at_least, namespace, on_host
+from ..base.arrays import Array, Groups, check_at_least, on_host
 from ..base.display import ShownWithSolution
 from ..base.errors import InvalidDataError, SettingError
 from ..base.estimators import checked_states
@@ -22,7 +22,7 @@ from ..deployment import Deployable
 from ..learners import Learner, Robust, Solution, Uncertainty, named
 from ..models import FeatureMap, Model, Scale, spaces
 from ..recordings import Demonstration, noise_of, preparation, stack, times_of
-from ..risks import Moments, unit_actions
+from ..risks import Moments, along_motion
 from ..training import Batch, FirstLook, Folds, Seen, Split, Training, Validation, cluster, is_typical
 
 Asked: TypeAlias = Sequence[float] | Literal["auto"] | None
@@ -257,24 +257,26 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
 
     @others_by_name
     def score(self, X: ArrayLike, y: ArrayLike, *, sample_weight: ArrayLike | None = None) -> float:
-        """Share of the observed motion that the policy, projected onto each action, explains.
+        """Share of the observed motion that the policy explains along it; 1 is best, 0 explains none.
 
-        ``1 − E_i / Σ w uᵀu`` (eq. 4); 1 is best; parameters as in :meth:`fit`. R² punishes what constraints took.
+        ``1 − Σ w (‖u‖ − ûᵀ π̃)² / Σ w ‖u‖²``, where a sample of less than half the usual length counts by the square of
+        its length: the direction of what rests is noise, and no policy's. It is what ``fit`` prints and verdicts judge;
+        :func:`~unconstrain.metrics.inconsistency` counts all alike (eq. 4). Parameters as in :meth:`fit`.
         """
         check_is_fitted(self, "solution_")
-        missed = moved = 0.0
-        for block in self._checked(X, y, sample_weight, reset=False).blocks():
-            directions, lengths = unit_actions(block.actions)
-            counts, along = beside(block.counts, lengths), directions * self._own(block.states)
-            missed += float(counts @ (lengths - namespace(lengths).sum(along, axis=1)) ** 2)
-            moved += float(counts @ lengths**2)
+        batch, missed, moved = self._checked(X, y, sample_weight, reset=False), 0.0, 0.0
+        energy = sum(float(one.counts @ (on_host(one.actions) ** 2).sum(axis=1)) for one in batch.blocks())
+        usual = np.sqrt(energy / max(batch.counts.sum(), 1e-300))
+        for one in batch.blocks():
+            found = along_motion(on_host(one.actions), on_host(self._own(one.states)), one.counts, usual)
+            missed, moved = missed + found[0], moved + found[1]
         return 1.0 - missed / moved if moved > 0 else 0.0
 
     def held_out_score(self) -> float:
         """:meth:`score` on each fold by what is learnt from the others; NaN where there is nothing to hold out.
 
-        From the moments alone, each local model by itself in its own field; by samples where the learner looks at them,
-        of which slow ones count less (:func:`~unconstrain.evaluation.metrics.along_motion`).
+        By samples where the learner looks at them, less of those below ten standard deviations of their noise; of other
+        learners from the moments alone, slow samples like all, each local model by itself in its own field.
         """
         check_is_fitted(self, "solution_")
         belief = self.solution_.belief
