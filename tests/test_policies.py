@@ -1,6 +1,7 @@
 """The estimators, as scikit-learn sees them and as a person does."""
 
 import pickle
+import warnings
 from dataclasses import replace
 from inspect import signature
 
@@ -432,3 +433,46 @@ def test_a_first_batch_that_does_not_move_leaves_folds_for_the_next():
     policy = uc.ParametricPolicy(uc.Affine()).partial_fit(np.ones((1, data.states.shape[1])), data.actions[:1])
     policy.partial_fit(data.states, data.actions)
     assert sum(part.weight.any() for part in policy.training_.gathered.parts) > 5
+
+
+def opposed(seed=0):
+    """Strokes that go up and down at the same places: no policy explains one by the others."""
+    x = np.linspace(0, 1, 30)
+    states = np.concatenate([np.column_stack([x, 0.01 * k + 0 * x]) for k in range(6)])
+    groups = np.repeat(np.arange(6), 30)
+    return states, np.column_stack([0 * groups, 1.0 - 2.0 * (groups % 2)]), groups
+
+
+def test_a_fit_that_explains_next_to_nothing_warns_once_and_notes_it():
+    states, actions, groups = opposed()
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        policy = uc.LocallyLinearPolicy(None).fit(states, actions, groups=groups)
+    assert policy.held_out_score() < 0.2
+    assert [one.category for one in said] == [UserWarning]
+    assert str(said[0].message) == policy.solution_.notes[-1]
+    assert "explains next to nothing of held-out motion" in policy.solution_.notes[-1]
+    fine = uc.LocallyLinearPolicy(None).fit(states, np.abs(actions), groups=groups)  # warnings are errors here
+    assert not any("next to nothing" in note for note in fine.solution_.notes)
+
+
+@pytest.mark.parametrize("learner", ["robust", "hybrid"])
+def test_learning_on_from_a_file_warns_where_samples_are_missed(data, tmp_path, learner):
+    uc.save(
+        uc.LocallyLinearPolicy(learner=learner).fit(data.states, data.actions, groups=data.groups), tmp_path / "p.npz"
+    )
+    stored = uc.load(tmp_path / "p.npz")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        for _ in range(2):
+            stored.partial_fit(data.states, data.actions, groups=data.groups + 10)
+    assert ["learnt from sums alone" in str(one.message) for one in said] == [True] * (learner == "robust")
+    with pytest.raises(SettingError, match="anew on all of them"):
+        stored.uncertainty(data.states[:1])
+
+
+def test_learning_on_in_memory_keeps_what_it_knows(data):
+    policy = uc.LocallyLinearPolicy().fit(data.states[:45], data.actions[:45], groups=data.groups[:45])
+    policy.partial_fit(data.states[45:], data.actions[45:], groups=data.groups[45:])
+    assert policy.uncertainty(data.states[:1]).total.shape == (1, 2)
+    policy.with_learner("hybrid")  # asked for: no warning

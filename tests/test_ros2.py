@@ -177,7 +177,7 @@ def test_an_orientation_is_refused(tmp_path):
 def test_actions_that_are_no_velocities_are_refused(tmp_path):
     data = draw(samples=300, policy=lambda x: -x, dimensions=4)
     policy = uc.ParametricPolicy(uc.Affine(), "direct").fit(data.states, data.actions[:, :2])
-    refused_as = "4 states .* to 2 actions .* accelerations are wrong. Export it as C, ONNX"
+    refused_as = "4 states .* 2 actions .* accelerations are wrong there. Export it as C, ONNX"
     for messages in (None, "joints", "pose"):
         with pytest.raises(SettingError, match=refused_as):
             policy.export_ros2(tmp_path / "reach", messages=messages)

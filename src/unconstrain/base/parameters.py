@@ -60,9 +60,8 @@ def others_by_name(method: Method) -> Method:
     def called(*given: Any, **named: Any) -> Any:
         if len(given) > 3:
             raise SettingError(
-                f"{method.__name__}: got {len(given) - 1} arrays, expected states and actions; say by name what the "
-                "others are. After states, actions, groups = uc.stack(demonstrations) it is "
-                f"{method.__name__}(states, actions, groups=groups); weights of samples are sample_weight=."
+                f"{method.__name__}: got {len(given) - 1} arrays, expected states and actions, others by name, as in "
+                f"{method.__name__}(states, actions, groups=groups), the three of uc.stack; weights are sample_weight=."
             )
         return method(*given, **named)
 

@@ -107,10 +107,9 @@ def _check(form: ClosedForm, kind: Messages, described: Description) -> None:
         raise SettingError("ros2: states hold an orientation; the node takes joints, or the position of a pose.")
     if n != d or _of_second_order(described):
         raise SettingError(
-            f"ros2: the node takes positions, and commands their velocities; this policy takes {n} states "
-            f"({', '.join(described.states)}) to {d} actions ({', '.join(described.actions)}), which are not that: "
-            "to a robot commanded by velocities, accelerations are wrong. Export it as C, ONNX or JavaScript, for use "
-            "in a controller that takes such actions; or learn velocities, with positions as states."
+            f"ros2: got {n} states ({', '.join(described.states)}) and {d} actions ({', '.join(described.actions)}), "
+            "expected positions and their velocities, which the node commands: accelerations are wrong there. Export "
+            "it as C, ONNX or JavaScript for a controller that takes such actions, or learn velocities of positions."
         )
     if kind == "pose" and (n, d) != (3, 3):
         raise SettingError(f"ros2: got {n} states and {d} actions, expected three of each for the position of a pose.")
@@ -119,9 +118,7 @@ def _check(form: ClosedForm, kind: Messages, described: Description) -> None:
 def _of_second_order(described: Description) -> bool:
     """Whether columns, by names or units, are accelerations, or velocities among the states."""
     plain = [bare(name) for name in described.states]
-    called = {f"a{name}" for name in plain}
-    accelerate = any(
-        bare(name) in called or _ACCELERATION.search(with_unit(name, described.units.get(name)))
-        for name in described.actions
-    )
-    return accelerate or not {speed_of(name) for name in plain}.isdisjoint(plain)
+    called = [with_unit(name, described.units.get(name)) for name in described.actions]
+    named = {bare(name) for name in called}.intersection(f"a{name}" for name in plain)
+    speeds = {*plain}.intersection(map(speed_of, plain))
+    return bool(speeds or named or any(map(_ACCELERATION.search, called)))

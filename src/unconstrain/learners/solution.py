@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
+from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,15 @@ from ..base.errors import MissingBeliefError
 
 if TYPE_CHECKING:
     from ..models import Model
+
+EXPLAINS_LITTLE = (
+    "The policy explains next to nothing of held-out motion (held_out_score {:.2g}), and nothing counts as determined: "
+    "demonstrations have too little in common, or columns, units or groups= are not what they should be."
+)
+LOST = (
+    "The samples of before are not in a stored policy: all is now learnt from sums alone, less well and without "
+    "uncertainty. Fit anew on all samples, or learn on from a copy or a pickle."
+)
 
 
 class Uncertainty(NamedTuple):
@@ -207,7 +217,7 @@ class Solution(Shown):
         if self.belief is None:
             raise MissingBeliefError(
                 f"noise: {self.method or 'this learner'} learnt from sums, which tell no noise and no free samples. "
-                "Fit with learner=Robust(), where it can see the samples."
+                "Fit with learner=Robust(), where it sees the samples: anew on all, and not on from a stored policy."
             )
         return self.belief
 
@@ -254,6 +264,18 @@ class Solution(Shown):
         """
         check_learnt(self.weights)
         return self
+
+    def warned(self, before: Solution | None) -> Solution:
+        """With a note, and a warning, of what makes it next to worthless; ``before`` learnt more from sums alone."""
+        from .robust.constants import LEAST_EXPLAINED  # imports this module
+
+        if before is not None and before.belief is not None and self.belief is None:
+            warn(LOST, stacklevel=7)
+        share = np.nan if self.belief is None else self.belief.held_out_score
+        if not share < LEAST_EXPLAINED:
+            return self
+        warn(note := EXPLAINS_LITTLE.format(share), stacklevel=7)
+        return replace(self, notes=(*self.notes, note))
 
     def in_units(self, action: float, weight: float) -> Solution:
         """With actions and sample weights measured in units ``1 / action`` and ``1 / weight`` as large."""
