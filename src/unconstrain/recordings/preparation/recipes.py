@@ -295,7 +295,8 @@ def _with_turning(recipe: Recipe, states: tuple[str, ...] | None) -> tuple[str, 
 def _names(what: str, names: Any) -> tuple[str, ...] | None:
     if names is None:
         return None
-    listed = (names,) if isinstance(names, str) else tuple(names) if isinstance(names, Iterable) else ()
+    given = [name.strip() for name in names.split(",")] if isinstance(names, str) else names
+    listed = tuple(given) if isinstance(given, Iterable) else ()
     if not listed or not all(isinstance(name, str) for name in listed) or len(set(listed)) < len(listed):
         raise SettingError(f"{what}: got {names!r}, expected names of columns, at least one and each once.")
     return listed
