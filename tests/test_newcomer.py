@@ -473,7 +473,7 @@ def test_a_start_without_support_is_warned_of_in_python(policy, starts):
     learnt, near = uc.load(policy), stroke(0)[5, 1:]
     first = 2 - np.ndim(starts)
     with pytest.warns(
-        uc.errors.SupportEndsWarning, match=r"\(900, 0\) \(support [^)]*\): what follows is extrap"
+        uc.errors.SupportEndsWarning, match=r"\(900, 0\) \(support [^)]*\): what follows is a guess"
     ) as said:
         uc.rollout(learnt, starts if first else [*starts, near], steps=3)
     assert len(said) == 1

@@ -98,11 +98,10 @@ def as_numbers(values: ArrayLike, what: str, convert: bool = True) -> Array:
 def as_seconds(values: Any, what: str) -> Array:
     """Time stamps (T,) as seconds; of dates, of NumPy, pandas or Python, those from the first on."""
     raw = np.asarray(values)
-    if raw.dtype.kind == "O" and raw.size:
+    if raw.dtype.kind == "O":
         with suppress(TypeError, AttributeError):  # numbers are no dates
             raw = np.array([(one - raw.flat[0]).total_seconds() for one in raw.flat])
-    if raw.dtype.kind == "M":
-        raw = raw - raw.flat[:1]
+    raw = raw - raw.flat[:1] if raw.dtype.kind == "M" else raw
     return as_numbers(raw / np.timedelta64(1, "s") if raw.dtype.kind == "m" else raw, what)
 
 

@@ -59,10 +59,8 @@ def others_by_name(method: Method) -> Method:
     @wraps(method)
     def called(*given: Any, **named: Any) -> Any:
         if len(given) > 3:
-            raise SettingError(
-                f"{method.__name__}: got {len(given) - 1} arrays, expected states and actions, others by name, as in "
-                f"{method.__name__}(states, actions, groups=groups), the three of uc.stack; weights are sample_weight=."
-            )
+            said = f"{(name := method.__name__)}: got {len(given) - 1} arrays, expected two, and the others by name, as"
+            raise SettingError(f"{said} {name}(states, actions, groups=groups) after uc.stack, or sample_weight=.")
         return method(*given, **named)
 
     return called  # type: ignore[return-value]  # of the same signature, for who reads it

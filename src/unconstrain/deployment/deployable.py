@@ -110,8 +110,7 @@ class Exportable:
         Raises
         ------
         SettingError
-            Also if actions are not the velocities of the states (other numbers of them, or accelerations by their names
-            or units), if states are orientations, or those of a pose are not three with three actions.
+            Also if actions are not velocities of the states, or states are orientations, or not the three of a pose.
         """
         form = self.closed_form(scaler)
         export_ros2(form, self._after(scaler), folder, name, self.describe(form, notes), messages)

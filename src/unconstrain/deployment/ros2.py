@@ -28,9 +28,7 @@ _MESSAGES = {
 }
 """Messages that come in and go out."""
 
-_ACCELERATION = re.compile(
-    r"accel|ddot|(^|[^a-z])(acc([^a-z]|$)|dd)|[a-z]dd[_.]?\d|/ ?s(\^|\*\*)?[2²]|/s/s", re.IGNORECASE
-)
+_ACCELERATION = re.compile(r"(?i)accel|ddot|(^|[^a-z])(acc([^a-z]|$)|dd)|[a-z]dd[_.]?\d|/ ?s(\^|\*\*)?[2²]|/s/s")
 """What a column of accelerations is called, or its unit: ``"qdd1"``, ``"x_ddot"``, ``"acc_x"``, ``"u1 (m/s^2)"``."""
 
 _PLACES = {
@@ -120,5 +118,4 @@ def _of_second_order(described: Description) -> bool:
     plain = [bare(name) for name in described.states]
     called = [with_unit(name, described.units.get(name)) for name in described.actions]
     named = {bare(name) for name in called}.intersection(f"a{name}" for name in plain)
-    speeds = {*plain}.intersection(map(speed_of, plain))
-    return bool(speeds or named or any(map(_ACCELERATION.search, called)))
+    return bool(named or {*plain}.intersection(map(speed_of, plain)) or any(map(_ACCELERATION.search, called)))

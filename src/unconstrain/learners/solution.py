@@ -16,14 +16,8 @@ from ..base.errors import MissingBeliefError
 if TYPE_CHECKING:
     from ..models import Model
 
-EXPLAINS_LITTLE = (
-    "The policy explains next to nothing of held-out motion (held_out_score {:.2g}), and nothing counts as determined: "
-    "demonstrations have too little in common, or columns, units or groups= are not what they should be."
-)
-LOST = (
-    "The samples of before are not in a stored policy: all is now learnt from sums alone, less well and without "
-    "uncertainty. Fit anew on all samples, or learn on from a copy or a pickle."
-)
+EXPLAINS_LITTLE = "The policy explains next to nothing of held-out motion ({:.2g}): look at columns, units and groups=."
+LOST = "Samples of before are not stored: all is learnt from sums alone, less well, without uncertainty. Fit all anew."
 
 
 class Uncertainty(NamedTuple):
@@ -270,11 +264,10 @@ class Solution(Shown):
         from .robust.constants import LEAST_EXPLAINED  # imports this module
 
         if before is not None and before.belief is not None and self.belief is None:
-            warn(LOST, stacklevel=7)
-        share = np.nan if self.belief is None else self.belief.held_out_score
-        if not share < LEAST_EXPLAINED:
+            warn(LOST, stacklevel=8)
+        if self.belief is None or not self.belief.held_out_score < LEAST_EXPLAINED:
             return self
-        warn(note := EXPLAINS_LITTLE.format(share), stacklevel=7)
+        warn(note := EXPLAINS_LITTLE.format(self.belief.held_out_score), stacklevel=8)
         return replace(self, notes=(*self.notes, note))
 
     def in_units(self, action: float, weight: float) -> Solution:

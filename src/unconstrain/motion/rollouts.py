@@ -233,8 +233,5 @@ def _warn_of_starts(starts: Array, support: Array, least: float) -> None:
         return
     where = ", ".join(f"{each:.4g}" for each in starts[away[0]])
     many = f" {away.size} of {len(starts)} starts, the first" if len(starts) > 1 else ""
-    said = (
-        f"nothing was demonstrated near{many} ({where}) (support {support[away[0]]:.2g}): what follows is extrapolated"
-    )
-    cures = "Start nearer, demonstrate there, guide the policy (uc.Guided), or leave off this warning: least_support=0."
-    warn(f"{said}. {cures}", SupportEndsWarning, stacklevel=4)
+    said = f"nothing was demonstrated near{many} ({where}) (support {support[away[0]]:.2g}): what follows is a guess. "
+    warn(said + "Start nearer, or guide the policy (uc.Guided); least_support=0 does not warn.", SupportEndsWarning, 4)

@@ -115,8 +115,8 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         The first batch, which should be typical, fixes features, fields, action dimensions, the spread by which samples
         are dealt into folds, and a scale that is ``"auto"``; a later one that is unlike in it is warned of. Batches of
         too few different states are kept until there are enough. Parameters, result and errors as in :meth:`fit`. The
-        solution is found anew each time; where only the last counts, :meth:`fit_batches` is faster. Warns, too, where
-        a learner that looks at samples goes on from a stored policy, which has their sums alone.
+        solution is found anew each time; where only the last counts, :meth:`fit_batches` is faster. Warns, too, if that
+        is from sums alone after samples, as of a stored policy.
         """
         first, learner, draft = not hasattr(self, "solution_"), named(self.learner), self._draft()
         batch = draft._checked(X, y, sample_weight, groups, reset=first)
@@ -416,7 +416,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
 
     def _solved(self, learner: Learner) -> Self:
         own = learner if self.scale_ is None else learner.within(self.scale_)
-        self.solution_ = own.solve(self.training_).warned(vars(self).get("solution_") if own.uses_samples else None)
+        self.solution_ = own.solve(self.training_, vars(self).get("solution_"))
         return self
 
     def _check_speed_power(self, speed_power: float) -> Learner:

@@ -79,8 +79,7 @@ class Recording(Shown):
                 f"recording{of}: got values of shape {values.shape}{stamps} and {counted(len(columns), 'name')} of "
                 f"columns ({listed(columns)}), expected a name for each column and a time for each row."
             )
-        for name, given in (("columns", columns), ("values", values), ("times", times)):
-            object.__setattr__(self, name, given)
+        vars(self).update(columns=columns, values=values, times=times)
 
     def __len__(self) -> int:
         return len(self.values)
