@@ -467,7 +467,7 @@ def test_learning_on_from_a_file_warns_where_samples_are_missed(data, tmp_path, 
         for _ in range(2):
             stored.partial_fit(data.states, data.actions, groups=data.groups + 10)
     assert ["all is learnt from sums alone" in str(one.message) for one in said] == [True] * (learner == "robust")
-    with pytest.raises(SettingError, match="anew on all of them"):
+    with pytest.raises(SettingError, match="anew on all, and not on from a stored policy"):
         stored.uncertainty(data.states[:1])
 
 
