@@ -81,6 +81,20 @@ def test_a_start_in_degrees_is_told_and_one_in_radians_is_not(turned, tmp_path):
     assert "radians" not in text(call(*given, "--start", "98.61,0,1.721"))
 
 
+def test_a_goal_in_degrees_is_told_and_one_in_radians_is_not(tmp_path):
+    times, goal = np.linspace(0.0, 4.0, 80)[:, None], np.array([30.0, 45.0])
+    for k, begin in enumerate(((90.0, 20.0), (40.0, -70.0), (-60.0, 50.0), (10.0, 80.0))):
+        states = goal + (begin - goal) * np.exp(-times)
+        write(tmp_path / f"j{k}.csv", "t,q1 [deg],q2 [deg]", np.hstack([times, states]))
+    fit = ("fit", tmp_path, *LINEAR, "-o", tmp_path.parent / "goal.npz", "--force", "--guided")
+    said = text(call(*fit, "30,45"))
+    assert "--guided: 30 is far outside radians, which the policy takes for q1 [deg]; if it is in degrees" in said
+    assert "that is 0.5236" in said
+    assert "that is 0.7854" in said
+    assert "far outside radians" not in text(call(*fit, "0.5236,0.7854"))
+    assert "far outside radians" not in text(call(*fit, "auto"))
+
+
 def test_a_movement_says_its_unit_and_is_scored_as_what_it_is(turned, tmp_path):
     moved, policy = tmp_path / "r.csv", turned.parent / "p.npz"
     run("rollout", policy, "--start", "0,0,1.721", "--least-support", 0, "-o", moved)

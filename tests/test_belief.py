@@ -220,6 +220,35 @@ class TestHinge:
         open_ = np.sqrt(np.einsum("na,nab,nb->n", outwards, policy.covariances(states), outwards))
         assert np.median(open_) > 0.5 * np.sqrt((uc.stack(demos).actions ** 2).sum(axis=1).mean())
 
+    @staticmethod
+    def of_three(seed, free=0):
+        """Ten demonstrations, the first of them free, the others about one of three hinges each."""
+        rng = np.random.default_rng(seed)
+        places = rng.uniform(-1.5, 1.5, (3, 2))
+        often, far, demos = 2 * rng.uniform(1, 3), rng.uniform(0.3, 0.8), []
+
+        def bent(x):
+            aside = far * np.column_stack([np.sin(often * x[:, 1]), np.cos(often * x[:, 0]) - 1.0])
+            return x @ [[-1.0, 1.5], [-1.5, -1.0]] + aside
+
+        for k in range(10):
+            about = None if k < free else lambda states, times, k=k: (states - places[k % 3])[:, None, :]
+            one = uc.rollout(bent, rng.uniform(-1, 1, 2), 120, 0.025, about)
+            noise = 0.02 * np.sqrt((one.actions**2).mean()) * rng.standard_normal(one.actions.shape)
+            demos.append(uc.Demonstration(one.states, one.actions + noise, one.times))
+        return demos
+
+    @pytest.mark.parametrize("seed", [8, 10])
+    def test_doors_about_several_hinges_are_not_free(self, seed):
+        demos = self.of_three(seed)
+        assert uc.LocallyLinearPolicy().fit_demonstrations(demos).solution_.believed.free_share < 0.01
+
+    def test_who_is_free_beside_doors_is_found(self):
+        demos = self.of_three(7, free=4)
+        believed = uc.LocallyLinearPolicy().fit_demonstrations(demos).solution_.believed
+        assert believed.free_share > 0.2
+        assert believed.free[480:].mean() < 0.2 < 0.5 < believed.free[:480].mean()
+
     def test_the_hinge_is_found_to_centimetres(self):
         states, actions, _ = uc.stack(swung(1))
         assert_allclose(pivot_of(states, actions), HINGE, atol=0.03)

@@ -283,6 +283,23 @@ def test_a_gap_in_time_alone_is_no_reason_to_doubt(tmp_path):
     assert run("inspect", *asked).startswith("! 1 of 4 demonstrations not as it should be: ")
 
 
+@pytest.mark.parametrize(("tilts", "mark"), [((0.0,) * 4, "!"), ((0.5, -0.5, 0.3, -0.2), "✔")])
+def test_it_agrees_with_diagnose_and_leaves_to_it_what_recordings_tell(tmp_path, tilts, mark):
+    time = np.linspace(0, 4, 60)
+    for k, tilt in enumerate(tilts):
+        x, y = np.cos(2 * time + k) + 0.1 * k, np.sin(2 * time + k)
+        table = np.column_stack([time, x, y, tilt * (x if k % 2 else y)])
+        np.savetxt(tmp_path / f"wipe_{k}.csv", table, delimiter=",", header="t,x,y,z", comments="")
+    files = sorted(tmp_path.glob("wipe_?.csv"))
+    said = run("look", *files, "-o", tmp_path / "a.html")
+    whole = " ".join(said.split())
+    assert said.startswith(f"{mark} 4 demonstrations, nothing odd: ready to learn from.")
+    assert "What recordings tell of a policy, 'unconstrain diagnose' judges." in whole
+    flat = "All demonstrations lie on one plane or parallel ones"
+    judged = " ".join(run("diagnose", *files, "--model", "affine").split())
+    assert [flat in whole, flat in judged, judged.startswith("✖")] == [mark == "!"] * 3
+
+
 def test_regions_count_demonstrations_not_samples(browser, tmp_path):
     ways = np.linspace(0, 1, 50)[:, None] * [1.0, 0.0], np.linspace(0, 0.5, 80)[:, None] * [1.0, 0.0]
     demos = [uc.Demonstration(way, np.ones((len(way), 2))) for way in ways]

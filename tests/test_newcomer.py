@@ -214,7 +214,7 @@ def test_a_folder_stands_for_its_own_files_and_says_what_lies_below(folder, tmp_
 def test_what_holds_of_many_recordings_is_said_once_and_counted(tmp_path):
     for k in range(4):
         write(tmp_path / f"w{k}.csv", HEAD, stroke(k, jitter=0.2))
-    ran = call("fit", tmp_path, *LINEAR, "-o", tmp_path.parent / "p.npz")
+    ran = call("fit", tmp_path, *LINEAR, "-o", tmp_path.parent / "jittery.npz")
     first, others = [line for line in ran.err.splitlines() if "irregular" in line]
     assert first.startswith(
         "Note: irregular: 'w0': time stamps are irregular, so it is resampled to its median rate of"
@@ -317,11 +317,19 @@ def test_auto_takes_the_default_model_where_that_explains_more_held_out(folder, 
     assert json.loads(run("info", tmp_path / "p.npz", "--json"))["holds"] == kind
 
 
-def test_the_page_of_a_fit_says_which_model_was_taken(folder, tmp_path):
-    run("fit", folder, "-o", tmp_path / "p.npz", "--report", tmp_path / "p.html")
-    assert "Affine policy" in (tmp_path / "p.html").read_text()
-    run("fit", folder, "-o", tmp_path / "q.npz", "--variance", "2e4", "--report", tmp_path / "q.html")
-    assert "Locally linear policy" in (tmp_path / "q.html").read_text()
+@pytest.mark.parametrize(
+    ("how", "which"),
+    [
+        ((), "one affine model for all states"),
+        (("--variance", "2e4"), "local models of σ² 2e+04"),
+        (("--model", "cubic"), "Polynomial(degree=3"),
+    ],
+)
+def test_the_page_of_a_fit_says_which_model_was_taken_as_info_does(folder, tmp_path, how, which):
+    run("fit", folder, *how, "-o", tmp_path / "p.npz", "--report", tmp_path / "p.html")
+    model = json.loads(run("info", tmp_path / "p.npz", "--json"))["model"]
+    assert which in model
+    assert f"A policy of {model} by the " in " ".join((tmp_path / "p.html").read_text("utf-8").split())
 
 
 def test_files_of_which_nobody_said_what_is_what_are_not_to_be_left_out(tmp_path):

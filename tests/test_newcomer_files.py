@@ -143,6 +143,29 @@ def test_a_recording_that_ends_a_fit_is_named_with_what_leaves_it_out_and_then_f
     run("fit", *fit, "--leave-out", "odd one")
 
 
+@pytest.mark.parametrize("name", ["cannot tell states", "a' has b", "w, x: 1"])
+def test_what_a_file_is_called_does_not_change_what_cures_it(tmp_path, name):
+    write(tmp_path / "w0.csv", "t,x,y", stroke(0))
+    odd = stroke(1)
+    odd[3, 1] = np.nan
+    file = write(tmp_path / f"{name}.csv", "t,x,y", odd)
+    said = refused("fit", tmp_path, *READ, "-o", tmp_path / "p.npz")
+    assert said.startswith(f"{file}, row 3 (line 5), column 'x': found nan")
+    assert said.endswith(f" Or leave it out: --leave-out {shlex.quote(name)}")
+    said = refused("fit", tmp_path, "--state", "x,z", "--differentiate", "-o", tmp_path / "p.npz")
+    assert "has no column 'z'" in said
+    assert "--leave-out" not in said
+
+
+def test_states_without_actions_are_not_cured_by_leaving_a_file_out(tmp_path):
+    for k in range(2):
+        write(tmp_path / f"s{k}.csv", "t,a,b", stroke(k))
+    said = refused("fit", tmp_path, "--state", "a,b", "-o", tmp_path / "p.npz")
+    assert said.startswith(f"{tmp_path / 's0.csv'}: cannot tell the actions from its columns a, b.")
+    assert said.endswith(" 'unconstrain inspect' proposes a command.")
+    assert "--differentiate -o policy.npz" in text(call("inspect", tmp_path, "--state", "a,b"))
+
+
 def test_inspect_counts_what_still_leaves(tmp_path):
     rows = stroke(0)
     begins = np.vstack([np.tile(rows[0], (20, 1)), rows])

@@ -43,6 +43,11 @@ def oval(number, seconds=8.0, **how):
     return np.column_stack([done.times, done.states + rng.standard_normal(done.states.shape)])
 
 
+def words(said):
+    """Without the ends of lines."""
+    return " ".join(said.split())
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Ovals to be scored on, and policies learnt from others, as large and fast as these or not."""
@@ -158,14 +163,37 @@ def test_a_score_says_that_what_was_learnt_is_too_slow(folder):
     assert found["verdict"]["mark"] != "good"
 
 
-@pytest.mark.parametrize(("head", "unit"), [("t,x,y,z", "(unit of the states)"), (HEAD, "mm")])
-def test_how_far_off_a_policy_runs_says_of_what_and_in_which_unit(tmp_path, head, unit):
-    file = write(tmp_path / "oval.csv", head, oval(3))
-    run("fit", file, "--state", "x,y,z", "--by", "savgol", "--model", "affine", "-o", tmp_path / "p.npz")
-    assert (
-        f" {unit} from the recorded path"
-        in json.loads(run("score", tmp_path / "p.npz", file, "--json"))["verdict"]["said"]
+@pytest.mark.parametrize(
+    ("head", "unit"),
+    [
+        ("t,x,y,z", ""),
+        (HEAD, "mm"),
+        ("t,x [cm],y [cm],z [cm]", "cm"),
+        ("t,x_mm,y_mm,z_mm", "mm"),
+        ("t,x_mm,y_mm,z", ""),
+        ("t,x_m,y_m,z_m", ""),  # measured, or metres
+    ],
+)
+def test_lengths_and_velocities_are_told_in_the_unit_of_the_columns(tmp_path, head, unit):
+    file, states = write(tmp_path / "oval.csv", head, oval(3)), head.partition(",")[2]
+    how, goal = (file, "--state", states, "--by", "savgol"), ("rollout", tmp_path / "p.npz", "--start", "60,0,9")
+    said = words(run("fit", *how, "--model", "affine", "--guided", "0,0,0", "-o", tmp_path / "p.npz"))
+    far, speed = unit or "(unit of the states)", f"{unit}/s" if unit else ""
+    assert f" {far} from the recorded path" in said
+    assert re.search(
+        rf"Noise and misfit are about [\d.e-]+ {f'{speed} on each action, and' if unit else 'on each'}", said
     )
+    assert re.search(rf"It ends [\d.e-]+ {re.escape(far)} from the goal", words(call(*goal, "--steps", 3).err))
+    assert re.search(rf" noise [\d.e-]+ {speed or 'guided'} ", words(run("info", tmp_path / "p.npz")))
+    learnt = f" {speed}".rstrip()
+    said = words(run("diagnose", *how, "--model", "affine"))
+    assert re.search(
+        rf", [\d.e-]+{learnt} on each action coordinate, \S+ of a typical action \([\d.e]+{learnt}\)", said
+    )
+    said = words(run("constraint", *how, "--features", "constant", "-o", tmp_path / "c.npz"))
+    assert re.search(rf"misfit along them are about [\d.e-]+{learnt} of action, and", said)
+    said = words(run("constraint", *how, "--surface", "-o", tmp_path / "s.npz"))
+    assert re.search(rf"are about [\d.e-]+{unit and f' {unit}'} of distance from it, and", said)
 
 
 @pytest.mark.parametrize(
@@ -320,7 +348,22 @@ def test_one_swing_may_be_a_habit_and_then_the_directions_learnt_are_followed(do
         told = " ".join(call(*ran, "--constraint", tmp_path / "c.npz").err.split())
         assert told.count("c.npz: Whether anything was held cannot be told") == 1
         assert "Do not trust: That 1 of 3 are held." in told
-        assert "Whether anything was held" not in call(*ran, "--constraint", place / "c.npz").err
+        assert told.count("c.npz: holds to the directions that were learnt, not to a circle (hinge), which") == 1
+        assert "Whether anything was held" not in (sure := call(*ran, "--constraint", place / "c.npz").err)
+        assert "holds to the directions" not in sure
+
+
+def test_a_task_that_was_learnt_is_followed_in_place_of_the_mechanism_and_that_is_said(door, tmp_path):
+    place, files = door[0], [door[0] / f"{k}.csv" for k in range(3)]
+    order = ("constraint", *files, "--state", "x,y,z", "--differentiate", "--with-task", "-o", tmp_path / "c.npz")
+    said = " ".join(run(*order).split())
+    assert "Positions may keep to a circle (hinge), which holds 2 of 3" in said
+    assert "follows the mechanism" not in said
+    assert "rollout --constraint follows the directions that were learnt" in said
+    assert "follows the mechanism" not in run("info", tmp_path / "c.npz")
+    start = ("rollout", place / "p.npz", "--start", ",".join(map(str, swing(0)[0, 1:])), "--steps", 3)
+    told = call(*start, "--constraint", tmp_path / "c.npz").err
+    assert "c.npz: holds to the directions that were learnt, not to a circle (hinge), which was named" in told
 
 
 @pytest.mark.parametrize(("by", "said"), [(0.3, False), (30.0, True)])

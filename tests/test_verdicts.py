@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.linalg import expm
 
 import unconstrain as uc
 from samples import PLATES, off_everywhere, on_plates, turning
@@ -15,7 +16,7 @@ from seen import below
 from unconstrain import cli
 from unconstrain.base.errors import InvalidDataError
 from unconstrain.evaluation import diagnosis, verdicts
-from unconstrain.evaluation.verdicts import FAIR, GOOD, Mark
+from unconstrain.evaluation.marks import FAIR, GOOD, Mark
 from unconstrain.recordings import Recording
 
 shares = st.floats(-1.0, 1.0)
@@ -196,7 +197,32 @@ def test_fit_and_score_agree_on_a_policy_that_is_not_told_across(folder, tmp_pat
     assert "held-out motion: good along the motion, but across it" in said["said"]
     assert verdicts.of_score(1.0, 5, told=0.5).mark is Mark.DOUBTFUL
     assert verdicts.of_score(1.0, 5, told=0.9).mark is Mark.GOOD
-    assert verdicts.of_score(1.0, 5, 0.95, told=0.5).mark is Mark.GOOD  # under the constraint that is all there is
+    under = verdicts.of_score(1.0, 5, 0.95, told=0.5)  # which says nothing of other constraints
+    assert under.mark is Mark.DOUBTFUL
+    assert ": good under this one, but of movement under others recordings tell too little." in under.said
+    assert "under other constraints: at 50% of the recorded states no recording tells the policy" in under.doubt
+    assert verdicts.of_score(1.0, 5, 0.95, told=0.96).mark is Mark.GOOD
+
+
+@pytest.mark.parametrize(("tilts", "mark"), [((0.0,) * 6, "doubtful"), ((0.0, 0.6, -0.6, 0.4, -0.4, 0.2), "good")])
+def test_a_score_stands_as_well_with_the_plane_as_without_and_as_the_policy_is(tmp_path, tilts, mark):
+    times, rng = np.arange(0.0, 3.0, 0.05), np.random.default_rng(1)
+    true = np.array([[-1.0, 0.8, 0.0], [-0.8, -1.0, 0.0], [0.0, 0.0, -1.2]])
+    for number, tilt in enumerate((*tilts, 0.0)):  # the last is scored on
+        normal = np.array([np.sin(tilt) * np.cos(number), np.sin(tilt) * np.sin(number), np.cos(tilt)])
+        slides, start = (np.eye(3) - np.outer(normal, normal)) @ true, rng.uniform(-1, 1, 3)
+        path = np.array([expm(slides * time) @ start for time in times]) + rng.normal(0, 2e-4, (60, 3))
+        table = np.column_stack([times, path])
+        np.savetxt(tmp_path / f"w{number}.csv", table, delimiter=",", header="t,x,y,z", comments="")
+    files = [tmp_path / f"w{number}.csv" for number in range(6)]
+    assert call("fit", *files, "--model", "affine", "-o", tmp_path / "p.npz").exit_code == 0
+    asked = ("score", tmp_path / "p.npz", tmp_path / "w6.csv", "--json")
+    assert [json.loads(call(*asked, *more).stdout)["verdict"]["mark"] for more in ((), ("--plane", "0,0,1"))] == [
+        mark
+    ] * 2
+    states = rng.uniform(-1, 1, (200, 3))
+    missed = ((uc.load(tmp_path / "p.npz")(states) - states @ true.T) ** 2).sum() / ((states @ true.T) ** 2).sum()
+    assert (missed < 0.05) == (mark == "good")
 
 
 @pytest.mark.parametrize(("times", "said"), [(1000, "metres"), (1 / 900, "metres"), (60, "degrees"), (1, ""), (9, "")])

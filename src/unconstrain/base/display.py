@@ -70,7 +70,14 @@ def with_unit(name: str, unit: str | None) -> str:
     """A column's name with its unit, ``"x (mm)"``; as it is where it says one, but ``"yaw [deg]"`` in rad is not."""
     short = bare(name)
     turned = bool(unit and unit.startswith("rad")) and re.match(r"\W*(deg|[°º])", name[len(short) :], re.IGNORECASE)
-    return f"{short} ({unit})" if unit and (short == name or turned) else name
+    said = short != name or unit_of([name]) == unit
+    return f"{short} ({unit})" if unit and (turned or not said) else name
+
+
+def unit_of(names: Iterable[str]) -> str:
+    """The unit that all names of columns say, ``"mm"`` of ``"x [mm]"`` and ``"x_mm"``; empty where they say none."""
+    units = {"".join(re.findall(r"_(mm|cm|deg|rad)$", one)) or one[len(bare(one)) :].strip(" ()[]") for one in names}
+    return units.pop() if len(units) == 1 else ""
 
 
 def bare(name: str) -> str:

@@ -58,6 +58,18 @@ class SettingError(UnconstrainError, ValueError):
     """A parameter outside its range, or a name that does not exist."""
 
 
+class UntoldError(SettingError):
+    """Columns of a recording that do not tell which are states and which actions."""
+
+    cure = " 'unconstrain inspect' proposes a command."
+
+
+class LackingError(InvalidDataError, SettingError):
+    """A column or time stamps that a recording lacks, and those beside it may lack too: left out, nothing is cured."""
+
+    cure = ""
+
+
 class MissingBeliefError(SettingError, AttributeError):
     """Something that only a learner which looks at the samples can tell."""
 

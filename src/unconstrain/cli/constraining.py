@@ -12,10 +12,10 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import bare, listed
+from ..base.display import bare, listed, unit_of
 from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
-from .informing import HELD_BY, OF, SHOWN, WHERE, WOUND, provenance, verdict_of
+from .informing import HELD_BY, NAMED, OF, SHOWN, WHERE, WOUND, provenance, verdict_of
 from .printing import of_option, option_for_json, print_table, refuse_warnings, say_verdict, say_written
 from .progress import shown
 from .reading import loaded, numbers, of_words, options_for_reading, prepared, said_recipe, with_options
@@ -32,6 +32,7 @@ LENGTHS = ("", "m", "mm", "cm", "um", "km", "in", "ft")
 
 FOLLOWED = "rollout --constraint and score --constraint hold to that mechanism, in parallel through the start."
 NOT_FOLLOWED = "That names the positions; rollout --constraint follows the directions that were learnt, as said first."
+MAY_LEAVE = "holds to the directions that were learnt, not to {}, which was named: a movement may leave that."
 
 FEATURES = ("auto", "constant", "affine", "quadratic", "rbf")
 
@@ -91,10 +92,10 @@ def constraint(
     if not as_json:
         say_verdict(verdict)
         click.echo(f"Learnt from {said_recipe(recipe, first)}.")
-        _say(learnt, "distance from it" if surface else "action", named)
+        _say(learnt, surface, recipe.labels(first.units), named)
     notes = provenance(paths, recipe, first, **reading) | {WOUND: wound}
     for name, place in outputs.items():
-        uc.save(learnt[name], place, notes | _of(name, named, demonstrations))
+        uc.save(learnt[name], place, notes | _of(name, learnt[name], named, demonstrations))
     written = {f"constraint of {name}" if name else "constraint": place for name, place in outputs.items()}
     if report is not None:
         _report(report, learnt, demonstrations, recipe.labels(first.units)[0], named, verdict)
@@ -102,15 +103,14 @@ def constraint(
     say_written(written, _told(learnt, verdict, named) if as_json else None)
 
 
-def _of(name: str, named: Named | None, demonstrations: Sequence[uc.Demonstration]) -> dict[str, Any]:
+def _of(
+    name: str, learnt: uc.LearntConstraint, named: Named | None, demonstrations: Sequence[uc.Demonstration]
+) -> dict[str, Any]:
     """What a file notes of the demonstration that it is of, of where that was, and of the mechanism."""
     states = uc.stack([one for one in demonstrations if name in ("", one.name)]).states
-    where = {WHERE: [states.min(axis=0).tolist(), states.max(axis=0).tolist()]}
-    return (
-        where
-        | {OF: [name] if name else [one.name for one in demonstrations]}
-        | ({} if named is None else named.notes(name))
-    )
+    told = {WHERE: [states.min(axis=0).tolist(), states.max(axis=0).tolist()]}
+    told[OF] = [name] if name else [one.name for one in demonstrations]
+    return told if named is None else told | named.notes(name, learnt)
 
 
 def _judged(
@@ -120,7 +120,7 @@ def _judged(
     shown, rank = None if named is None else named.shown, max(one.rank_ for one in learnt.values())
     found = uc.evaluation.verdicts.of_constraint(*learnt.values(), shown=shown, wound=wound)
     judged = uc.evaluation.verdicts.of_mechanism
-    return found if named is None else judged(found, rank, named.found.mechanism, bool(named.shown))
+    return found if named is None else judged(found, rank, named.found.mechanism, named.is_followed(learnt))
 
 
 def _report(
@@ -231,6 +231,8 @@ def held_of(
         click.echo(f"Note: {path}: {said}", err=True)
     if (judged := verdict_of(learnt, notes)).mark is not uc.evaluation.verdicts.Mark.GOOD:
         click.echo(f"Note: {path}: {judged.said} {f'Do not trust: {judged.doubt}' * bool(judged.doubt)}", err=True)
+    if notes.get(NAMED):
+        click.echo(f"Note: {path}: {MAY_LEAVE.format(notes[NAMED])}", err=True)
     return learnt if learnt.task or HELD_BY not in notes else uc.constraints.mechanisms.restored(notes[HELD_BY])
 
 
@@ -278,12 +280,20 @@ class Named(NamedTuple):
         decided = self.found.decided and self.found.mechanism.rank
         return False if not decided else None if self.found.doubt else True
 
-    def notes(self, name: str) -> dict[str, Any]:
+    def is_followed(self, learnt: Mapping[str, uc.LearntConstraint]) -> bool:
+        """Whether each of what was learnt, by name, is held by the mechanism, not by the directions learnt."""
+        one = len(self.found.candidates[0].mechanisms) == 1
+        return bool(self.shown) and all((one or name) and not each.task for name, each in learnt.items())
+
+    def notes(self, name: str, learnt: uc.LearntConstraint) -> dict[str, Any]:
         """What goes into the file of one demonstration, or of all together: words, and numbers where it is sure."""
         mechanisms = self.found.candidates[0].mechanisms
         own = mechanisms[self.names.index(name)] if name and len(mechanisms) > 1 else mechanisms[0]
         told = {"mechanism": dict(self.each).get(name, self.found.summary), SHOWN: self.shown}
-        return told | ({HELD_BY: own.numbers()} if self.shown and (name or len(mechanisms) == 1) else {})
+        if self.is_followed({name: learnt}):
+            return told | {HELD_BY: own.numbers()}
+        more = self.shown is not False and (own.rank > learnt.rank_ or own.form.straight is not None)
+        return told | ({NAMED: own.title} if more else {})
 
     @property
     def each(self) -> list[tuple[str, str]]:
@@ -311,7 +321,7 @@ def mechanism_of(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe, 
     positions, groups = positions[moves], groups[moves]
     every = -(-len(positions) // MOST_POSITIONS)
     try:
-        unit = _unit_of([first.units.get(name, "") for name in names])
+        unit = _length_of([recipe.units(first.units).get(name, "") for name in names])
         found = uc.constraints.identify(positions[::every], groups=groups[::every], unit=unit)
         if found.mechanism.rank == len(names):
             raise InvalidDataError("positions keep to a point, which would hold every motion.")
@@ -321,7 +331,7 @@ def mechanism_of(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe, 
     return Named(found, [demonstrations[number].name for number in sorted({*groups[::every].tolist()})], names[-1])
 
 
-def _unit_of(units: Sequence[str]) -> str:
+def _length_of(units: Sequence[str]) -> str:
     """Of lengths, as the columns say it; empty where they do not."""
     [unit, *others] = dict.fromkeys(unit.lower() for unit in units)
     if others or unit not in LENGTHS:
@@ -331,13 +341,16 @@ def _unit_of(units: Sequence[str]) -> str:
     return unit
 
 
-def _say(learnt: Mapping[str, uc.LearntConstraint], what: str, named: Named | None) -> None:
+def _say(
+    learnt: Mapping[str, uc.LearntConstraint], surface: bool, labels: Sequence[Sequence[str]], named: Named | None
+) -> None:
+    what = f"{unit_of(labels[not surface])} of {'distance from it' if surface else 'action'}".lstrip()
     if "" in learnt:
         _say_one(learnt[""], what)
     else:
         click.echo("Each demonstration has its own: one constraint for all misses more where held out.")
     if named is not None:
-        click.echo("\n".join([*named.sentences, FOLLOWED if named.shown else NOT_FOLLOWED]))
+        click.echo("\n".join([*named.sentences, FOLLOWED if named.is_followed(learnt) else NOT_FOLLOWED]))
     head, rows = table_of(learnt, named)
     if rows:
         print_table(head, rows)
@@ -349,10 +362,8 @@ def _say_one(learnt: uc.LearntConstraint, what: str) -> None:
     choice = learnt.choice_
     smooth = f", smoothed with {choice.smoothness:g}" if choice.smoothness else ""
     click.echo(f"Learnt: {learnt.rank_} of {choice.actions} directions held, by {choice.name} features{smooth}.")
-    click.echo(
-        f"Noise and misfit along them are about {learnt.noise_:.3g} of {what}, and where held out "
-        f"{choice.held_out:.3g} of its mean square."
-    )
+    missed = f"where held out {choice.held_out:.3g} of its mean square"
+    click.echo(f"Noise and misfit along them are about {learnt.noise_:.3g} {what}, and {missed}.")
     rows = [[name, f"{share:.3g}"] for name, share in choice.candidates.items()]
     print_table(["features", "missed where held out"], rows)
 

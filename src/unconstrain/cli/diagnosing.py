@@ -11,7 +11,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import counted, percent
+from ..base.display import counted, percent, unit_of
 from ..base.files import write
 from .fitting import options_for_model, policy_of
 from .printing import as_noted, explained, option_for_json, print_table, refuse_warnings, say, say_scale, say_verdict
@@ -63,11 +63,11 @@ def diagnose(
         click.echo(json.dumps(found.to_json() | named, indent=2))
     else:
         say_verdict(verdict)
-        used = said_recipe(recipe, first)
         counts = counted(len(demonstrations), "demonstration"), counted(len(found.undetermined), "sample")
-        click.echo(f"{', '.join(counts)}; {used}.")
+        click.echo(f"{', '.join(counts)}; {said_recipe(recipe, first)}.")
         say_scale(policy, recipe)
-        _say(found, states, actions, len(found.regions) if verbose else MOST_ROWS)
+        unit = "" if policy.scale_ else unit_of(recipe.labels(first.units)[1])
+        _say(found, states, actions, unit, len(found.regions) if verbose else MOST_ROWS)
     if report is not None:
         from ..pages.diagnosis import diagnosis_page
 
@@ -76,9 +76,9 @@ def diagnose(
         click.echo(f"report: {report}", err=as_json)
 
 
-def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequence[str], most: int) -> None:
+def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequence[str], unit: str, most: int) -> None:
     named = uc.evaluation.diagnosis.named
-    for line in uc.evaluation.diagnosis.sentences(found, states, actions):
+    for line in uc.evaluation.diagnosis.sentences(found, states, actions, unit):
         click.echo(line)
     shown = found.regions[:most]
     click.echo(f"\nThe {len(shown)} regions of largest undetermined spread, of {len(found.regions)}, largest first:")

@@ -13,7 +13,7 @@ import unconstrain as uc
 
 from ..base.errors import SettingError
 from ..base.files import stem
-from .printing import of_option
+from .printing import doubt_degrees, of_option
 from .reading import check_enough, numbers, of_words, recordings_of, with_options
 
 CENTRES = 25
@@ -128,6 +128,7 @@ def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None, to: Any) 
     if to is not None:
         with of_option("--guided"):
             uc.Guided.goes_round(stream.beginning(), *_aim(to))
+        doubt_degrees("--guided", () if isinstance(to, str) else to, stream.recipe)
     if scheduler is None:
         policy.fit_batches(stream)
         check_enough(stream.beginning())

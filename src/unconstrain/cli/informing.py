@@ -13,8 +13,8 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import innermost, percent
-from .printing import models_of, print_table, say_verdict
+from ..base.display import innermost, percent, unit_of
+from .printing import print_table, say_verdict
 from .reading import loaded, reading_of
 
 TOLD = "determined share of states"
@@ -31,6 +31,9 @@ MARK = "verdict"
 
 OF, HELD_BY, SHOWN, WHERE, WOUND = "of", "held by", "shown by positions", "least and largest states", "winding"
 """Notes of a constraint: of which demonstrations; mechanism; if that is sure; where; if they turn more than free."""
+
+NAMED = "named, but not held to"
+"""Note of the mechanism that positions may keep to, where the directions that were learnt are followed all the same."""
 
 ENDS = 2**16
 """Bytes at either end of a file by which it is known again."""
@@ -82,11 +85,8 @@ def info(file: str, as_json: bool) -> None:
     A policy, guided or not, or a constraint.
     """
     held, notes = loaded(file, uc.Policy | uc.LearntConstraint | uc.Guided), uc.storage.load_notes(file)
-    rest = {
-        name: value
-        for name, value in notes.items()
-        if name not in ("recipe", "units", "digests", MARK, HELD_BY, SHOWN, WHERE, WOUND)
-    }
+    inner = ("recipe", "units", "digests", MARK, HELD_BY, SHOWN, WHERE, WOUND)
+    rest = {name: value for name, value in notes.items() if name not in inner}
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held, notes), **rest}
     if as_json:
         click.echo(json.dumps(told | {"verdict": verdict_of(held, notes).to_json()}, indent=2))
@@ -94,6 +94,8 @@ def info(file: str, as_json: bool) -> None:
     say_verdict(verdict_of(held, notes))
     kind = {uc.LearntConstraint: "a learnt constraint", uc.Guided: "a guided policy"}.get(type(held), "a policy")
     told["holds"] = f"{kind}: {told.pop('model')}" if "model" in told else kind
+    if told.get("noise") and isinstance(innermost(held), uc.Policy) and not innermost(held).scale_:
+        told["noise"] = f"{told['noise']:.4g} {unit_of(told.get('actions', ()))}".rstrip()
     told |= {TOLD: f"{percent(told[TOLD])}, by all recordings together"} if told.get(TOLD) is not None else {}
     rows = [[name, _said(value)] for name, value in told.items() if value not in (None, [], {}, "")]
     print_table(["", ""], rows, uc.evaluation.verdicts.WIDTH)
@@ -129,7 +131,7 @@ def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
         "learner": one if isinstance(one := policy.learner, str) else type(uc.learners.named(one)).__name__,
         "learnt as": solution.method,
         "learnt as, in words": uc.evaluation.diagnosis.in_words(solution.method) or None,
-        "model": models_of(policy),
+        "model": uc.evaluation.diagnosis.models_of(policy),
         "explained held out": None if (share := policy.held_out_score() - lost) != share else round(share, 4),
         "noise": None if solution.belief is None else solution.noise,
         "guided": held.aim_.promise if isinstance(held, uc.Guided) else None,

@@ -81,16 +81,7 @@ def look(
     seen = _seen(paths, reading)
     scene = None if rrd is None and not live else _scene(seen, robot, tip)
     surveys = uc.preparation.survey_set(seen.recordings, seen.recipe)
-    odd = any(one.warnings for one in surveys)
-    then = "Open the page; what it marks says what cures it." if odd else "Open the page."
-    verdict = uc.evaluation.verdicts.of_surveys(surveys)
-    if seen.policy is not None:
-        from ..pages.fit import replayed
-
-        of = seen.policy, seen.demonstrations, seen.recipe, None, seen.recordings[0].units
-        verdict = replayed(verdict, *of, free=False).verdict
-        verdict = uc.evaluation.verdicts.of_told(verdict, seen.notes.get(TOLD))
-    say_verdict(verdict := verdict._replace(next="" if live else then))
+    say_verdict(verdict := _judged(seen, surveys, live))
     for line in _about(seen):
         click.echo(line)
     samples = sum(map(len, seen.demonstrations))
@@ -144,6 +135,20 @@ def _seen(paths: Sequence[str | Path], reading: dict[str, Any]) -> Seen:
     return Seen(
         recorded, *found, next(iter(policies), None), next(iter(constraints), None), reading_of(**notes).roles, notes
     )
+
+
+def _judged(seen: Seen, surveys: Sequence[Any], live: bool) -> uc.evaluation.verdicts.Verdict:
+    """How recordings look, how a policy that is there moves, and what is left to others to judge."""
+    verdicts = uc.evaluation.verdicts
+    found = verdicts.of_surveys(surveys)
+    if seen.policy is not None:
+        from ..pages.fit import replayed
+
+        of = seen.policy, seen.demonstrations, seen.recipe, None, seen.recordings[0].units
+        found = verdicts.of_told(replayed(found, *of, free=False).verdict, seen.notes.get(TOLD))
+    across = uc.evaluation.diagnosis.about_recordings(found, seen.demonstrations, seen.recipe)
+    odd = "; what it marks says what cures it" * any(one.warnings for one in surveys)
+    return verdicts.of_look(found, across)._replace(next="" if live else f"Open the page{odd}.")
 
 
 def _page(seen: Seen, surveys: Sequence[Any], verdict: uc.evaluation.verdicts.Verdict) -> str:
@@ -245,9 +250,8 @@ def _to_fit(paths: Sequence[str | Path], recipe: uc.Recipe, roles: Mapping[str, 
     told = ["unconstrain", "fit", *map(str, paths)]
     if not context.params["state"]:
         told += ["--state", ",".join(recipe.states or ())]
-        told += (
-            ["--by", recipe.differentiate or ""] if recipe.actions is None else ["--action", ",".join(recipe.actions)]
-        )
+        by = ["--by", recipe.differentiate or ""]
+        told += by if recipe.actions is None else ["--action", ",".join(recipe.actions)]
     given = typed("files", "output", "force", "leave_out", "rrd", "robot", "tip")
     for option in context.command.params:
         role = roles.get(option.name or "")

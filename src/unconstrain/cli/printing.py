@@ -9,14 +9,14 @@ import sys
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from math import inf, isfinite
+from math import isfinite, radians, tau
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 import unconstrain as uc
 
-from ..base.display import bare, counted, innermost, listed, percent
+from ..base.display import counted, innermost, listed, percent, unit_of
 from ..base.errors import InvalidDataError, ModelFileError, ReadError, SettingError, WriteError
 from .endings import REFUSED, ending
 from .reading import next_command, said_recipe, say_left
@@ -138,9 +138,8 @@ def say_surveys(surveys: Sequence[Any], needed: str, then: str) -> None:
             click.echo(f"{found.title}: time does not increase at row {found.non_increasing[0]}.")
     each = [(found.title, remark) for found in surveys for remark in (*found.warnings, *found.notes)]
     several = {title for title, remark in each if remark.code == "several-in-one"}
-    each = [
-        (title, one) for title, one in each if title not in several or one.code not in uc.evaluation.verdicts.SAME_CAUSE
-    ]
+    same = uc.evaluation.verdicts.SAME_CAUSE
+    each = [(title, one) for title, one in each if title not in several or one.code not in same]
     for code in dict.fromkeys(remark.code for _, remark in sorted(each, key=lambda one: not one[1].warns)):
         titles = {title: remark for title, remark in reversed(each) if remark.code == code}
         *others, first = titles
@@ -229,15 +228,6 @@ def _least_known(policy: uc.Policy, demonstrations: Sequence[uc.Demonstration], 
     return f"{least} All such places:\n{next_command('diagnose')}"
 
 
-def models_of(policy: uc.Policy) -> str:
-    """Number and width of the local models, or the features of the one."""
-    if isinstance(policy, uc.LocallyLinearPolicy) and policy.variance_ in (inf, "cubic"):
-        return f"one {'cubic' if policy.variance_ == 'cubic' else 'affine'} model for all states"
-    if isinstance(policy, uc.LocallyLinearPolicy):
-        return f"{counted(len(policy.solution_.weights), 'local model')} of σ² {policy.variance_:.4g}"
-    return str(policy.features_)
-
-
 def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, learner: str, verbose: bool) -> None:
     """Print a verdict, what a policy was learnt from and explains, and what the data determined."""
     say_verdict(judged.verdict)
@@ -247,7 +237,7 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
     if moving is not policy:
         click.echo(f"Guided: {moving.aim_.promise}")
     solution, known = policy.solution_, isfinite(judged.training)
-    models = models_of(policy) if hasattr(policy, "fields_") else ""
+    models = uc.evaluation.diagnosis.models_of(policy) if hasattr(policy, "fields_") else ""
     counts = f"{counted(judged.demonstrations, 'demonstration')}, {counted(judged.samples, 'sample')}" if known else ""
     if counts or models:
         click.echo(f"{', '.join(filter(None, (counts, models)))}.")
@@ -259,11 +249,9 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
             _say_suspects(solution.belief.suspects, stream)
     elif learner != "direct":
         _say_determined(solution, learner)
-    click.echo(
-        "Share of the motion explained, where slow samples count less, as in the verdict: "
-        + (f"{judged.training:.4g} on the training data, " if known else "")
-        + (f"{judged.held_out:.4g} where held out." if isfinite(judged.held_out) else "nothing could be held out.")
-    )
+    seen = f"{judged.training:.4g} on the training data, " if known else ""
+    rest = f"{judged.held_out:.4g} where held out." if isfinite(judged.held_out) else "nothing could be held out."
+    click.echo(f"Share of the motion explained, where slow samples count less, as in the verdict: {seen}{rest}")
     for note in solution.notes:
         click.echo(note)
     if verbose and solution.belief is not None:
@@ -275,14 +263,11 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
 
 
 def _say_determined(solution: uc.Solution, learner: str) -> None:
-    rest = "."
+    said = f"{percent(solution.determined_share)} of {solution.directions} weight directions"
+    said += " of each model" * (len(solution.weights) > 1)
     if learner == "hybrid" and solution.determined_share < 1:
-        rest = "; along the others the policy is as close to the recorded actions as can be."
-    click.echo(
-        f"The inconsistency determined {percent(solution.determined_share)} of {solution.directions} weight directions"
-        + (" of each model" if len(solution.weights) > 1 else "")
-        + rest
-    )
+        said += "; along the others the policy is as close to the recorded actions as can be"
+    click.echo(f"The inconsistency determined {said}.")
     if solution.determined_share == 0.0:
         click.echo("Note: nothing was determined, so this is the same as --learner direct.", err=True)
 
@@ -293,8 +278,7 @@ def say_scale(policy: uc.Policy, recipe: uc.Recipe) -> None:
         click.echo("Note: --scale auto: angles and orientations have none; give positions in metres.", err=True)
     if policy.scale_ is None:
         return
-    states = recipe.states or ()
-    names = states if recipe.actions is None else (*states, *recipe.actions)
+    names = *(recipe.states or ()), *(recipe.actions or ())
     sizes = [*policy.scale_.states, *policy.scale_.actions]
     told = ", ".join(f"{size:.4g} of {name}" for name, size in zip(names, sizes, strict=False))
     click.echo(f"As one count {told} (--scale); noise and features are in these units, predictions as in the files.")
@@ -304,22 +288,18 @@ def _say_suspects(rows: NDArray[np.intp], stream: uc.Stream | None) -> None:
     """Name the samples that look wrong, in a further walk if there are any."""
     if len(rows) and stream is not None:
         named = ((name.partition("/")[2], demo) for name, demo in stream.named_demonstrations())
-        places = uc.evaluation.diagnosis.places_of(rows, named)
-        for line in uc.evaluation.diagnosis.about_suspects(places):
+        for line in uc.evaluation.diagnosis.about_suspects(uc.evaluation.diagnosis.places_of(rows, named)):
             click.echo(f"Note: {line}", err=True)
 
 
 def _said_of_samples(solution: uc.Solution, actions: Sequence[str]) -> str:
     """The candidate that a robust learner took, and its estimates of noise and free samples."""
-    units = {name[len(bare(name)) :].strip(" ()[]") for name in actions}
-    where = f"{max(units)} on each action" if len(units) == 1 and max(units) else "on each action, in its unit"
+    where = f"{unit} on each action" if (unit := unit_of(actions)) else "on each action, in its unit"
     risks, share = {name: one.risk for name, one in solution.candidates.items()}, solution.believed.undecided_share
     undecided = f" ({percent(share)} free or always held in the same way, which looks alike)" if share >= 0.01 else ""
-    return (
-        f"{uc.evaluation.diagnosis.about_choice(solution.method, risks)} Noise and misfit are about "
-        f"{solution.noise:.3g} {where}, and {percent(solution.free_share)} of the samples were free, or "
-        f"held by less than that{undecided}."
-    )
+    said = f"{uc.evaluation.diagnosis.about_choice(solution.method, risks)} Noise and misfit are about "
+    said += f"{solution.noise:.3g} {where}, and {percent(solution.free_share)} of the samples were free, or "
+    return f"{said}held by less than that{undecided}."
 
 
 def explained(policy: Any, demonstrations: Sequence[uc.Demonstration]) -> float:
@@ -378,6 +358,14 @@ def show_warning(message: Warning | str, *_: Any) -> None:
         if len(titles) > 1:
             return
     click.echo(f"Note: {as_typed(str(message))}", err=True)
+
+
+def doubt_degrees(option: str, states: Sequence[float], recipe: uc.Recipe) -> None:
+    """Note angles of an option that look like degrees, where a policy takes radians of columns recorded in degrees."""
+    for name, angle in zip(recipe.states or (), states, strict=False):
+        if name in (recipe.degrees or ()) and abs(angle) > tau:
+            said = f"{option}: {angle:.4g} is far outside radians, which the policy takes for {name}; if it is in "
+            show_warning(f"{said}degrees, as recorded, that is {radians(angle):.4g}.")
 
 
 def say_others() -> None:

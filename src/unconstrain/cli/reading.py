@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import shlex
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -261,18 +260,16 @@ def of_files(recordings: Iterable[uc.Recording]) -> Iterator[None]:
     try:
         yield
     except (InvalidDataError, SettingError) as error:
-        named = re.match(r"'(.+?)'(?=,|:| has )", str(error))
         with suppress(UnconstrainError):
             came = {(one.name, one.file): None for one in recordings}
-            files = {file: None for name, file in came if named and name == named[1] and file}
-            if named and files:
-                own = any(stem(file) == named[1] for file in files)
-                title = " or ".join(files) if own else f"{named[0]} of {' or '.join(files)}"
-                others = len(came) > len(files) and str(error)[named.end()] in ",:"  # all may lack what it has not
-                left_out = ",".join([*click.get_current_context().params["leave_out"], named[1]])
-                cure = f" Or leave it out: --leave-out {shlex.quote(left_out)}" if others else ""
-                cure = " 'unconstrain inspect' proposes a command." if "cannot tell states" in str(error) else cure
-                error.args = (f"{title}{str(error)[named.end() :]}{cure}", *error.args[1:])
+            named = max((name for name, _ in came if str(error).startswith(f"'{name}'")), key=len, default="")
+            if named and (files := {file: None for name, file in came if name == named and file}):
+                own = any(stem(file) == named for file in files)
+                title = " or ".join(files) if own else f"'{named}' of {' or '.join(files)}"
+                left_out = ",".join([*click.get_current_context().params["leave_out"], named])
+                leave = f" Or leave it out: --leave-out {shlex.quote(left_out)}" * (len(came) > len(files))
+                said = f"{title}{str(error)[len(named) + 2 :]}{getattr(error, 'cure', leave)}"
+                error.args = (said, *error.args[1:])
         raise
 
 
@@ -316,10 +313,8 @@ def typed(*without: str) -> list[str]:
             continue
         value = context.params[name]
         for one in value if getattr(option, "multiple", False) else [value]:
-            told += [
-                option.opts[0],
-                *([] if one is True else [",".join(map(str, one))] if isinstance(one, tuple) else [str(one)]),
-            ]
+            plain = ",".join(map(str, one)) if isinstance(one, tuple) else str(one)
+            told += [option.opts[0]] if one is True else [option.opts[0], plain]
     return told
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -15,12 +14,12 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import counted, innermost
+from ..base.display import counted, innermost, unit_of
 from ..base.errors import DivergedError, InvalidDataError, SettingError, SupportEndsWarning
 from ..base.files import write
 from .constraining import held_of, options_for_held
 from .informing import TOLD, doubted
-from .printing import of_option, option_for_json, say_verdict, say_written, show_warning
+from .printing import doubt_degrees, of_option, option_for_json, say_verdict, say_written, show_warning
 from .reading import fitted_policy, numbers, of_words
 from .scoring import support_of
 from .writing import check_outputs, option_for_force
@@ -122,10 +121,7 @@ def _obstacle(given: tuple[float, ...], n: int) -> uc.motion.obstacles.Ellipsoid
 
 def _check_start(policy: uc.Policy | uc.Guided, recipe: uc.Recipe, start: tuple[float, ...], least: float) -> None:
     """Note angles that look like degrees; refuse to begin where nothing was demonstrated, unless it is guided."""
-    for name, angle in zip(recipe.states or (), start, strict=False):
-        if name in (recipe.degrees or ()) and abs(angle) > math.tau:
-            said = f"--start: {angle:.4g} is far outside radians, which the policy takes for {name}; if it is in "
-            show_warning(f"{said}degrees, as recorded, that is {math.radians(angle):.4g}.")
+    doubt_degrees("--start", start, recipe)
     if innermost(policy) is not policy:
         return
     support = float(support_of(policy, [start])[0])
@@ -160,18 +156,18 @@ def _supported(
     untold = None if told >= verdicts.MOSTLY else uc.evaluation.diagnosis.untold(policy, path)
     found = verdicts.of_support(support_of(policy, path.states), path.times, untold)
     found = verdicts.of_early_end(found, why) if why else found
-    passes = f" {held[:1].upper()}{held[1:]} passes through the start." * bool(held) + _off_goal(moving, path, held)
+    unit = unit_of(uc.Recipe.from_dict(notes.get("recipe", {})).labels(notes.get("units", {}))[0])
+    passes = f" {held[:1].upper()}{held[1:]} passes through the start." * bool(held)
+    passes += _off_goal(moving, path, held, unit or "(unit of the states)")
     found = verdicts.of_fit(found._replace(said=f"{found.said}{passes}"), doubted(moving, notes))
     if not obstacles:
         return found
     nearest = min((float(one(path.states)[0].min()), number) for number, one in enumerate(obstacles, start=1))
-    return found._replace(
-        said=f"{found.said} It keeps clear of {counted(len(obstacles), 'obstacle')}, at the nearest of number "
-        f"{nearest[1]} by {nearest[0]:.0%} of its radius."
-    )
+    clear = f"It keeps clear of {counted(len(obstacles), 'obstacle')}, at the nearest of number {nearest[1]} by "
+    return found._replace(said=f"{found.said} {clear}{nearest[0]:.0%} of its radius.")
 
 
-def _off_goal(moving: Any, path: uc.Demonstration, held: str, near: float = 0.02) -> str:
+def _off_goal(moving: Any, path: uc.Demonstration, held: str, unit: str, near: float = 0.02) -> str:
     """A sentence on where off its goal a guided movement ends, by more than ``near`` of how far it was, and why."""
     if not isinstance(getattr(moving, "aim_", None), uc.motion.descent.Descent):
         return ""
@@ -179,14 +175,13 @@ def _off_goal(moving: Any, path: uc.Demonstration, held: str, near: float = 0.02
     rests = speeds[-1] <= near * speeds.max()
     why = "it rests there" if rests else "it is still on its way (--steps)"
     why += f", {'as' if rests else 'and may come to rest where'} {held} holds it off" if held else ""
-    return f" It ends {far[-1]:.3g} (unit of the states) from the goal: {why}." if far[-1] > near * far.max() else ""
+    return f" It ends {far[-1]:.3g} {unit} from the goal: {why}." if far[-1] > near * far.max() else ""
 
 
 def _csv(header: Sequence[str], path: uc.Demonstration) -> str:
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows([f"{value:.9g}" for value in row] for row in _rows(path))
+    rows = ([f"{value:.9g}" for value in row] for row in _rows(path))
+    csv.writer(text, lineterminator="\n").writerows([header, *rows])
     return text.getvalue()
 
 

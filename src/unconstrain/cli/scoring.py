@@ -20,9 +20,8 @@ from .printing import explained, number, option_for_json, print_table, refuse_wa
 from .progress import shown
 from .reading import fitted_policy, options_for_reading, prepared
 
-LEAST, SLOW, ENOUGH = 5, 10.0, 5.0
-"""Samples that it takes to tell noise, and standard deviations of it below which a direction cannot be judged: of half
-a usual action so many are enough."""
+LEAST, ENOUGH = 5, 5.0
+"""Samples that it takes to tell noise, and standard deviations of it that are enough in half a usual action."""
 
 
 @click.command(epilog="\b\nExample:\n  unconstrain score wipe.npz other.csv --plane 0,0.3,1 --json")
@@ -102,8 +101,9 @@ def _with_noise(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe) -
 
 
 def _judged(noise: Any, half: float) -> Any:
-    """Noise, of which :data:`SLOW` times are half a usual action at most, but for what is more than that itself."""
-    return noise.clip(max=max(half / SLOW, float((noise**2).mean() ** 0.5) * ENOUGH / SLOW))
+    """Noise, of which as many as turn a direction are half a usual action at most, but for what is more itself."""
+    turned = uc.evaluation.metrics.TURNED
+    return noise.clip(max=max(half / turned, float((noise**2).mean() ** 0.5) * ENOUGH / turned))
 
 
 def _moved(moving: Any, demonstrations: list[uc.Demonstration]) -> tuple[list[uc.Demonstration], list[str]]:
@@ -118,7 +118,7 @@ def _moved(moving: Any, demonstrations: list[uc.Demonstration]) -> tuple[list[uc
 
 
 def _scores(moving: Any, held: Any, of: Sequence[uc.Demonstration], name: str) -> dict[str, Any]:
-    slow = [0.0 if one.noise is None else SLOW**2 * (one.noise**2).mean() for one in of]
+    slow = [0.0 if one.noise is None else uc.evaluation.metrics.TURNED**2 * (one.noise**2).mean() for one in of]
     kept = [(one.actions**2).sum(axis=1) >= least for one, least in zip(of, slow, strict=True)]
     fast = [one[rows] for one, rows in zip(of, kept, strict=True) if rows.any()]
     count = sum(map(len, fast))

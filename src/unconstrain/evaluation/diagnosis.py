@@ -17,12 +17,15 @@ from ..base.files import stem
 from ..learners import Solution, robust
 from ..models import Scale, choose_variance, cover
 from ..recordings import Demonstration, stack
+from .marks import ENOUGH as ENOUGH
+from .marks import SMALL as SMALL
 from .metrics import along_motion
 from .sentences import CONSTRAINED as CONSTRAINED
 from .sentences import FREE as FREE
 from .sentences import about_choice as about_choice
 from .sentences import about_suspects as about_suspects
 from .sentences import in_words as in_words
+from .sentences import models_of as models_of
 from .sentences import sentences as sentences
 from .shown import FLAT as FLAT
 from .shown import about_recordings as about_recordings
@@ -30,8 +33,6 @@ from .shown import flat as flat
 from .shown import named as named
 from .shown import names_of
 from .shown import planes_of as planes_of
-from .verdicts import ENOUGH as ENOUGH
-from .verdicts import SMALL as SMALL
 
 if TYPE_CHECKING:
     from ..policies import Policy

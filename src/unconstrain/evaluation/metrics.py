@@ -27,6 +27,7 @@ from ..constraints import Constraint, constraint_matrices
 from ..learners import robust
 from ..models import spaces
 from ..recordings import Demonstration, Recipe, preparation, stack
+from ..risks import TURNED as TURNED
 from ..risks import action_projection, null_space_projection, project
 from ..risks import along_motion as along
 

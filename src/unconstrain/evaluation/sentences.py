@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.display import percent
+from ..base.display import counted, percent
 from ..learners import robust
+from .marks import ENOUGH, SMALL
 from .shown import named
-from .verdicts import ENOUGH, SMALL, regions_left
+from .verdicts import regions_left
 
 if TYPE_CHECKING:
     from .diagnosis import Diagnosis, Place, Region
@@ -28,10 +29,10 @@ MOST_NAMED = 8
 """So many samples that look wrong are named."""
 
 
-def sentences(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> list[str]:
-    """The diagnosis in sentences, with the names of the columns."""
+def sentences(found: Diagnosis, states: Sequence[str], actions: Sequence[str], unit: str = "") -> list[str]:
+    """The diagnosis in sentences, with the names of the columns, and the unit of the actions if they have one."""
     return [
-        _about_noise(found),
+        _about_noise(found, f" {unit}".rstrip()),
         about_choice(found.method, found.candidates),
         *_about_regions(found, states, actions),
         _about_freedom(found),
@@ -44,23 +45,22 @@ def about_suspects(places: Sequence[Place]) -> list[str]:
     if not places:
         return []
     number = "1 sample looks" if len(places) == 1 else f"{len(places)} samples look"
-    more = ", ..." if len(places) > MOST_NAMED else ""
-    named = ", ".join(map(str, places[:MOST_NAMED]))
-    return [f"{number} wrong beside the neighbours in time, and counted nothing: {named}{more}."]
+    named = ", ".join(map(str, places[:MOST_NAMED])) + ", ..." * (len(places) > MOST_NAMED)
+    return [f"{number} wrong beside the neighbours in time, and counted nothing: {named}."]
 
 
-def _about_noise(found: Diagnosis) -> str:
+def _about_noise(found: Diagnosis, unit: str) -> str:
     verdict = "little" if found.noise_share < SMALL else "some" if found.noise_share < 3 * SMALL else "much"
     too_much = found.noise_share > robust.SPHERE_HIDDEN_BY_NOISE
     hidden = " So much noise makes the following unreliable." if too_much else ""
-    said = f"Noise and misfit: {verdict}, {found.noise:.3g} on each action coordinate, {found.noise_share:.1%} of a "
-    said += f"typical action ({found.typical:.3g}) in all.{hidden}"
+    said = (
+        f"Noise and misfit: {verdict}, {found.noise:.3g}{unit} on each action coordinate, {found.noise_share:.1%} of a "
+    )
+    said += f"typical action ({found.typical:.3g}{unit}) in all.{hidden}"
     if found.noise_share < 0.5 * SMALL or found.noise < MISFIT * found.jitter:
         return said
-    return said + (
-        f" Only {found.jitter:.3g} of it changes from sample to sample; the rest is what the model does not follow, or "
-        "people who vary."
-    )
+    rest = "the rest is what the model does not follow, or people who vary."
+    return f"{said} Only {found.jitter:.3g}{unit} of it changes from sample to sample; {rest}"
 
 
 _WAYS = {
@@ -77,6 +77,15 @@ _WAYS = {
 def in_words(method: str) -> str:
     """What is told of a way of learning, by its name with or without a softness after a comma; empty of others."""
     return _WAYS.get(method.partition(", ")[0], "")
+
+
+def models_of(policy: Any) -> str:
+    """Number and width of a fitted policy's local models, or the one for all states; of others their features."""
+    if not hasattr(policy, "fields_"):
+        return str(policy.features_)
+    if policy.variance_ in (np.inf, "cubic"):
+        return f"one {'cubic' if policy.variance_ == 'cubic' else 'affine'} model for all states"
+    return f"{counted(len(policy.solution_.weights), 'local model')} of σ² {policy.variance_:.4g}"
 
 
 def about_choice(method: str, candidates: Mapping[str, float]) -> str:
@@ -130,6 +139,5 @@ def _about_freedom(found: Diagnosis) -> str:
     means = np.array([one.free for one in found.movements], dtype=np.float64)
     free, held = int((means > FREE).sum()), int((means < CONSTRAINED).sum())
     between = len(means) - free - held
-    return f"{said}. Of {len(means)} demonstrations, {free} look free and {held} constrained" + (
-        f"; of {between} that is not certain." if between else "."
-    )
+    rest = f"; of {between} that is not certain." if between else "."
+    return f"{said}. Of {len(means)} demonstrations, {free} look free and {held} constrained{rest}"

@@ -9,7 +9,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..learners import robust
 from ..recordings import Demonstration, Recipe, readers, stack
-from .verdicts import ENOUGH, Mark, Verdict
+from .marks import ENOUGH, Mark, Verdict
 
 FLAT, ONE = 0.1, 0.03
 """Held are directions of less spread than the first share of the longest, and all on one plane below the second."""
@@ -46,11 +46,11 @@ def planes_of(demonstrations: Sequence[Demonstration]) -> Array:
 
 
 def about_recordings(
-    found: Verdict, demos: Sequence[Demonstration], recipe: Recipe, policy: Callable[[Array], Array]
+    found: Verdict, demos: Sequence[Demonstration], recipe: Recipe, policy: Callable[[Array], Array] | None = None
 ) -> Verdict:
     """Add which planes demonstrations keep to, what they turn about and, unless rest is trimmed, where a policy rests.
 
-    Of a rest that is the policy's own nothing is said.
+    Of a rest that is the policy's own nothing is said, nor of any without a policy.
     """
     planes, states, trust, doubt = planes_of(demos), recipe.states or (), found.trust, found.doubt
     if len(planes) == 1:
@@ -63,7 +63,7 @@ def about_recordings(
         about = f"All motion is about {named(pivot.tolist(), states)}, as of a door about its hinge: none tells what "
         doubt = f"{about}points there; free motion, or motion about another place, would. {doubt}"
     found = found._replace(trust=trust, doubt=doubt.rstrip())
-    return found if recipe.still else _about_rest(found, demos, states, policy)
+    return found if recipe.still or policy is None else _about_rest(found, demos, states, policy)
 
 
 def _about_rest(

@@ -1,16 +1,11 @@
-"""Judgements in words: what numbers mean, what to trust, where not, and what to do next.
-
-The thresholds of everything that is judged stand here, each with its reason; pages and commands say the same.
-"""
+"""Judgements in words: what numbers mean, what to trust, where not, and what to do next."""
 
 from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
-from enum import Enum
 from functools import partial
-from textwrap import wrap
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,17 +13,17 @@ from numpy.typing import NDArray
 from ..base.arrays import Array
 from ..base.display import counted, percent
 from ..models import SUPPORTED
+from .marks import ENOUGH, FAIR, FAR_OFF, FORBIDDEN, NEARBY, OTHERWISE, PARTLY, UNITS, doubted, graded, no_better
+from .marks import GOOD as GOOD
+from .marks import MOSTLY as MOSTLY
+from .marks import SMALL as SMALL
+from .marks import WIDTH as WIDTH
+from .marks import Mark as Mark
+from .marks import Verdict as Verdict
 
 if TYPE_CHECKING:
     from ..constraints import LearntConstraint
     from .diagnosis import Diagnosis
-
-GOOD, FAIR = 0.9, 0.7
-"""Explained share of motion. Along it a prediction misses √(1 − share) of a typical action: at the first a third, at
-the second more than half, beyond which little but the rough direction is left."""
-
-MOSTLY, PARTLY = 0.95, 0.7
-"""Share of recorded states at which the policy is determined: of the rest, one in twenty is an edge."""
 
 MORE = (
     "If one file holds several demonstrations, name the column that tells them apart with --group ('unconstrain "
@@ -36,80 +31,9 @@ MORE = (
 )
 """What helps against too few demonstrations."""
 
-OTHERWISE = 1.2
-"""Size or pace of a roll-out over that demonstrated, or the inverse, from which on it is another movement."""
-
-FAR_OFF = 1.5
-"""Those of a single roll-out from which on not even the others speak for the policy."""
-
-FORBIDDEN = 0.05
-"""Share of recorded motion that a constraint given would not allow, from which on it is likely another."""
-
-UNITS = {"metres and millimetres": 1000.0, "degrees and radians": 57.3}
-"""Units that are mixed up, and how many of one are the other."""
-
-NEARBY = 0.6
-"""Support of nearly all recorded states: they are within one width of a kernel, exp(−½). Below, none came by."""
-
-SMALL = 0.1
-"""An undetermined spread below this share of the typical action is negligible."""
-
-ENOUGH = 3
-"""Demonstrations that have to show something for it to be sure."""
-
-WIDTH = 80
-"""Columns of a terminal that sentences are broken for."""
-
-
-class Mark(Enum):
-    """How it stands, and the sign of it."""
-
-    GOOD = "✔"
-    DOUBTFUL = "!"
-    BAD = "✖"
-
-
-class Verdict(NamedTuple):
-    """A judgement in one sentence, and what follows from it, in sentences that may be empty."""
-
-    mark: Mark
-    said: str
-    trust: str = ""
-    doubt: str = ""
-    next: str = ""
-
-    def rest(self) -> list[tuple[str, str]]:
-        """What to trust, where not, and what to do next, as far as there is something to say."""
-        named = (("Trust", self.trust), ("Do not trust", self.doubt), ("Next", self.next))
-        return [(name, text) for name, text in named if text]
-
-    def to_json(self) -> dict[str, str]:
-        """With the name of the mark."""
-        return self._asdict() | {"mark": self.mark.name.lower()}
-
-    def lines(self) -> list[str]:
-        """For a terminal of 80 columns; a command that comes next, or follows in a line of its own, stays whole."""
-        whole = partial(wrap, width=WIDTH, break_on_hyphens=False)  # options and paths can be copied
-        said = whole(f"{self.mark.value} {self.said}", subsequent_indent="  ")
-        for name, text in self.rest():
-            prose, *commands = f"{name}: {text}".split("\n")
-            named = prose.startswith("Next: unconstrain ")
-            said += [f"  {prose}"] if named else whole(prose, initial_indent="  ", subsequent_indent="    ")
-            said += [f"    {command}" for command in commands]
-        return said
-
-
 TOO_SLOW = Verdict(
     Mark.DOUBTFUL, "Too slow to be judged: all is below ten times its noise.", next="Score faster motion."
 )
-
-
-def _graded(share: float, good: float = GOOD, fair: float = FAIR, told: float | None = None) -> tuple[Mark, str]:
-    if share >= good and told is not None and told < PARTLY:
-        return Mark.DOUBTFUL, "good along the motion, but across it recordings tell too little"
-    if share >= good:
-        return Mark.GOOD, "good"
-    return (Mark.DOUBTFUL, "fair") if share >= fair else (Mark.BAD, "poor")
 
 
 def _explains(share: float, what: str = "held-out motion") -> str:
@@ -161,11 +85,10 @@ def of_explained(
         across = f"Across the motion: {of_untold(1 - determined)}"
         across += "." if there else "; 'unconstrain diagnose' says where."
     much = f"{percent(lost)} less" if lost and round(lost, 2) else "as much"
-    (alone, word), (mark, _) = (_graded(each, told=determined) for each in (share, share - (lost or 0.0)))
-    retold = (
-        f" {'Guided' if mark is alone else 'But guided'}, it explains {much} of the demonstrations it was fitted to"
-    )
-    retold = "" if lost is None else f"{retold}; that says nothing of new starts."
+    (alone, word), (mark, _) = (graded(each, told=determined) for each in (share, share - (lost or 0.0)))
+    guided = "Guided" if mark is alone else "But guided"
+    retold = f" {guided}, it explains {much} of the demonstrations it was fitted to; that says nothing of new starts."
+    retold *= lost is not None
     if demonstrations < ENOUGH or not np.isfinite(share):
         seen = f"The policy {_explains(share)}, but no" if np.isfinite(share) else "No"
         few = f"{seen} verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
@@ -183,32 +106,30 @@ def of_score(
     """Judge how much of recordings that were not learnt from a policy explains; one is enough to see it fail.
 
     ``under`` is the same under their constraint, 1 − nCPE, where that is known: then the smaller one is judged. Of
-    ``learnt`` of them, where that is known, the policy learnt; ``told`` is as ``determined`` in :func:`of_explained`.
+    ``learnt`` of them, where that is known, the policy learnt; ``told`` is as ``determined`` in :func:`of_explained`,
+    and makes any score doubtful where it is small: under the constraint given, too, others are not told.
     """
-    mark, word = _graded(share, told=told) if under is None else _graded(min(share, under))
+    mark, word = graded(share if under is None else min(share, under), told=told, under=under is not None)
     few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
     least = "nothing" if under is not None and under < -1 else percent(under or 0)
     known = "" if under is None else f", and {least} under the constraint given (1 − nCPE)"
-    more = "Movement under other constraints. Noise, and motion faster or slower than learnt, count as missed in nCPE."
+    untold = of_untold(1 - told) if told is not None and told < MOSTLY else ""
+    more = (
+        f"Movement under other constraints{untold and f': {untold}'}. Noise, and motion faster or slower than learnt, "
+    )
+    more += "count as missed in nCPE."
     if learnt:
         said = f"The policy {_explains(share, 'the motion')}{known}, but it learnt from {learnt} of "
         said += f"{_count(demonstrations)}: a score on what was learnt from is too good."
         return Verdict(Mark.DOUBTFUL, said, next="Hold some out of the fit (--leave-out, --episodes), and score these.")
     unknown = ", if none of it was learnt from" if learnt is None else ""
-    across = "What constraints hid in these recordings, too"
-    if told is not None and told < MOSTLY:
-        across = f"Across the motion: {of_untold(1 - told)}"
+    across = f"Across the motion: {untold}" if untold else "What constraints hid in these recordings, too"
     across += ". Only motion along the recorded actions is judged; what held these recordings, given with --plane or "
     across += "--constraint (one by one, if each was held in its own way), tells more: all directions that were free."
-    return Verdict(
-        mark,
-        f"The policy {_explains(share)}{known}{unknown}: {word}.",
-        "" if mark is Mark.BAD else "Movement like this, along the directions that were recorded.",
-        across if under is None else more,
-        f"Score it under other constraints.{few}"
-        if mark is Mark.GOOD
-        else "'unconstrain diagnose' says what to record.",
-    )
+    said, good = f"The policy {_explains(share)}{known}{unknown}: {word}.", mark is Mark.GOOD
+    trust = "" if mark is Mark.BAD else "Movement like this, along the directions that were recorded."
+    then = f"Score it under other constraints.{few}" if good else "'unconstrain diagnose' says what to record."
+    return Verdict(mark, said, trust, across if under is None else more, then)
 
 
 def of_worst(found: Verdict, shares: Mapping[str, float]) -> Verdict:
@@ -219,7 +140,7 @@ def of_worst(found: Verdict, shares: Mapping[str, float]) -> Verdict:
         return found
     more = f", and {', '.join(name for _, name in poor[1:])} little better" if poor[1:] else ""
     then = f"Look whether these went wrong or were held otherwise ('unconstrain look'). {found.next}"
-    return _doubted(found, f"it {_explains(poor[0][0], f'{poor[0][1]} alone')}{more}")._replace(next=then)
+    return doubted(found, f"it {_explains(poor[0][0], f'{poor[0][1]} alone')}{more}")._replace(next=then)
 
 
 def of_planes(found: Verdict, shares: Array, motion: Array) -> Verdict:
@@ -234,34 +155,29 @@ def of_planes(found: Verdict, shares: Array, motion: Array) -> Verdict:
     many = f"planes that {kept.sum()} of {_count(len(shares))} kept to"
     where = f"in all directions of the {'plane that it kept to' if len(shares) == 1 else many}, the policy "
     where += _explains(share, "the motion")
-    if _graded(share)[0] is Mark.GOOD:
+    if graded(share)[0] is Mark.GOOD:
         return found._replace(trust=f"{found.trust} {where[0].upper()}{where[1:]}.".lstrip())
-    return _doubted(found, f"{where}, unless more than a plane held {'it' if len(shares) == 1 else 'them'}")
+    return doubted(found, f"{where}, unless more than a plane held {'it' if len(shares) == 1 else 'them'}")
 
 
 def of_told(found: Verdict, told: float | None) -> Verdict:
     """Add to a verdict that recordings tell a policy at too small a share of their states, as :func:`of_explained`."""
     if told is None or told >= PARTLY:
         return found
-    return _doubted(found, "across the motion recordings tell the policy too little")
+    return doubted(found, "across the motion recordings tell the policy too little")
 
 
-def of_fit(found: Verdict, doubted: str) -> Verdict:
-    """Add to a verdict on a movement what ``fit`` doubted of its policy, the rest of a sentence, if anything."""
+def of_look(found: Verdict, across: Verdict) -> Verdict:
+    """Say of how recordings look who judges what they tell; ``across`` adds what they plainly do not."""
+    if across.doubt != found.doubt:
+        across = doubted(across, "they tell no policy across their motion")
+    return across._replace(said=f"{across.said} What recordings tell of a policy, 'unconstrain diagnose' judges.")
+
+
+def of_fit(found: Verdict, why: str) -> Verdict:
+    """Add to a verdict on a movement why ``fit`` doubted its policy, the rest of a sentence, if anything."""
     then = found.next or "Look at the policy beside its demonstrations ('unconstrain look')."
-    return _doubted(found, f"as 'fit' said, {doubted}")._replace(next=then) if doubted else found
-
-
-def _doubted(found: Verdict, how: str) -> Verdict:
-    """Go on in a sentence that leaves a verdict no better than doubtful."""
-    return found._replace(
-        mark=_no_better(found.mark), said=f"{found.said} {'But' if found.mark is Mark.GOOD else 'And'} {how}."
-    )
-
-
-def _no_better(mark: Mark) -> Mark:
-    """Doubtful, or bad as it is."""
-    return Mark.BAD if mark is Mark.BAD else Mark.DOUBTFUL
+    return doubted(found, f"as 'fit' said, {why}")._replace(next=then) if why else found
 
 
 def of_unit(found: Verdict, times: float) -> Verdict:
@@ -276,20 +192,20 @@ def of_unit(found: Verdict, times: float) -> Verdict:
 def of_units_apart(found: Verdict) -> Verdict:
     """Add to a verdict that recordings were not all in one unit."""
     then = "Convert the recordings that the notes name, or leave them out, and begin again."
-    return _doubted(found, "recordings are not all in one unit, as the notes say")._replace(next=then)
+    return doubted(found, "recordings are not all in one unit, as the notes say")._replace(next=then)
 
 
 def of_glitches(found: Verdict, names: str) -> Verdict:
     """Add to a verdict that samples of some demonstrations, by name, are far off their neighbours."""
     said = f"samples of {names} jump far off their neighbours and back (glitches), and velocities about them are wrong"
-    return _doubted(found, said)._replace(next=f"Add --glitches drop, or repair if few are in a row. {found.next}")
+    return doubted(found, said)._replace(next=f"Add --glitches drop, or repair if few are in a row. {found.next}")
 
 
 def of_forbidden(found: Verdict, share: float) -> Verdict:
     """Add to a score under a constraint that it would not allow some share of the recorded motion, nPOE, if much."""
     said = f"The constraint given forbids {percent(share)} of this motion (nPOE): likely another held it. {found.said}"
     then = "Score without it, or give what held them ('unconstrain constraint' learns that)."
-    return found if share <= FORBIDDEN else found._replace(mark=_no_better(found.mark), said=said, next=then)
+    return found if share <= FORBIDDEN else found._replace(mark=no_better(found.mark), said=said, next=then)
 
 
 def regions_left(found: Diagnosis) -> tuple[int, int]:
@@ -307,7 +223,7 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
     if count < ENOUGH:
         said = f"No verdict: {_count(count)}; whether they were free cannot be told from fewer than {ENOUGH}."
         return Verdict(Mark.DOUBTFUL, said, doubt=doubt, next=MORE)
-    mark, word = _graded(share, MOSTLY, PARTLY)
+    mark, word = graded(share, MOSTLY, PARTLY)
     how = {"good": "enough", "fair": "enough in most places", "poor": "not enough"}
     said = f"Recordings: at {percent(share)} of their states three demonstrations or more tell the policy: {how[word]}."
     if mark is Mark.BAD and found.told_together >= PARTLY:
@@ -319,7 +235,7 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
     elif mark is Mark.BAD and found.planes:
         mark, said = Mark.DOUBTFUL, f"{said[:-1]} to be sure, though each lies on a plane of its own."
     if found.noise_share > 3 * SMALL:
-        mark = _no_better(mark)
+        mark = no_better(mark)
         said = f"{said[:-1]}, though noise is {percent(found.noise_share)} of a typical action."
     trust = "" if mark is Mark.BAD else f"The policy at these states, to {percent(found.noise_share)} of noise."
     trust = f"{trust}{hangs}".strip()
@@ -350,7 +266,7 @@ def of_constraint(
         then = "Record movements that cross each other, and learn it again; or name the --features."
         said = f"Whether anything was held cannot be told: {why}."
         return Verdict(Mark.DOUBTFUL, said, doubt=f"That {min(ranks)} of {choice.actions} are held.", next=then)
-    mark, word = _graded(1.0 - missed)
+    mark, word = graded(1.0 - missed)
     held = f"{min(ranks)} of {choice.actions} directions were held"
     apart = f", others in each of {_count(len(every))}" if others else ""
     if len(ranks) > 1:
@@ -467,7 +383,7 @@ def of_divergence(found: Verdict) -> Verdict:
 
 
 def _strays(found: Verdict, how: str, what: str) -> Verdict:
-    return _doubted(found, how)._replace(
+    return doubted(found, how)._replace(
         doubt=f"Its {what} over time. {found.doubt}".rstrip(),
         next="Look at it ('unconstrain look'). More demonstrations may come nearer.",
     )
@@ -477,7 +393,7 @@ def of_early_end(found: Verdict, why: str) -> Verdict:
     """Add to a verdict on a movement that it stops, for a reason in one sentence, and what to do in another."""
     said, _, then = why.partition(". ")
     doubt = f"{found.doubt} What would have come after."
-    return found._replace(mark=_no_better(found.mark), said=f"{said}. {found.said}", doubt=doubt.lstrip(), next=then)
+    return found._replace(mark=no_better(found.mark), said=f"{said}. {found.said}", doubt=doubt.lstrip(), next=then)
 
 
 SAME_CAUSE = ("clock-gap", "seam", "few-demonstrations")

@@ -97,9 +97,8 @@ def policy_page(
 
 
 def _lead(policy: Policy, learner: str, states: Sequence[str], actions: Sequence[str]) -> html.Markup:
-    kind = {np.inf: "Affine", "cubic": "Cubic"}.get(getattr(policy, "variance_", None), "Locally linear")
-    kind = kind if hasattr(policy, "fields_") else "Parametric"
-    return html.words("fit_lead", kind=kind, learner=learner, states=", ".join(states), actions=", ".join(actions))
+    named = {"model": diagnosis.models_of(policy), "learner": learner}
+    return html.words("fit_lead", **named, states=", ".join(states), actions=", ".join(actions))
 
 
 def _held_out(policy: Policy, demos: list[Demonstration]) -> list[float] | None:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Array
-from ..base.display import innermost
+from ..base.display import innermost, unit_of
 from ..base.errors import DivergedError
 from ..evaluation import diagnosis, verdicts
 from ..models import spaces
@@ -84,8 +84,7 @@ def replayed(
         unknown = " Its size and pace over time: not compared, as what held these recordings is not known."
         return Replayed(found._replace(doubt=(found.doubt + unknown).strip()) if runs else found, None, runs)
     extents, paces, lasts, apart = np.array([one[:4] for one in known]).T
-    unit = {recipe.units(units).get(name, "") for name in recipe.states or ()}
-    said = f"{np.median(apart):.3g} {(len(unit) == 1 and unit.pop()) or '(unit of the states)'}"
+    said = f"{np.median(apart):.3g} {unit_of(recipe.labels(units)[0]) or '(unit of the states)'}"
     measured = {"extent": extents, "pace": paces, "last_round": lasts, "apart": apart}
     finite = {name: values[np.isfinite(values)] for name, values in measured.items()}
     told = {name: float(np.median(values)) if len(values) else None for name, values in finite.items()}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array, as_matrix, as_numbers, as_seconds, as_vector
 from ..base.display import Shown, counted, has_no_column, listed, shortened
-from ..base.errors import InvalidDataError
+from ..base.errors import InvalidDataError, LackingError
 from ..models import spaces
 from .columns import resolve
 from .remarks import Remark, titled
@@ -106,7 +106,7 @@ class Recording(Shown):
             said = has_no_column(self.name, missing, self.columns, self.words)
             others = len(missing) == len(names) <= len(self.columns) and not said.endswith("?")
             cure = " Name those of this file with states= and actions=, or all of its columns with columns=."
-            raise InvalidDataError(said + cure * others)
+            raise LackingError(said + cure * others)
         return self.values[:, [self._places[name] for name in names]]
 
     def resolve(self, names: Sequence[str]) -> tuple[str, ...]:

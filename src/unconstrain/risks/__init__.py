@@ -4,7 +4,7 @@ from .autocorrelation import autocorrelations
 from .folded_moments import FoldedMoments
 from .moments import Moments, Sums, gather
 from .objectives import inconsistency, standard_risk, unvec, vec
-from .projection import action_projection, along_motion, null_space_projection, project, unit_actions
+from .projection import TURNED, action_projection, along_motion, null_space_projection, project, unit_actions
 from .quadratic import (
     NOISE,
     SECONDARY_NOISE,
@@ -19,6 +19,7 @@ from .quadratic import (
 __all__ = [
     "NOISE",
     "SECONDARY_NOISE",
+    "TURNED",
     "FoldedMoments",
     "Moments",
     "Path",

@@ -5,7 +5,8 @@ wrong, then misses what is held out. But that one policy fits all ten, though th
 fit, is no chance. Demonstration g tells ``E_g = tr H_g (H_g + B)⁻¹`` independent numbers of the policy, with the
 Hessians H_g of its error and B of the prior; the sum of these, E, was fitted by ``P = tr H (H + B)⁻¹`` of them, with
 the Hessian H of all. What is new is then missed by ``E / (E − P)`` times as much as what was learnt from: generalised
-cross-validation (Golub, Heath and Wahba, *Technometrics* 21(2), 1979), by demonstration.
+cross-validation (Golub, Heath and Wahba, *Technometrics* 21(2), 1979), by demonstration. It supposes that the policy
+has the form of the model: what another form would make of places between the strokes, none of them tells.
 """
 
 from dataclasses import replace
@@ -53,6 +54,7 @@ def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Cand
         held_out=policy + residuals - missed,
         refits=np.repeat(found.weights[None], len(found.refits), axis=0),
         spread=_spread(samples, factor * from_noise[0] + undetermined[0]),
+        alone=_square(samples, held_out) / motion,
     )
 
 

@@ -33,6 +33,8 @@ class Candidate:
         constraints than their actions.
     spread : float, optional
         Mean variance of the predictions, where refits do not tell it; see :mod:`.agreement`.
+    alone : float
+        Share of the squared motion that was missed in demonstrations left out, where ``held_out`` is not about that.
     by_segments : bool
         Whether demonstrations that were held in the same way all the time show it more than samples along themselves.
     """
@@ -46,6 +48,7 @@ class Candidate:
     refits: Array
     softness: float = 0.0
     spread: float | None = None
+    alone: float = 0.0
     by_segments: bool = False
 
 

@@ -35,6 +35,7 @@ from .noise import (
     noise_by_differences,
     noise_of_each,
 )
+from .pivot import pivot_of
 from .segments import held_throughout
 
 
@@ -145,9 +146,16 @@ def _moved(actions: Array, counts: Array, noise: float) -> Array:
 
 
 def _of_free_demonstrations(samples: Samples, free: Array) -> Array:
-    """The probability of being free, and zero where most of a demonstration was not: there it may be chance."""
+    """The probability of being free, and zero where it may be chance, or a hinge looks the same.
+
+    That is in demonstrations of which most was not free, and in those that went about one place at one distance.
+    """
     of_group, counts = (np.bincount(samples.groups, samples.counts * one) for one in (free, np.ones(len(free))))
-    return np.asarray(free * (of_group > 0.5 * counts)[samples.groups])
+    mostly = of_group > 0.5 * counts
+    for group in np.flatnonzero(mostly):
+        rows = samples.groups == group
+        mostly[group] = pivot_of(samples.states[rows], samples.actions[rows]) is None
+    return np.asarray(free * mostly[samples.groups])
 
 
 def parts_of(samples: Samples) -> NDArray[np.intp]:

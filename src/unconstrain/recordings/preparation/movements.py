@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...base.arrays import Array, as_matrix, as_vector, check_at_least
 from ...base.display import counted
-from ...base.errors import InvalidDataError, SettingError
+from ...base.errors import InvalidDataError, LackingError, SettingError
 from ..demonstration import Demonstration, Recording, Source
 from ..readers.clocks import usual
 from ..remarks import Remark
@@ -242,7 +242,7 @@ def trim(
     keep = np.ones(len(demonstration), dtype=bool)
     if start_s or end_s:
         if demonstration.times is None:
-            raise SettingError(f"'{demonstration.name}' has no times to trim by: give a time column, or a rate.")
+            raise LackingError(f"'{demonstration.name}' has no times to trim by: give a time column, or a rate.")
         since = demonstration.times - demonstration.times[0]
         keep = (since >= start_s - 1e-9) & (since <= since[-1] - end_s + 1e-9)
     if still is not None:
@@ -294,7 +294,7 @@ def _prepare(subject: Subject) -> tuple[Demonstration, list[Remark]]:
         notes += more
         at = _nearest(stamped, times)
     if actions is None:
-        raise SettingError(
+        raise LackingError(
             f"'{recording.name}' has no times, which are needed to differentiate: "
             "name the time column with time=, or give its rate in samples per second with rate=."
         )

@@ -12,8 +12,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from ...base.arrays import Array, check_at_least
-from ...base.display import listed, speed_of, with_unit
-from ...base.errors import SettingError
+from ...base.display import listed, speed_of, unit_of, with_unit
+from ...base.errors import SettingError, UntoldError
 from ...models import spaces
 from ..demonstration import Recording
 from .guesses import guess_actions, guess_states, positions_in
@@ -193,8 +193,9 @@ class Recipe:
         return states, actions
 
     def units(self, recorded: Mapping[str, str]) -> dict[str, str]:
-        """Units of what is learnt, by those of columns: rad of angles, and of what is in degrees."""
-        told = dict.fromkeys(self.angles, "rad") | {name: unit for name, unit in recorded.items() if unit}
+        """Units of what is learnt, by those of columns or their names: rad of angles, and of what is in degrees."""
+        told = {name: unit for name in self.states or () if (unit := unit_of([name]))}
+        told |= dict.fromkeys(self.angles, "rad") | {name: unit for name, unit in recorded.items() if unit}
         for name in self.degrees or ():
             unit = recorded.get(name) or ("deg/s" if name in (self.actions or ()) else "deg")
             told[name] = re.sub(r"deg(ree)?s?|[°º]", "rad", unit, flags=re.IGNORECASE)
@@ -279,7 +280,7 @@ def _with_columns(recipe: Recipe, recording: Recording) -> Recipe:
         return replace(told, states=states, actions=actions)
     if states and states == _with_turning(told, positions_in(columns)):
         return replace(told, states=states, differentiate="savgol")
-    raise SettingError(
+    raise UntoldError(
         f"'{recording.name}': cannot tell {'the actions' if states else 'states and actions'} from its columns "
         f"{listed(columns)}. Say which with states= and actions=, or take the velocity "
         "of the states with differentiate='savgol'."

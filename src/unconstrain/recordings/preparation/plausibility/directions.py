@@ -10,8 +10,12 @@ from .outlines import Outline
 REACH, RIDGE = 0.3, 3.0
 """How far a place says something of others, in standard deviations of all in each direction, and how much is noise."""
 
-AGAINST, WITH = -0.5, 0.6
-"""Cosines with the prediction: of one that goes the other way at most, and of the median one at least."""
+AGAINST, WITH = -0.8, 0.6
+"""Cosines with the prediction: of one that goes the other way at most, and of the median one at least.
+
+Rails and doors lead people where others do not predict, or against it: with −0.5, 15 of 100 such sets that nothing is
+wrong with were accused, with −0.8 seven; of 120 backward ones among free movements 115 are found in place of 116.
+"""
 
 WEAK = 0.15
 """Predictions shorter than this share of the steps say nothing."""

@@ -258,8 +258,8 @@ def columns_differ(outlines: Sequence[Outline], strange: Collection[int]) -> lis
 
 def reversed_among_others(outlines: Sequence[Outline], strange: Collection[int]) -> list[tuple[int, Remark]]:
     """Demonstrations that move against what all others, but for ``strange`` ones, say at their places."""
-    message = "moves against the others at the same places; leave it out with leave_out=, or turn it round. If a "
-    message += "column has another sign in it, or two are exchanged, correct that."
+    message = "moves against the others at the same places. If it should not, leave it out with leave_out=, or turn it "
+    message += "round; if a column has another sign in it, or two are exchanged, correct that."
     return [
         (places[index], Remark("reversed", message))
         for places in _together(outlines, strange)
