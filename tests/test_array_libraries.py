@@ -136,9 +136,9 @@ POLICIES = {
 def test_a_policy_learns_and_predicts_as_from_numpy(to, kind, weighted):
     data = samples.draw()
     weights = np.arange(len(data.states)) % 3.0 if weighted else None
-    expected = POLICIES[kind]().fit(data.states, data.actions, weights, data.groups)
+    expected = POLICIES[kind]().fit(data.states, data.actions, sample_weight=weights, groups=data.groups)
     moved_weights = None if weights is None else to(weights)
-    found = POLICIES[kind]().fit(to(data.states), to(data.actions), moved_weights, data.groups)
+    found = POLICIES[kind]().fit(to(data.states), to(data.actions), sample_weight=moved_weights, groups=data.groups)
     assert_same(found.solution_.weights, expected.solution_.weights, 1e-8, foreign=False)
     assert_same(found.predict(to(data.states)), expected.predict(data.states), 1e-8)
     assert_same(found.predict(data.states), expected.predict(data.states), 1e-8, foreign=False)

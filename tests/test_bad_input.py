@@ -1,6 +1,7 @@
 """Whatever comes in: a clear error, or a finite policy that says what it knows."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -12,7 +13,7 @@ from sklearn.base import clone
 import unconstrain as uc
 from conftest import LEARNERS, POLICIES
 from samples import draw
-from unconstrain.base.errors import InvalidDataError, UnconstrainError
+from unconstrain.base.errors import InvalidDataError, SettingError, UnconstrainError
 
 
 def broken(table, row, column, value):
@@ -204,7 +205,11 @@ FORMS = {
 @pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
 def test_the_form_of_the_numbers_does_not_matter(policy, form, data):
     plain = clone(policy).fit(data.states, data.actions).predict(data.states)
-    other = clone(policy).fit(form(data.states), form(data.actions), form(np.ones(90))).predict(form(data.states))
+    other = (
+        clone(policy)
+        .fit(form(data.states), form(data.actions), sample_weight=form(np.ones(90)))
+        .predict(form(data.states))
+    )
     assert_allclose(other, plain, atol=1e-9)
 
 
@@ -257,12 +262,12 @@ def test_states_of_any_size_give_a_finite_policy(size, data):
 
 @pytest.mark.parametrize("weight", [1e-300, 1e-30, 1e29])
 def test_weights_of_any_size_give_a_finite_policy(policy, weight, data):
-    policy.fit(data.states, data.actions, np.full(90, weight))
+    policy.fit(data.states, data.actions, sample_weight=np.full(90, weight))
     assert_finite(policy, data.states)
 
 
 def test_weights_of_very_different_size_give_a_finite_policy(policy, data):
-    assert_finite(policy.fit(data.states, data.actions, np.logspace(-300, 10, 90)), data.states)
+    assert_finite(policy.fit(data.states, data.actions, sample_weight=np.logspace(-300, 10, 90)), data.states)
 
 
 def test_a_single_wild_state_does_not_spoil_the_others(data):
@@ -323,3 +328,31 @@ def test_a_batch_beside_which_the_first_is_nothing_is_refused_in_words(learner, 
     with pytest.raises(InvalidDataError, match="one unit for all batches"):
         policy.partial_fit(states, -1e29 * states)
     assert_array_equal(policy.predict(states), before)
+
+
+def test_what_is_masked_is_refused_as_missing(policy, data):
+    masked = np.ma.masked_greater(data.states, np.sort(data.states[:, 0])[-3])
+    for X, y, of in ((masked, data.actions, "states"), (data.states, np.ma.masked_greater(data.actions, 0), "actions")):
+        with pytest.raises(InvalidDataError, match=f"{of}: found nan at row"):
+            clone(policy).fit(X, y)
+    policy.fit(np.ma.masked_array(data.states), np.ma.masked_array(data.actions))  # nothing in it is masked
+    plain = clone(policy).fit(data.states, data.actions)
+    assert_array_equal(policy.predict(data.states), plain.predict(data.states))
+    with pytest.raises(InvalidDataError, match="states: found nan at row"):
+        policy.predict(masked)
+
+
+@pytest.mark.parametrize(
+    "table", [pd.DataFrame([[1.0, 2.0]]), pd.DataFrame([[1.0, 2.0]], columns=["x", "y"]), np.eye(2)]
+)
+def test_a_table_in_memory_is_no_path(table):
+    for paths in (table, [table]):
+        with pytest.raises(SettingError, match=r"paths: got \w+, expected paths; .* uc.Recording\(columns, values\)"):
+            uc.read(paths)
+
+
+def test_names_of_columns_may_be_one_text():
+    assert uc.Recipe(states="x, y", actions="vx,vy") == uc.Recipe(states=("x", "y"), actions=("vx", "vy"))
+    assert uc.Recipe(states="x").states == ("x",)
+    with pytest.raises(SettingError, match="each once"):
+        uc.Recipe(states="x,x")

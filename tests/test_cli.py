@@ -826,6 +826,21 @@ def test_export_writes_a_package_for_ros(policy, tmp_path):
     assert not (tmp_path / "other").exists()
 
 
+def test_no_package_commands_accelerations_as_velocities(tmp_path):
+    rng = np.random.default_rng(0)
+    states = rng.uniform(-1, 1, (40, 4))
+    reach = uc.ParametricPolicy(uc.Affine(), "direct").fit(states, -states[:, :2] - states[:, 2:])
+    recipe = {"states": ["x", "y", "vx", "vy"], "actions": ["ax", "ay"]}
+    storage.save(reach, tmp_path / "reach.npz", {"recipe": recipe})
+    said = refused("export", tmp_path / "reach.npz", "--ros2", tmp_path / "reach", "--messages", "joints")
+    assert said.startswith(
+        "--ros2: got 4 states (x, y, vx, vy) and 2 actions (ax, ay), expected positions and their vel"
+    )
+    assert not (tmp_path / "reach").exists()
+    run("export", tmp_path / "reach.npz", "-o", tmp_path / "reach.c")
+    assert "actions: ax, ay" in (tmp_path / "reach.c").read_text()
+
+
 def test_export_as_json_says_the_same(policy, tmp_path):
     told = json.loads(run("export", policy, "-o", tmp_path / "swing.c", "--json"))
     assert {"C source": str(tmp_path / "swing.c"), "header": str(tmp_path / "swing.h")}.items() <= told.items()

@@ -62,9 +62,10 @@ def chunked(rows, *arrays):
 @pytest.mark.parametrize("kind", POLICIES)
 @pytest.mark.parametrize("rows", [600, 45])
 def test_chunks_of_dask_are_the_same_as_one_array(kind, rows):
-    serial = POLICIES[kind]().fit(DATA.states, DATA.actions, WEIGHTS, DATA.groups)
+    serial = POLICIES[kind]().fit(DATA.states, DATA.actions, sample_weight=WEIGHTS, groups=DATA.groups)
     parallel = POLICIES[kind]()
-    found = cluster.fit(parallel, *chunked(rows, DATA.states, DATA.actions, WEIGHTS, DATA.groups))
+    X, y, weights, groups = chunked(rows, DATA.states, DATA.actions, WEIGHTS, DATA.groups)
+    found = cluster.fit(parallel, X, y, sample_weight=weights, groups=groups)
     assert found is parallel
     same(found, serial)
 
@@ -89,8 +90,9 @@ def test_a_vector_of_actions_stays_one():
 
 def test_processes_learn_what_one_learns(workers):
     for make in POLICIES.values():
-        chunks = chunked(100, DATA.states, DATA.actions, WEIGHTS, DATA.groups)
-        same(cluster.fit(make(), *chunks, client=workers), make().fit(DATA.states, DATA.actions, WEIGHTS, DATA.groups))
+        X, y, weights, groups = chunked(100, DATA.states, DATA.actions, WEIGHTS, DATA.groups)
+        found = cluster.fit(make(), X, y, sample_weight=weights, groups=groups, client=workers)
+        same(found, make().fit(DATA.states, DATA.actions, sample_weight=WEIGHTS, groups=DATA.groups))
 
 
 class Slow:

@@ -1,6 +1,9 @@
 """Demonstrations, recordings, and laying them end to end."""
 
+from datetime import UTC, datetime, timedelta
+
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_array_equal
 
@@ -101,3 +104,55 @@ def test_a_column_that_is_not_there_is_named_with_those_that_are():
     recording = Recording(("t", "x"), np.ones((2, 2)), name="log")
     with pytest.raises(InvalidDataError, match="'log' has no column 'y', 'z'; it has t, x"):
         recording.select(["y", "x", "z"])
+
+
+STAMPS = pd.date_range("2024-01-01", periods=4, freq="20ms")
+TABLE = np.arange(8.0).reshape(4, 2)
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        STAMPS,
+        STAMPS.tz_localize("Europe/Berlin"),
+        STAMPS.to_numpy(),
+        pd.Series(STAMPS),
+        STAMPS - STAMPS[0],
+        [datetime(2024, 1, 1, tzinfo=UTC) + k * timedelta(milliseconds=20) for k in range(4)],
+        [0, 0.02, 0.04, 0.06],
+    ],
+)
+def test_dates_become_seconds_from_the_first_on(times):
+    recording = Recording(("x", "y"), TABLE, times, name="ts")
+    assert recording.times.dtype == np.float64
+    np.testing.assert_allclose(recording.times, 0.02 * np.arange(4), atol=1e-9)
+
+
+def test_stamps_of_numbers_stay_as_they_are():
+    assert_array_equal(Recording(["x", "y"], TABLE, 1.7e9 + np.arange(4)).times, 1.7e9 + np.arange(4))
+    assert Recording(("x", "y"), TABLE).times is None
+
+
+def test_tables_of_pandas_and_masked_ones_are_values():
+    frame = pd.DataFrame(TABLE, columns=["x", "y"])
+    recording = Recording(tuple(frame.columns), frame)
+    assert_array_equal(recording.select(["y"]), TABLE[:, 1:])
+    masked = Recording(("x", "y"), np.ma.masked_greater(TABLE.astype(int), 6)).values
+    assert_array_equal(np.isnan(masked), TABLE > 6)
+    assert Recording(("x", "y"), TABLE).values is TABLE
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ((("x",), TABLE), r"recording: got values of shape \(4, 2\) and 1 name of columns \(x\)"),
+        ((("x", "y"), TABLE[:, 0]), r"got values of shape \(4,\)"),
+        ((("x", "y"), TABLE, np.arange(3.0)), r"times of shape \(3,\) .* expected a name for each column and a time"),
+        ((("x", "y"), TABLE, ["noon"] * 4), r"times: got values that are not numbers"),
+        ((("x", "y"), [["up", 1.0]]), r"values: got values that are not numbers"),
+        ((("x", "y"), [[1.0, 2.0], [3.0]]), r"values: the rows have different lengths"),
+    ],
+)
+def test_recordings_that_do_not_fit_together_are_refused(given, said):
+    with pytest.raises(InvalidDataError, match=said):
+        Recording(*given)

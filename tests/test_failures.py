@@ -76,16 +76,24 @@ FAILING = {
     "other columns": lambda policy: policy.partial_fit(np.ones((5, 3)), np.ones((5, 2))),
     "a batch without groups": lambda policy: policy.partial_fit(DATA.states, DATA.actions),
     "a fit to NaN": lambda policy: policy.fit(np.full((5, 2), np.nan), np.ones((5, 2))),
-    "a fit to weights of zero": lambda policy: policy.fit(DATA.states, DATA.actions, np.zeros(120)),
+    "a fit to weights of zero": lambda policy: policy.fit(DATA.states, DATA.actions, sample_weight=np.zeros(120)),
     "a generator": lambda policy: policy.fit_batches(broken()),
     "the first walk": lambda policy: policy.fit_batches(Twice(fails_on=1)),
     "the second walk": lambda policy: policy.fit_batches(Twice(fails_on=2)),
     "no batch": lambda policy: policy.fit_batches([]),
     "no demonstration": lambda policy: policy.fit_demonstrations([]),
-    "a learner": lambda policy: policy.set_params(learner=LearnsNothing()).partial_fit(*halves()[0]),
-    "a learner in fit": lambda policy: policy.set_params(learner=LearnsNothing()).fit(*halves()[0]),
-    "what is not finite": lambda policy: policy.set_params(learner=LearnsNaN()).partial_fit(*halves()[0]),
-    "what is not finite in fit": lambda policy: policy.set_params(learner=LearnsNaN()).fit(*halves()[0]),
+    "a learner": lambda policy: policy.set_params(learner=LearnsNothing()).partial_fit(
+        *halves()[0][:2], groups=halves()[0][3]
+    ),
+    "a learner in fit": lambda policy: policy.set_params(learner=LearnsNothing()).fit(
+        *halves()[0][:2], groups=halves()[0][3]
+    ),
+    "what is not finite": lambda policy: policy.set_params(learner=LearnsNaN()).partial_fit(
+        *halves()[0][:2], groups=halves()[0][3]
+    ),
+    "what is not finite in fit": lambda policy: policy.set_params(learner=LearnsNaN()).fit(
+        *halves()[0][:2], groups=halves()[0][3]
+    ),
     "a cluster that is lost after the first look": lambda policy: policy.fit_parts([halves()], Lost()),
     "parts": lambda policy: policy.fit_parts([halves(), broken()], lambda call, parts: sum_of(map(call, parts))),
 }
@@ -101,15 +109,19 @@ def sum_of(parts):
 @pytest.mark.parametrize("kind", POLICIES)
 @pytest.mark.parametrize("failing", FAILING)
 def test_a_call_that_fails_leaves_the_policy_as_it_was(kind, failing):
-    policy = clone(POLICIES[kind]).partial_fit(*halves()[0])
+    policy = clone(POLICIES[kind]).partial_fit(*halves()[0][:2], groups=halves()[0][3])
     before, learner = vars(policy).copy(), policy.learner
     with pytest.raises((uc.UnconstrainError, OSError, RuntimeError)):
         FAILING[failing](policy)
     policy.learner = learner
     assert vars(policy).keys() == before.keys()
     assert all(value is before[name] for name, value in vars(policy).items())
-    retried = policy.partial_fit(*halves()[1])
-    expected = clone(POLICIES[kind]).partial_fit(*halves()[0]).partial_fit(*halves()[1])
+    retried = policy.partial_fit(*halves()[1][:2], groups=halves()[1][3])
+    expected = (
+        clone(POLICIES[kind])
+        .partial_fit(*halves()[0][:2], groups=halves()[0][3])
+        .partial_fit(*halves()[1][:2], groups=halves()[1][3])
+    )
     assert_array_equal(retried.predict(DATA.states), expected.predict(DATA.states))
     assert retried.moments_.weight.sum() == expected.moments_.weight.sum()
 
@@ -126,7 +138,10 @@ def test_a_first_call_that_fails_fixes_nothing(kind, failing):
         assert vars(policy).keys() == before
         assert not hasattr(policy, "n_features_in_")
     scaled = (1000 * DATA.states, 1000 * DATA.actions, None, DATA.groups)
-    assert_allclose(policy.partial_fit(*scaled).predict(scaled[0]), clone(policy).fit(*scaled).predict(scaled[0]))
+    assert_allclose(
+        policy.partial_fit(*scaled[:2], groups=scaled[3]).predict(scaled[0]),
+        clone(policy).fit(*scaled[:2], groups=scaled[3]).predict(scaled[0]),
+    )
 
 
 def test_what_is_not_finite_is_neither_saved_nor_exported(tmp_path):
@@ -144,7 +159,7 @@ def test_what_is_not_finite_is_neither_saved_nor_exported(tmp_path):
 def test_weights_in_any_unit_give_a_finite_policy_or_a_sentence(kind, unit):
     policy = clone(POLICIES[kind])
     try:
-        policy.fit(DATA.states, DATA.actions, np.full(120, unit), DATA.groups)
+        policy.fit(DATA.states, DATA.actions, sample_weight=np.full(120, unit), groups=DATA.groups)
     except uc.UnconstrainError:
         assert not hasattr(policy, "solution_")
     else:
@@ -249,7 +264,7 @@ class TestWhenAStreamIsTypical:
 
     def test_weights_of_some_waiting_batches_are_ones_elsewhere(self):
         policy = uc.ParametricPolicy(uc.Affine(), uc.Hybrid()).partial_fit(DATA.states[:5], DATA.actions[:5])
-        policy.partial_fit(DATA.states[5:], DATA.actions[5:], np.full(115, 2.0))
+        policy.partial_fit(DATA.states[5:], DATA.actions[5:], sample_weight=np.full(115, 2.0))
         assert policy.moments_.weight.sum() == 5.0 + 230.0
 
     def test_a_long_stream_of_single_samples_takes_no_longer_than_its_length_says(self):

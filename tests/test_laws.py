@@ -315,7 +315,7 @@ def exactness(policy):
 @pytest.mark.parametrize("weight", [1e-310, 10.0, 1e29])
 def test_scaling_all_weights_changes_nothing(policy, grouped, data, weight):
     weights = np.full(len(data.states), weight)
-    heavy = clone(policy).fit(data.states, data.actions, weights, groups=data.groups)
+    heavy = clone(policy).fit(data.states, data.actions, sample_weight=weights, groups=data.groups)
     assert_same(heavy.predict(data.states), grouped.predict(data.states), 1e-9)
     assert_same_beliefs(heavy, grouped)
 
@@ -355,7 +355,7 @@ def test_the_order_of_demonstrations_does_not_matter(policy, data, folds):
 
 def test_a_weight_of_zero_is_absence(policy, data):
     policy, counting = placed(policy, data), np.random.default_rng(4).integers(0, 3, len(data.states)) > 0
-    with_zeros = clone(policy).fit(data.states, data.actions, counting.astype(float), groups=data.groups)
+    with_zeros = clone(policy).fit(data.states, data.actions, sample_weight=counting.astype(float), groups=data.groups)
     without = clone(policy).fit(data.states[counting], data.actions[counting], groups=data.groups[counting])
     assert_same(with_zeros.predict(data.states), without.predict(data.states))
     assert_array_equal(with_zeros.solution_.determined, without.solution_.determined)
@@ -375,7 +375,7 @@ def assert_same_beliefs(actual, expected, rows=slice(None)):
 
 def test_a_weight_is_the_same_as_a_repetition(policy, data):
     times = np.random.default_rng(4).integers(0, 4, len(data.states))
-    weighted = clone(policy).fit(data.states, data.actions, times.astype(float), groups=data.groups)
+    weighted = clone(policy).fit(data.states, data.actions, sample_weight=times.astype(float), groups=data.groups)
     rows = np.repeat(np.arange(len(times)), times)
     repeated = clone(policy).fit(data.states[rows], data.actions[rows], groups=data.groups[rows])
     assert_same(weighted.predict(data.states), repeated.predict(data.states))
@@ -384,7 +384,7 @@ def test_a_weight_is_the_same_as_a_repetition(policy, data):
 
 def test_a_weight_is_the_same_as_a_repetition_where_samples_are_held_out(policy, data):
     times = np.random.default_rng(4).integers(0, 4, len(data.states))
-    weighted = clone(policy).fit(data.states, data.actions, times.astype(float))
+    weighted = clone(policy).fit(data.states, data.actions, sample_weight=times.astype(float))
     rows = np.repeat(np.arange(len(times)), times)
     repeated = clone(policy).fit(data.states[rows], data.actions[rows])
     assert_same(weighted.predict(data.states), repeated.predict(data.states))
@@ -478,7 +478,9 @@ def test_a_batch_without_weight_changes_nothing(policy, plain, data):
     assert_same(
         clone(policy).fit_batches([idle, batches[0], idle, batches[1]]).predict(data.states), expected(data.states)
     )
-    assert_same(deepcopy(plain).partial_fit(*idle).predict(data.states), plain.predict(data.states))
+    assert_same(
+        deepcopy(plain).partial_fit(*idle[:2], sample_weight=idle[2]).predict(data.states), plain.predict(data.states)
+    )
 
 
 def test_what_comes_after_the_first_batch_may_come_in_any_pieces_and_order(policy, data):

@@ -476,6 +476,20 @@ def test_a_movement_that_ends_for_want_of_support_warns_by_a_class_of_its_own(po
     assert [one.category for one in said] == [uc.errors.SupportEndsWarning]
 
 
+@pytest.mark.parametrize("starts", [[900.0, 0.0], [[900.0, 0.0], [0.0, 900.0]]])
+def test_a_start_without_support_is_warned_of_in_python(policy, starts):
+    learnt, near = uc.load(policy), stroke(0)[5, 1:]
+    first = 2 - np.ndim(starts)
+    with pytest.warns(
+        uc.errors.SupportEndsWarning, match=r"\(900, 0\) \(support [^)]*\): what follows is a guess"
+    ) as said:
+        uc.rollout(learnt, starts if first else [*starts, near], steps=3)
+    assert len(said) == 1
+    assert ("near 2 of 3 starts, the first" in str(said[0].message)) != bool(first)
+    uc.rollout(learnt, starts, steps=3, least_support=0.0)  # warnings are errors here
+    uc.rollout(learnt, near, steps=3)
+
+
 def test_the_verdict_speaks_of_obstacles(folder, policy, tmp_path):
     track = stroke(0)
     x, y = track[5, 1:]

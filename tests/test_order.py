@@ -61,7 +61,9 @@ def test_times_tell_the_order(seed):
     batch = Batch(states[rows], states[rows], None, np.zeros(60), np.arange(60.0)[rows])
     order, _, notes = arranged(batch)
     assert_array_equal(rows[order], np.arange(60))
-    assert notes == ()
+    [alone] = notes
+    assert alone.startswith("One demonstration alone: nothing tells what held it")
+    assert arranged(batch._replace(groups=np.arange(60) // 30))[2] == ()
 
 
 def test_copies_are_one_sample_but_not_at_another_time_or_of_another_demonstration():

@@ -683,6 +683,8 @@ def test_a_fit_that_explains_nothing_says_so(tmp_path):
     ran = call("fit", tmp_path / "*.csv", "--model", "linear", "-o", tmp_path / "p.npz")
     assert ran.code == 0
     assert "Note: explains-nothing: misses " in ran.err
+    assert "Note: The policy explains next to nothing" not in ran.err  # its verdict says so
+    assert ran.out.startswith("✖ The policy ")
 
 
 def apart(folder, which, size=1.0, clock=1.0):

@@ -1,12 +1,15 @@
 """The estimators, as scikit-learn sees them and as a person does."""
 
 import pickle
+import warnings
 from dataclasses import replace
+from inspect import signature
 
 import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from sklearn import config_context
 from sklearn.base import clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.exceptions import NotFittedError
@@ -142,14 +145,76 @@ def test_a_long_table_is_predicted_in_blocks_as_in_one(policy_of, data):
 def test_the_score_is_the_share_of_observed_motion_that_is_explained(data):
     policy = uc.ParametricPolicy().fit(data.states, data.actions)
     weights = np.random.default_rng(0).uniform(0, 1, 90)
-    missed = naive.inconsistency(data.actions, policy.predict(data.states), weights)
-    moved = sum(w * u @ u for w, u in zip(weights, data.actions, strict=True))
-    assert policy.score(data.states, data.actions, weights) == pytest.approx(1 - missed / moved)
+    usual = np.sqrt(sum(w * u @ u for w, u in zip(weights, data.actions, strict=True)) / weights.sum())
+    weights_by_speed = [
+        w * min(1.0, np.linalg.norm(u) / (0.5 * usual)) ** 2 for w, u in zip(weights, data.actions, strict=True)
+    ]
+    missed = naive.inconsistency(data.actions, policy.predict(data.states), weights_by_speed)
+    moved = sum(w * u @ u for w, u in zip(weights_by_speed, data.actions, strict=True))
+    assert policy.score(data.states, data.actions, sample_weight=weights) == pytest.approx(1 - missed / moved)
+
+
+def test_rest_does_not_spoil_the_score_of_the_true_policy():
+    rng = np.random.default_rng(0)
+    states = rng.uniform(-1, 1, (400, 2))
+    held = np.arange(400) % 2 == 0  # against a wall, where the policy pushes on, and what is recorded is noise
+    actions = np.where(held[:, None], 0.0, -states) + 1e-3 * rng.standard_normal((400, 2))
+    true = uc.ParametricPolicy(uc.Affine(), "direct").fit(states, -states)
+    plain = 1 - naive.inconsistency(actions, -states, np.ones(400)) / (actions**2).sum()
+    assert plain < 0.7
+    assert true.score(states, actions) > 0.99
+    wrong = uc.ParametricPolicy(uc.Affine(), "direct").fit(states, states)
+    assert wrong.score(states, actions) < 0
+
+
+def test_a_score_is_the_same_in_blocks_and_with_repetitions(data, monkeypatch):
+    policy = uc.ParametricPolicy(uc.Affine(), "direct").fit(data.states, data.actions)
+    actions = data.actions * np.logspace(-3, 0, 90)[:, None]
+    times = np.arange(90) % 3
+    whole = policy.score(data.states, actions, sample_weight=times)
+    assert whole == pytest.approx(policy.score(np.repeat(data.states, times, 0), np.repeat(actions, times, 0)))
+    monkeypatch.setattr("unconstrain.training.batches.BLOCK_ROWS", 7)
+    assert whole == pytest.approx(policy.score(data.states, actions, sample_weight=times))
 
 
 def test_a_score_of_no_motion_is_zero(data):
     policy = uc.ParametricPolicy().fit(data.states, data.actions)
     assert policy.score(data.states, np.zeros_like(data.actions)) == 0.0
+
+
+def test_groups_reach_every_fit_of_a_search_and_of_a_cross_validation(data):
+    seen = []
+
+    class Told(uc.LocallyLinearPolicy):
+        def fit(self, X, y, *, sample_weight=None, groups=None):
+            seen.append(None if groups is None else len(set(groups)))
+            return super().fit(X, y, sample_weight=sample_weight, groups=groups)
+
+    told = {"X": data.states, "y": data.actions, "cv": GroupKFold(3), "groups": data.groups}
+    cross_val_score(Told(learner="hybrid"), **told, params={"groups": data.groups})
+    assert seen == [4, 4, 4]
+    with config_context(enable_metadata_routing=True):
+        policy = Told(learner="hybrid").set_fit_request(groups=True)
+        grid = {"variance": [0.3, 3.0]}
+        GridSearchCV(policy, grid, cv=GroupKFold(3)).fit(data.states, data.actions, groups=data.groups)
+        assert seen[3:] == [4] * 6 + [6]
+        make_pipeline(StandardScaler(), policy).fit(data.states, data.actions, groups=data.groups)
+        assert seen[-1] == 6
+
+
+@pytest.mark.parametrize("method", ["fit", "partial_fit", "score"])
+def test_groups_are_never_taken_for_weights(data, method):
+    demos = [uc.Demonstration(data.states[data.groups == g], data.actions[data.groups == g]) for g in range(6)]
+    policy = uc.ParametricPolicy(learner="hybrid").fit(data.states, data.actions)
+    with pytest.raises(SettingError, match=rf"{method}: got 3 arrays.*{method}\(states, actions, groups=groups\)"):
+        getattr(policy, method)(*uc.stack(demos))
+    assert list(signature(getattr(policy, method)).parameters)[:2] == ["X", "y"]
+    getattr(policy, method)(X=data.states, y=data.actions, sample_weight=np.ones(90))
+
+
+def test_groups_are_never_taken_for_weights_on_a_cluster(data):
+    with pytest.raises(SettingError, match=r"fit\(states, actions, groups=groups\)"):
+        uc.cluster.fit(uc.ParametricPolicy(learner="hybrid"), data.states, data.actions, data.groups)
 
 
 def test_demonstrations_are_groups(data):
@@ -214,7 +279,7 @@ def test_only_so_many_samples_place_the_features():
 def test_samples_without_weight_place_nothing(data):
     weights = np.ones(90)
     far = np.vstack([data.states, [[1e6, 1e6]]])
-    policy = uc.ParametricPolicy().fit(far, np.vstack([data.actions, [[0, 0]]]), np.append(weights, 0.0))
+    policy = uc.ParametricPolicy().fit(far, np.vstack([data.actions, [[0, 0]]]), sample_weight=np.append(weights, 0.0))
     plain = uc.ParametricPolicy().fit(data.states, data.actions)
     assert_allclose(policy.predict(data.states), plain.predict(data.states), atol=1e-7)
 
@@ -332,7 +397,9 @@ def test_speed_power_is_a_sample_weight():
     demos = uc.rollout(LimitCycle(), [[0.1, 0.9], [0.5, -0.5], [-1.0, 0.2]], 30, 0.05)
     states, actions, groups = uc.stack(demos)
     weighted = uc.LocallyLinearPolicy(None).fit_demonstrations(demos, speed_power=2.0)
-    by_hand = uc.LocallyLinearPolicy(None, learner=uc.Hybrid()).fit(states, actions, (actions**2).sum(axis=1), groups)
+    by_hand = uc.LocallyLinearPolicy(None, learner=uc.Hybrid()).fit(
+        states, actions, sample_weight=(actions**2).sum(axis=1), groups=groups
+    )
     assert_allclose(weighted.predict(states), by_hand.predict(states), rtol=1e-6, atol=1e-9)
 
 
@@ -366,3 +433,46 @@ def test_a_first_batch_that_does_not_move_leaves_folds_for_the_next():
     policy = uc.ParametricPolicy(uc.Affine()).partial_fit(np.ones((1, data.states.shape[1])), data.actions[:1])
     policy.partial_fit(data.states, data.actions)
     assert sum(part.weight.any() for part in policy.training_.gathered.parts) > 5
+
+
+def opposed(seed=0):
+    """Strokes that go up and down at the same places: no policy explains one by the others."""
+    x = np.linspace(0, 1, 30)
+    states = np.concatenate([np.column_stack([x, 0.01 * k + 0 * x]) for k in range(6)])
+    groups = np.repeat(np.arange(6), 30)
+    return states, np.column_stack([0 * groups, 1.0 - 2.0 * (groups % 2)]), groups
+
+
+def test_a_fit_that_explains_next_to_nothing_warns_once_and_notes_it():
+    states, actions, groups = opposed()
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        policy = uc.LocallyLinearPolicy(None).fit(states, actions, groups=groups)
+    assert policy.held_out_score() < 0.2
+    assert [one.category for one in said] == [UserWarning]
+    assert str(said[0].message) == policy.solution_.notes[-1]
+    assert "explains next to nothing of held-out motion" in policy.solution_.notes[-1]
+    fine = uc.LocallyLinearPolicy(None).fit(states, np.abs(actions), groups=groups)  # warnings are errors here
+    assert not any("next to nothing" in note for note in fine.solution_.notes)
+
+
+@pytest.mark.parametrize("learner", ["robust", "hybrid"])
+def test_learning_on_from_a_file_warns_where_samples_are_missed(data, tmp_path, learner):
+    uc.save(
+        uc.LocallyLinearPolicy(learner=learner).fit(data.states, data.actions, groups=data.groups), tmp_path / "p.npz"
+    )
+    stored = uc.load(tmp_path / "p.npz")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        for _ in range(2):
+            stored.partial_fit(data.states, data.actions, groups=data.groups + 10)
+    assert ["all is learnt from sums alone" in str(one.message) for one in said] == [True] * (learner == "robust")
+    with pytest.raises(SettingError, match="anew on all, and not on from a stored policy"):
+        stored.uncertainty(data.states[:1])
+
+
+def test_learning_on_in_memory_keeps_what_it_knows(data):
+    policy = uc.LocallyLinearPolicy().fit(data.states[:45], data.actions[:45], groups=data.groups[:45])
+    policy.partial_fit(data.states[45:], data.actions[45:], groups=data.groups[45:])
+    assert policy.uncertainty(data.states[:1]).total.shape == (1, 2)
+    policy.with_learner("hybrid")  # asked for: no warning

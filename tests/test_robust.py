@@ -239,7 +239,8 @@ def test_what_was_learnt_survives_a_file(tmp_path, sampler, policy_of):
         with pytest.raises(uc.UnconstrainError, match="samples"):
             again.partial_fit(data.states, data.actions, groups=data.groups)
     else:
-        again.partial_fit(data.states, data.actions, groups=data.groups)
+        with pytest.warns(UserWarning, match="from sums alone"):
+            again.partial_fit(data.states, data.actions, groups=data.groups)
         assert "from sums alone" in again.solution_.notes[0]
     assert np.isfinite(again.with_learner(uc.Hybrid()).predict(data.states)).all()
 
@@ -363,8 +364,8 @@ def test_a_demonstration_at_rest_does_not_choose_the_softness():
 def test_a_common_factor_of_small_weights_changes_nothing(sampler):
     data = draw(samples=200)
     policy = uc.ParametricPolicy(uc.Affine(), sampler)
-    once = clone(policy).fit(data.states, data.actions, np.full(200, 1.0), data.groups)
-    small = clone(policy).fit(data.states, data.actions, np.full(200, 1 / 200), data.groups)
+    once = clone(policy).fit(data.states, data.actions, sample_weight=np.full(200, 1.0), groups=data.groups)
+    small = clone(policy).fit(data.states, data.actions, sample_weight=np.full(200, 1 / 200), groups=data.groups)
     assert_allclose(small.predict(data.states), once.predict(data.states), atol=1e-9)
     assert_allclose(small.uncertainty(data.states).total, once.uncertainty(data.states).total, rtol=1e-6)
 
@@ -427,7 +428,8 @@ def test_a_stored_policy_says_that_its_samples_are_gone(tmp_path):
             with pytest.raises(uc.UnconstrainError, match="it was stored"):
                 again.partial_fit(data.states, data.actions, groups=data.groups)
         else:
-            again.partial_fit(data.states, data.actions, groups=data.groups)
+            with pytest.warns(UserWarning, match="from sums alone"):
+                again.partial_fit(data.states, data.actions, groups=data.groups)
             assert "Learnt from sums alone" in " ".join(again.solution_.notes)
 
 
@@ -438,7 +440,7 @@ def test_free_has_an_entry_for_each_sample_of_no_weight_too(sampler):
     weights[[3, 50, 51, 199]] = 0.0
     weights[groups == 4] = 0.0  # a whole demonstration
     policy = uc.ParametricPolicy(uc.Affine(), sampler)
-    weighted = clone(policy).fit(states, actions, weights, groups)
+    weighted = clone(policy).fit(states, actions, sample_weight=weights, groups=groups)
     counting = weights > 0
     without = clone(policy).fit(states[counting], actions[counting], groups=groups[counting])
     assert weighted.solution_.free.shape == (200,)

@@ -202,7 +202,8 @@ def test_a_start_far_from_the_data_is_followed_and_may_come_near():
     policy = local()
     policy.predict = lambda states: -states
     assert policy.support(np.array([[3.0, 0.0]])) < 1e-3
-    assert len(uc.rollout(policy, [3.0, 0.0], 300, 0.02)) == 300
+    with pytest.warns(uc.errors.SupportEndsWarning, match=r"nothing was demonstrated near \(3, 0\)"):
+        assert len(uc.rollout(policy, [3.0, 0.0], 300, 0.02)) == 300
 
 
 @pytest.mark.parametrize("features", [uc.Affine(), uc.Polynomial(3)])

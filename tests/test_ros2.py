@@ -172,3 +172,58 @@ def test_an_orientation_is_refused(tmp_path):
     with pytest.raises(SettingError, match="states hold an orientation"):
         turning.export_ros2(tmp_path / "turning")
     assert not list(tmp_path.iterdir())
+
+
+def test_actions_that_are_no_velocities_are_refused(tmp_path):
+    data = draw(samples=300, policy=lambda x: -x, dimensions=4)
+    policy = uc.ParametricPolicy(uc.Affine(), "direct").fit(data.states, data.actions[:, :2])
+    refused_as = "4 states .* 2 actions .* accelerations are wrong there. Export it as C, ONNX"
+    for messages in (None, "joints", "pose"):
+        with pytest.raises(SettingError, match=refused_as):
+            policy.export_ros2(tmp_path / "reach", messages=messages)
+    policy.export_c(tmp_path / "reach.c")
+    assert not (tmp_path / "reach").exists()
+
+
+@pytest.mark.parametrize(
+    ("recipe", "units"),
+    [
+        ({"states": ["x", "y"], "actions": ["ax", "ay"]}, {}),
+        ({"states": ["x", "vx"], "actions": ["vx", "ax"]}, {}),
+        ({"states": ["x", "vx"]}, {}),
+        ({"states": ["q1", "q2"], "actions": ["qdd1", "qdd2"]}, {}),
+        ({"states": ["x", "y"], "actions": ["x_ddot", "y_ddot"]}, {}),
+        ({"states": ["x", "y"], "actions": ["acc_x", "acc_y"]}, {}),
+        ({"states": ["x", "y"], "actions": ["u1 [m/s^2]", "u2 [m/s^2]"]}, {}),
+        ({"states": ["x", "y"], "actions": ["u1", "u2"]}, {"u1": "rad/s²", "u2": "rad/s²"}),
+    ],
+)
+def test_accelerations_are_known_by_names_and_units(tmp_path, recipe, units):
+    policy, _, _ = learnt(2)
+    with pytest.raises(SettingError, match="accelerations are wrong"):
+        policy.export_ros2(tmp_path / "reach", notes={"recipe": recipe, "units": units})
+
+
+@pytest.mark.parametrize(
+    ("recipe", "units"),
+    [
+        ({"states": ["x", "y"], "actions": ["vx", "vy"]}, {"vx": "m/s"}),
+        ({"states": ["pos1", "pos2"]}, {}),
+        ({"states": ["q1", "q2"], "actions": ["qd1", "qd2"]}, {}),
+        ({"states": ["x [mm]", "y [mm]"], "actions": ["dx [mm/s]", "dy [mm/s]"]}, {}),
+        ({"states": ["observation.state.0", "observation.state.1"], "actions": ["action.0", "action.1"]}, {}),
+    ],
+)
+def test_velocities_are_taken_whatever_they_are_called(tmp_path, recipe, units):
+    policy, _, _ = learnt(2)
+    policy.export_ros2(tmp_path / "reach", notes={"recipe": recipe, "units": units})
+    assert (tmp_path / "reach" / "README.md").exists()
+
+
+def test_actions_of_arrays_are_not_called_velocities(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    data = draw(samples=300, policy=lambda x: -x, dimensions=2)
+    frame = pandas.DataFrame(data.states, columns=["x", "y"])
+    policy = uc.ParametricPolicy(uc.Affine(), "direct").fit(frame, data.actions)
+    told = policy.describe(policy.closed_form()).whole
+    assert (told["states"], told["actions"]) == ("x, y", "u1, u2")

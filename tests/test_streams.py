@@ -52,7 +52,9 @@ def test_batches_are_the_same_as_all_at_once(kind, size):
 def test_batches_with_weights_and_groups_are_the_same_too(size, seed):
     weights = np.random.default_rng(seed).integers(0, 3, 400).astype(float)
     weights[::size] = 1.0  # no batch without any
-    whole = uc.ParametricPolicy(uc.KMeansRBF(7), uc.Hybrid()).fit(DATA.states, DATA.actions, weights, DATA.groups)
+    whole = uc.ParametricPolicy(uc.KMeansRBF(7), uc.Hybrid()).fit(
+        DATA.states, DATA.actions, sample_weight=weights, groups=DATA.groups
+    )
     batched = cut(size, DATA.states, DATA.actions, weights, DATA.groups)
     same(uc.ParametricPolicy(uc.KMeansRBF(7), uc.Hybrid()).fit_batches(batched), whole)
 
@@ -143,9 +145,9 @@ def test_a_block_without_weight_is_passed_over(monkeypatch):
     monkeypatch.setattr(batches, "BLOCK_ROWS", 100)
     weights = np.repeat([1.0, 0.0, 2.0, 0.0], 100)
     counting = weights > 0
-    blocked = uc.ParametricPolicy(uc.Affine(), uc.Hybrid()).fit(DATA.states, DATA.actions, weights)
+    blocked = uc.ParametricPolicy(uc.Affine(), uc.Hybrid()).fit(DATA.states, DATA.actions, sample_weight=weights)
     left_out = uc.ParametricPolicy(uc.Affine(), uc.Hybrid()).fit(
-        DATA.states[counting], DATA.actions[counting], weights[counting]
+        DATA.states[counting], DATA.actions[counting], sample_weight=weights[counting]
     )
     same(blocked, left_out)
 

@@ -76,7 +76,7 @@ def test_a_bad_sample_is_named_and_absent(name, kind):
     elif kind == "kmeans":
         policy.set_params(features=uc.NormalisedRBF.grid(-2, 2, 3))
     bad = clone(policy).fit(states, actions, groups=groups)
-    without = clone(policy).fit(states, movements()[1], absent(row), groups)
+    without = clone(policy).fit(states, movements()[1], sample_weight=absent(row), groups=groups)
     assert_array_equal(bad.solution_.belief.suspects, [row])
     assert_allclose(bad.predict(states), without.predict(states), rtol=0, atol=1e-9 * np.abs(actions).max())
 

@@ -338,3 +338,18 @@ def test_the_command_scores_recordings_in_their_planes(tmp_path):
     assert "In all directions of the planes that 3 of 3" in right["verdict"]["trust"]
     known = json.loads(call("score", tmp_path / "off.npz", files[0], *options, "--plane", "0,0,1").stdout)
     assert "plane held" not in known["verdict"]["said"]  # it is given
+
+
+def test_the_share_that_fit_prints_is_the_score_in_python(tmp_path):
+    rng, times = np.random.default_rng(0), np.arange(0.0, 4.0, 0.05)
+    for number in range(4):
+        start = [np.cos(number), np.sin(number)]
+        states = np.exp(-3.0 * times)[:, None] * start  # most of the time at rest, where noise is all there is
+        table = np.column_stack([times, states, -3.0 * states + 1e-3 * rng.standard_normal(states.shape)])
+        np.savetxt(tmp_path / f"{number}.csv", table, delimiter=",", header="t,x,y,vx,vy", comments="")
+    files = sorted(tmp_path.glob("*.csv"))
+    told = json.loads(call("fit", *files, "--model", "affine", "-o", tmp_path / "p.npz", "--json").stdout)
+    demos = uc.prepare(uc.read(files), uc.Recipe(states=("x", "y"), actions=("vx", "vy")))
+    states, actions, _ = uc.stack(demos)
+    assert uc.load(tmp_path / "p.npz").score(states, actions) == pytest.approx(told["training"], abs=1e-6)
+    assert told["training"] > 0.999

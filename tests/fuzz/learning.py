@@ -43,8 +43,8 @@ def learning(begin, folder):
     policy = uc.LocallyLinearPolicy(learner=learner) if rng.integers(2) else uc.ParametricPolicy(features, learner)
     if isinstance(learner, uc.Segments) and rng.integers(2):
         policy.learner = uc.Segments("groups")
-    policy.fit(states, actions, weights, groups)
+    policy.fit(states, actions, sample_weight=weights, groups=groups)
     if rng.integers(4) == 0:
-        policy.partial_fit(odd_table(rng, rows, n, plain), odd_table(rng, rows, d, plain), None, groups)
+        policy.partial_fit(odd_table(rng, rows, n, plain), odd_table(rng, rows, d, plain), groups=groups)
     found = policy.predict(states)
     return None if np.isfinite(found).all() else f"{policy} predicts what is not finite"

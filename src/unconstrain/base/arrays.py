@@ -12,6 +12,7 @@ of another library. Such an array stays on its device.
 import importlib
 import math
 from collections.abc import Hashable, Iterator, Sequence
+from contextlib import suppress
 from numbers import Integral
 from types import ModuleType
 from typing import Any, NoReturn
@@ -76,6 +77,34 @@ def on_host(array: Any) -> NDArray[Any]:
     return np.asarray(array)
 
 
+def as_numbers(values: ArrayLike, what: str, convert: bool = True) -> Array:
+    """Numbers of any shape as float64, NaN where masked; raises InvalidDataError if ragged, complex or none."""
+    if is_foreign(values):
+        return _foreign_as_numbers(values, what, convert)
+    try:
+        raw = np.ma.filled(values.astype(float), np.nan) if np.ma.isMaskedArray(values) else np.asarray(values)
+    except ValueError as error:  # NumPy's word for rows of different lengths
+        raise InvalidDataError(f"{what}: the rows have different lengths, expected a rectangular table.") from error
+    if raw.dtype.kind == "c":
+        raise InvalidDataError(f"{what}: complex data not supported, expected real numbers.")
+    if not convert and raw.dtype.kind in "fiu":
+        return raw
+    try:
+        return raw.astype(np.float64, copy=False)
+    except (TypeError, ValueError) as error:
+        raise InvalidDataError(f"{what}: got values that are not numbers ({error}).") from error
+
+
+def as_seconds(values: Any, what: str) -> Array:
+    """Time stamps (T,) as seconds; of dates, of NumPy, pandas or Python, those from the first on."""
+    raw = np.asarray(values)
+    if raw.dtype.kind == "O":
+        with suppress(TypeError, AttributeError):  # numbers are no dates
+            raw = np.array([(one - raw.flat[0]).total_seconds() for one in raw.flat])
+    raw = raw - raw.flat[:1] if raw.dtype.kind == "M" else raw
+    return as_numbers(raw / np.timedelta64(1, "s") if raw.dtype.kind == "m" else raw, what)
+
+
 def as_matrix(values: ArrayLike, what: str, *, convert: bool = True) -> Array:
     """Check a table of finite numbers and return it as a float64 array.
 
@@ -99,7 +128,7 @@ def as_matrix(values: ArrayLike, what: str, *, convert: bool = True) -> Array:
         If it is ragged, not two-dimensional, empty, or holds NaN, infinity or a
         number beyond :data:`LARGEST`; the message names the row and the column.
     """
-    matrix = _as_real(values, what, convert)
+    matrix = as_numbers(values, what, convert)
     if matrix.ndim != 2:
         raise InvalidDataError(
             f"{what}: got an array of shape {tuple(matrix.shape)}, expected two dimensions (samples, columns). "
@@ -125,7 +154,7 @@ def as_table(values: ArrayLike, what: str, *, convert: bool = True) -> tuple[Arr
     InvalidDataError
         As :func:`as_matrix` does.
     """
-    array = _as_real(values, what, convert)
+    array = as_numbers(values, what, convert)
     flat = array.ndim == 1
     return as_matrix(array[:, None] if flat else array, what, convert=convert), flat
 
@@ -138,7 +167,7 @@ def as_vector(values: ArrayLike, what: str, length: int | None = None) -> Array:
     InvalidDataError
         If it is ragged, not one-dimensional, of the wrong length, or holds NaN or infinity.
     """
-    vector = _as_real(on_host(values) if is_foreign(values) else values, what)
+    vector = as_numbers(on_host(values) if is_foreign(values) else values, what)
     if vector.ndim != 1:
         raise InvalidDataError(f"{what}: got an array of shape {vector.shape}, expected one dimension.")
     if length is not None and len(vector) != length:
@@ -248,24 +277,7 @@ def require_extra(module: str, extra: str) -> ModuleType:
         ) from error
 
 
-def _as_real(values: ArrayLike, what: str, convert: bool = True) -> Array:
-    if is_foreign(values):
-        return _foreign_as_real(values, what, convert)
-    try:
-        raw = np.asarray(values)
-    except ValueError as error:  # NumPy's word for rows of different lengths
-        raise InvalidDataError(f"{what}: the rows have different lengths, expected a rectangular table.") from error
-    if raw.dtype.kind == "c":
-        raise InvalidDataError(f"{what}: complex data not supported, expected real numbers.")
-    if not convert and raw.dtype.kind in "fiu":
-        return raw
-    try:
-        return raw.astype(np.float64, copy=False)
-    except (TypeError, ValueError) as error:
-        raise InvalidDataError(f"{what}: got values that are not numbers ({error}).") from error
-
-
-def _foreign_as_real(values: Any, what: str, convert: bool) -> Any:
+def _foreign_as_numbers(values: Any, what: str, convert: bool) -> Any:
     xp = namespace(values)
     if not xp.isdtype(values.dtype, ("real floating", "integral")):
         raise InvalidDataError(f"{what}: got values of type {values.dtype}, expected real numbers.")

@@ -91,7 +91,7 @@ class MissingExtraError(UnconstrainError, ImportError):
 
 
 class SupportEndsWarning(UserWarning):
-    """A movement that stops before it comes to where nothing was demonstrated."""
+    """A movement that stops before it comes to where nothing was demonstrated, or starts there."""
 
 
 NOTHING_LEFT = "no demonstration is left to read; check episodes=, task= and leave_out=, or leave them off."

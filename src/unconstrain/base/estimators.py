@@ -20,8 +20,8 @@ def checked_states(estimator: Any, X: ArrayLike, *, reset: bool = False, convert
     """
     if not reset and _is_plain(estimator, X):
         return as_matrix(X, "states", convert=convert)
-    if isinstance(X, list | tuple):
-        X = as_matrix(X, "states")  # our words for ragged rows
+    if isinstance(X, list | tuple | np.ma.MaskedArray):
+        X = as_matrix(X, "states")  # our words for ragged rows, and for what is masked
     try:
         # scikit-learn checks names, sparse input and the number of columns; the numbers are ours to check.
         kind = np.float64 if convert else "numeric"

@@ -1,12 +1,15 @@
 """Settings, read and changed as scikit-learn does with its estimators': ``learner__alpha`` is the learner's alpha."""
 
 from collections import defaultdict
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from copy import copy
+from functools import wraps
 from inspect import signature
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from .errors import SettingError
+
+Method = TypeVar("Method", bound=Callable[..., Any])
 
 
 class Parameters:
@@ -48,6 +51,19 @@ class Parameters:
             raise SettingError(
                 f"{name}: {type(self).__name__} has no such setting, expected one of {', '.join(known) or 'none'}."
             )
+
+
+def others_by_name(method: Method) -> Method:
+    """Refuse more than states and actions by their place: next could come weights, or groups."""
+
+    @wraps(method)
+    def called(*given: Any, **named: Any) -> Any:
+        if len(given) > 3:
+            said = f"{(name := method.__name__)}: got {len(given) - 1} arrays, expected two, and the others by name, as"
+            raise SettingError(f"{said} {name}(states, actions, groups=groups) after uc.stack, or sample_weight=.")
+        return method(*given, **named)
+
+    return called  # type: ignore[return-value]  # of the same signature, for who reads it
 
 
 def _settings_of(part: Any) -> dict[str, Any]:

@@ -77,6 +77,7 @@ class Group(click.Group):
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("default", UserWarning)
+                warnings.filterwarnings("ignore", "The policy explains next to nothing")  # its verdict says so
                 warnings.showwarning = show_warning  # type: ignore[assignment]
                 try:
                     return super().invoke(ctx)

@@ -110,7 +110,7 @@ class Exportable:
         Raises
         ------
         SettingError
-            Also if states are orientations, or those of a pose are not three with three actions.
+            Also if actions are not velocities of the states, or states are orientations, or not the three of a pose.
         """
         form = self.closed_form(scaler)
         export_ros2(form, self._after(scaler), folder, name, self.describe(form, notes), messages)
@@ -208,7 +208,8 @@ class Deployable(Exportable):
     def describe(self, form: ClosedForm, notes: Mapping[str, Any] | None = None) -> Description:
         """Columns, units and origin, by the notes of the policy's file, and what it was learnt by."""
         names = getattr(self, "feature_names_in_", None)
-        told = {"recipe": {"states": None if names is None else list(names)}} | dict(notes or {})
+        actions = [f"u{place}" for place in range(1, form.sizes[1] + 1)]  # nobody has said what they are
+        told = {"recipe": {"states": None if names is None else list(names), "actions": actions}} | dict(notes or {})
         learner = type(self.learner).__name__ if self.learner is not None else "Robust"
         method = getattr(self.solution_, "method", "")
         unit = 1.0 if self.scale_ is None else float(self.scale_.actions.max())

@@ -2,12 +2,13 @@
 
 import json
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
 from ..base.arrays import Array
-from ..base.display import bare
+from ..base.display import bare, speed_of, with_unit
 from ..base.errors import SettingError
 from ..base.files import put_folder, workshop
 from ..models import ClosedForm, spaces
@@ -26,6 +27,9 @@ _MESSAGES = {
     "pose": ("geometry_msgs/PoseStamped", "geometry_msgs/TwistStamped"),
 }
 """Messages that come in and go out."""
+
+_ACCELERATION = re.compile(r"(?i)accel|ddot|(^|[^a-z])(acc([^a-z]|$)|dd)|[a-z]dd[_.]?\d|/ ?s(\^|\*\*)?[2²]|/s/s")
+"""What a column of accelerations is called, or its unit: ``"qdd1"``, ``"x_ddot"``, ``"acc_x"``, ``"u1 (m/s^2)"``."""
 
 _PLACES = {
     "package.xml": "package.xml",
@@ -54,7 +58,7 @@ def export_ros2(
     package = c_name(Path(os.path.realpath(folder)).name if name is None else name).lower()
     coordinates = [bare(name)[-1:].lower() for name in described.states] == ["x", "y", "z"]
     kind = messages or ("pose" if coordinates else "joints")
-    _check(form, kind)
+    _check(form, kind, described)
     fill = _words(package, form, described, kind)
     with workshop(folder) as made:
         made.joinpath("new").mkdir()
@@ -95,9 +99,23 @@ def _words(package: str, form: ClosedForm, described: Description, kind: Message
     }
 
 
-def _check(form: ClosedForm, kind: Messages) -> None:
+def _check(form: ClosedForm, kind: Messages, described: Description) -> None:
     n, d, _ = form.columns, *form.sizes[1:]
     if any(isinstance(factor, spaces.Sphere) for factor in form.embedding.space.factors):
         raise SettingError("ros2: states hold an orientation; the node takes joints, or the position of a pose.")
+    if n != d or _of_second_order(described):
+        raise SettingError(
+            f"ros2: got {n} states ({', '.join(described.states)}) and {d} actions ({', '.join(described.actions)}), "
+            "expected positions and their velocities, which the node commands: accelerations are wrong there. Export "
+            "it as C, ONNX or JavaScript for a controller that takes such actions, or learn velocities of positions."
+        )
     if kind == "pose" and (n, d) != (3, 3):
         raise SettingError(f"ros2: got {n} states and {d} actions, expected three of each for the position of a pose.")
+
+
+def _of_second_order(described: Description) -> bool:
+    """Whether columns, by names or units, are accelerations, or velocities among the states."""
+    plain = [bare(name) for name in described.states]
+    called = [with_unit(name, described.units.get(name)) for name in described.actions]
+    named = {bare(name) for name in called}.intersection(f"a{name}" for name in plain)
+    return bool(named or {*plain}.intersection(map(speed_of, plain)) or any(map(_ACCELERATION.search, called)))

@@ -43,8 +43,8 @@ class Learner(Parameters, ABC):
             Weights (M, d, p) over these features.
         """
 
-    def solve(self, training: Training) -> Solution:
-        """The solution with weights over the features φ(x), in the units of what was given.
+    def solve(self, training: Training, before: Solution | None = None) -> Solution:
+        """The solution with weights over the features φ(x), in the units of what was given; ``before`` it another.
 
         Raises
         ------
@@ -52,7 +52,8 @@ class Learner(Parameters, ABC):
             If it is not finite.
         """
         found = self.learn(training).over(training.model)
-        return found.in_units(training.action_unit, training.weight_unit).checked()
+        found = found.in_units(training.action_unit, training.weight_unit).checked()
+        return found.warned(before if self.uses_samples else None)
 
     def within(self, scale: Scale) -> Self:
         """The same learner for states and actions in such units of a policy's own."""

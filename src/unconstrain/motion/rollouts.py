@@ -110,7 +110,7 @@ def rollout(
     Warns
     -----
     SupportEndsWarning
-        Where it stops for want of support.
+        Where it stops for want of support, or has none from the start, and is extrapolated.
 
     Raises
     ------
@@ -219,8 +219,19 @@ def _near(policy: Callable[[Array], Array], state: Array, least: float) -> Calla
     """Whether states (K, n) are where something was demonstrated; all are, of policies that do not know."""
     support: Callable[[Array], Array] | None = getattr(policy, "support", None)
     try:
-        if least > 0.0 and support is not None and support(state) is not None:
+        if least > 0.0 and support is not None:
+            _warn_of_starts(state, support(state), least)
             return lambda states: support(states) >= least
     except SettingError:  # affine and polynomial policies
         pass
     return lambda states: np.ones(len(states), np.bool_)
+
+
+def _warn_of_starts(starts: Array, support: Array, least: float) -> None:
+    """Say that movements begin where nothing was demonstrated, and at which support."""
+    if not (away := np.flatnonzero(~(support >= least))).size:
+        return
+    where = ", ".join(f"{each:.4g}" for each in starts[away[0]])
+    many = f" {away.size} of {len(starts)} starts, the first" if len(starts) > 1 else ""
+    said = f"nothing was demonstrated near{many} ({where}) (support {support[away[0]]:.2g}): what follows is a guess. "
+    warn(said + "Start nearer, or guide the policy (uc.Guided); least_support=0 does not warn.", SupportEndsWarning, 4)

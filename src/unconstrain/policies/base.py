@@ -13,16 +13,16 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
-from ..base.arrays import Array, Groups, beside, check_at_least, namespace, on_host
+from ..base.arrays import Array, Groups, check_at_least, on_host
 from ..base.display import ShownWithSolution
 from ..base.errors import InvalidDataError, SettingError
 from ..base.estimators import checked_states
-from ..base.parameters import Parameters
+from ..base.parameters import Parameters, others_by_name
 from ..deployment import Deployable
 from ..learners import Learner, Robust, Solution, Uncertainty, named
 from ..models import FeatureMap, Model, Scale, spaces
 from ..recordings import Demonstration, noise_of, preparation, stack, times_of
-from ..risks import Moments, unit_actions
+from ..risks import Moments, along_motion
 from ..training import Batch, FirstLook, Folds, Seen, Split, Training, Validation, cluster, is_typical
 
 Asked: TypeAlias = Sequence[float] | Literal["auto"] | None
@@ -73,10 +73,13 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
 
     # Learning: each works on a draft, which takes this policy's place when all has gone well.
 
+    @others_by_name
     def fit(
-        self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, groups: Groups | None = None
+        self, X: ArrayLike, y: ArrayLike, *, sample_weight: ArrayLike | None = None, groups: Groups | None = None
     ) -> Self:
         """Learn the unconstrained policy. If anything fails, this policy is as it was.
+
+        Warns where next to nothing of held-out motion is explained. ``solution_.notes`` says so, and what was assumed.
 
         Parameters
         ----------
@@ -103,15 +106,17 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         began = draft._began(look, learner, more=False, seen=[checked])
         return self._become(began._learnt([checked], learner))
 
+    @others_by_name
     def partial_fit(
-        self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, groups: Groups | None = None
+        self, X: ArrayLike, y: ArrayLike, *, sample_weight: ArrayLike | None = None, groups: Groups | None = None
     ) -> Self:
         """Learn from a further batch; the sums are those of all batches at once.
 
         The first batch, which should be typical, fixes features, fields, action dimensions, the spread by which samples
         are dealt into folds, and a scale that is ``"auto"``; a later one that is unlike in it is warned of. Batches of
         too few different states are kept until there are enough. Parameters, result and errors as in :meth:`fit`. The
-        solution is found anew each time; where only the last counts, :meth:`fit_batches` is faster.
+        solution is found anew each time; where only the last counts, :meth:`fit_batches` is faster. Warns, too, if that
+        is from sums alone after samples, as of a stored policy.
         """
         first, learner, draft = not hasattr(self, "solution_"), named(self.learner), self._draft()
         batch = draft._checked(X, y, sample_weight, groups, reset=first)
@@ -253,25 +258,28 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         actions = self.predict(states)
         return actions[:, None] if self._flat else actions
 
-    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
-        """Share of the observed motion that the policy, projected onto each action, explains.
+    @others_by_name
+    def score(self, X: ArrayLike, y: ArrayLike, *, sample_weight: ArrayLike | None = None) -> float:
+        """Share of the observed motion that the policy explains along it; 1 is best, 0 explains none.
 
-        ``1 − E_i / Σ w uᵀu`` (eq. 4); 1 is best; parameters as in :meth:`fit`. R² punishes what constraints took.
+        ``1 − Σ w (‖u‖ − ûᵀ π̃)² / Σ w ‖u‖²``, where a sample of less than half the usual length counts by the square of
+        its length: the direction of what rests is noise, and no policy's. It is what ``fit`` prints and verdicts judge;
+        :func:`~unconstrain.metrics.inconsistency` counts all alike (eq. 4). Parameters as in :meth:`fit`.
         """
         check_is_fitted(self, "solution_")
-        missed = moved = 0.0
-        for block in self._checked(X, y, sample_weight, reset=False).blocks():
-            directions, lengths = unit_actions(block.actions)
-            counts, along = beside(block.counts, lengths), directions * self._own(block.states)
-            missed += float(counts @ (lengths - namespace(lengths).sum(along, axis=1)) ** 2)
-            moved += float(counts @ lengths**2)
+        batch, missed, moved = self._checked(X, y, sample_weight, reset=False), 0.0, 0.0
+        energy = sum(float(one.counts @ (on_host(one.actions) ** 2).sum(axis=1)) for one in batch.blocks())
+        usual = np.sqrt(energy / max(batch.counts.sum(), 1e-300))
+        for one in batch.blocks():
+            found = along_motion(on_host(one.actions), on_host(self._own(one.states)), one.counts, usual)
+            missed, moved = missed + found[0], moved + found[1]
         return 1.0 - missed / moved if moved > 0 else 0.0
 
     def held_out_score(self) -> float:
         """:meth:`score` on each fold by what is learnt from the others; NaN where there is nothing to hold out.
 
-        From the moments alone, each local model by itself in its own field; by samples where the learner looks at them,
-        of which slow ones count less (:func:`~unconstrain.evaluation.metrics.along_motion`).
+        By samples where the learner looks at them, less of those below ten standard deviations of their noise; of other
+        learners from the moments alone, slow samples like all, each local model by itself in its own field.
         """
         check_is_fitted(self, "solution_")
         belief = self.solution_.belief
@@ -408,7 +416,7 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
 
     def _solved(self, learner: Learner) -> Self:
         own = learner if self.scale_ is None else learner.within(self.scale_)
-        self.solution_ = own.solve(self.training_)
+        self.solution_ = own.solve(self.training_, vars(self).get("solution_"))
         return self
 
     def _check_speed_power(self, speed_power: float) -> Learner:

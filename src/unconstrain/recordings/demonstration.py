@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array, as_matrix, as_vector
-from ..base.display import Shown, counted, has_no_column, shortened
+from ..base.arrays import Array, as_matrix, as_numbers, as_seconds, as_vector
+from ..base.display import Shown, counted, has_no_column, listed, shortened
 from ..base.errors import InvalidDataError, LackingError
 from ..models import spaces
 from .columns import resolve
@@ -26,10 +26,10 @@ class Recording(Shown):
     ----------
     columns : tuple of str
         A name for each column.
-    values : ndarray, shape (T, c)
-        May hold NaN where the file has an empty cell.
-    times : ndarray, shape (T,), optional
-        Seconds.
+    values : array_like, shape (T, c)
+        May hold NaN where the file has an empty cell; a table of pandas is one.
+    times : array_like, shape (T,), optional
+        Seconds; of dates those from the first on.
     name : str
         Which demonstration this is, for messages and groups.
     remarks : tuple of Remark
@@ -44,6 +44,11 @@ class Recording(Shown):
         Columns of the file that hold no numbers, by which it may be taken apart.
     lines : ndarray, shape (T,), optional
         Line of the file that each row is in, from 1, where its format has lines.
+
+    Raises
+    ------
+    InvalidDataError
+        If values or times are no numbers, or there are other numbers of them than of names or rows.
 
     Examples
     --------
@@ -63,6 +68,18 @@ class Recording(Shown):
     file: str = ""
     words: tuple[str, ...] = ()
     lines: NDArray[np.integer] | None = None
+
+    def __post_init__(self) -> None:
+        of = f" of '{self.name}'" if self.name else ""
+        columns, values = tuple(self.columns), as_numbers(self.values, f"values{of}", convert=False)
+        times = None if self.times is None else as_seconds(self.times, f"times{of}")
+        if values.shape[1:] != (len(columns),) or (times is not None and times.shape != values.shape[:1]):
+            stamps = "" if times is None else f", times of shape {times.shape}"
+            raise InvalidDataError(
+                f"recording{of}: got values of shape {values.shape}{stamps} and {counted(len(columns), 'name')} of "
+                f"columns ({listed(columns)}), expected a name for each column and a time for each row."
+            )
+        vars(self).update(columns=columns, values=values, times=times)
 
     def __len__(self) -> int:
         return len(self.values)

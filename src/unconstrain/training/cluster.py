@@ -25,6 +25,7 @@ from typing import Any, Protocol, Self, TypeVar
 
 from ..base.arrays import require_extra
 from ..base.errors import InvalidDataError, SettingError
+from ..base.parameters import others_by_name
 from .batches import Batch
 
 FAN_IN = 8
@@ -42,8 +43,9 @@ class Distributed(Protocol):
 P = TypeVar("P", bound=Distributed)
 
 
+@others_by_name
 def fit(
-    policy: P, X: Any, y: Any, sample_weight: Any | None = None, groups: Any | None = None, *, client: Any | None = None
+    policy: P, X: Any, y: Any, *, sample_weight: Any | None = None, groups: Any | None = None, client: Any | None = None
 ) -> P:
     """Fit a policy to dask arrays, chunk by chunk, where the chunks are.
 

@@ -19,6 +19,9 @@ _NEIGHBOURS = 8
 _DIGITS = 1e-6
 """Demonstrations whose means differ by less than this share of the spread count as equal: rounding must not decide."""
 
+UNNAMED = "No groups were given: all samples count as one demonstration."
+ALONE = "One demonstration alone: nothing tells what held it, so across its motion the policy is not known."
+
 
 def content(places: NDArray[np.intp], states: Array, actions: Array, counts: Array) -> Array:
     """Sums that tell demonstrations apart, ``Σ w (1, x, ‖u‖)``, shape (K, n + 2).
@@ -99,7 +102,7 @@ def arranged(samples: Batch) -> tuple[NDArray[np.intp], NDArray[np.intp], tuple[
     number = np.argsort(by_content(content(codes, samples.states, samples.actions, samples.counts), origin, scale))
     demonstrations = number[codes]
     columns = *samples.actions.T[::-1], *states.T[::-1]
-    unnamed = () if samples.groups is not None else ("No groups were given: all samples count as one demonstration.",)
+    unnamed = (UNNAMED if samples.groups is None else ALONE,) if not codes.any() else ()
     if samples.times is not None:
         order = np.lexsort((*columns, samples.times, demonstrations))
         return order, demonstrations[order], unnamed

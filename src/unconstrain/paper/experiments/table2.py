@@ -293,7 +293,7 @@ def _fitted(
     weights = np.linalg.norm(actions, axis=1) ** speed_power
     fields = (settings.variance, settings.at_least)
     policy = uc.LocallyLinearPolicy(*fields, None, learner or uc.Direct(), uc.Folds(settings.folds))
-    return policy.fit(states, actions, weights, groups)
+    return policy.fit(states, actions, sample_weight=weights, groups=groups)
 
 
 def _printed(method: str, index: int) -> dict[str, Any]:

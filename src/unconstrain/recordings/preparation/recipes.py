@@ -272,7 +272,7 @@ def _with_columns(recipe: Recipe, recording: Recording) -> Recipe:
     told = replace(recipe, states=states, actions=recipe.actions and recording.resolve(recipe.actions))
     told = replace(told, angles=recording.resolve(recipe.angles))
     states = states or _with_turning(told, guess_states(columns))
-    replace(recording, values=recording.values[:0]).select([*(states or ()), *(told.actions or ())])
+    replace(recording, values=recording.values[:0], times=None).select([*(states or ()), *(told.actions or ())])
     if states and (told.actions or told.differentiate):
         return replace(told, states=states)
     actions = states and guess_actions(columns, states)
@@ -296,7 +296,8 @@ def _with_turning(recipe: Recipe, states: tuple[str, ...] | None) -> tuple[str, 
 def _names(what: str, names: Any) -> tuple[str, ...] | None:
     if names is None:
         return None
-    listed = (names,) if isinstance(names, str) else tuple(names) if isinstance(names, Iterable) else ()
+    named = re.split(r"\s*,\s*", names) if isinstance(names, str) else names
+    listed = tuple(named) if isinstance(named, Iterable) else ()
     if not listed or not all(isinstance(name, str) for name in listed) or len(set(listed)) < len(listed):
         raise SettingError(f"{what}: got {names!r}, expected names of columns, at least one and each once.")
     return listed

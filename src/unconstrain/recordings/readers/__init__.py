@@ -15,6 +15,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from glob import glob
 from pathlib import Path
+from typing import Any
 
 from ...base.display import listed, meant
 from ...base.errors import NOTHING_LEFT, ReadError, SettingError
@@ -131,7 +132,10 @@ def expand(paths: PathLike | Iterable[PathLike]) -> list[Path]:
     SettingError
         If there is none.
     """
-    listed = [Path(path) for path in ([paths] if isinstance(paths, (str, os.PathLike)) else paths)]
+    given: list[Any] = [paths] if isinstance(paths, str | os.PathLike) or hasattr(paths, "shape") else [*paths]
+    if odd := [type(one).__name__ for one in given if not isinstance(one, str | os.PathLike)]:
+        raise SettingError(f"paths: got {odd[0]}, expected paths; a table in memory is uc.Recording(columns, values).")
+    listed = [*map(Path, given)]
     # A pattern may be absolute, which Path.glob refuses.
     there = [[] if path.exists() else sorted(glob(str(path), recursive=True)) for path in listed]  # noqa: PTH207
     matched = [Path(match) for path, found in zip(listed, there, strict=True) for match in found or [str(path)]]
