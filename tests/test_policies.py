@@ -456,6 +456,13 @@ def test_a_fit_that_explains_next_to_nothing_warns_once_and_notes_it():
     assert not any("next to nothing" in note for note in fine.solution_.notes)
 
 
+def test_actions_that_are_all_zero_teach_nothing_and_that_is_said():
+    states, actions, groups = opposed()
+    with pytest.warns(UserWarning, match="No action is other than zero"):
+        policy = uc.LocallyLinearPolicy(None).fit(states, 0.0 * actions, groups=groups)
+    assert policy.solution_.notes[-1].startswith("No action is other than zero")
+
+
 @pytest.mark.parametrize("learner", ["robust", "hybrid"])
 def test_learning_on_from_a_file_warns_where_samples_are_missed(data, tmp_path, learner):
     uc.save(

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from typing import ClassVar, Self
+from warnings import warn
 
 from ..base.parameters import Parameters
 from ..models import Model, Scale
@@ -9,6 +10,8 @@ from ..risks import inconsistency, vec
 from ..training import Training
 from .solution import Solution
 from .thresholds import judged
+
+LOST = "Samples of before are not stored: all is learnt from sums alone, less well, without uncertainty. Fit all anew."
 
 
 class Learner(Parameters, ABC):
@@ -53,7 +56,9 @@ class Learner(Parameters, ABC):
         """
         found = self.learn(training).over(training.model)
         found = found.in_units(training.action_unit, training.weight_unit).checked()
-        return found.warned(before if self.uses_samples else None)
+        if self.uses_samples and before is not None and before.belief is not None and found.belief is None:
+            warn(LOST, stacklevel=7)
+        return found
 
     def within(self, scale: Scale) -> Self:
         """The same learner for states and actions in such units of a policy's own."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
-from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +14,6 @@ from ..base.errors import MissingBeliefError
 
 if TYPE_CHECKING:
     from ..models import Model
-
-EXPLAINS_LITTLE = "The policy explains next to nothing of held-out motion ({:.2g}): look at columns, units and groups=."
-LOST = "Samples of before are not stored: all is learnt from sums alone, less well, without uncertainty. Fit all anew."
 
 
 class Uncertainty(NamedTuple):
@@ -258,17 +254,6 @@ class Solution(Shown):
         """
         check_learnt(self.weights)
         return self
-
-    def warned(self, before: Solution | None) -> Solution:
-        """With a note, and a warning, of what makes it next to worthless; ``before`` learnt more from sums alone."""
-        from .robust.constants import LEAST_EXPLAINED  # imports this module
-
-        if before is not None and before.belief is not None and self.belief is None:
-            warn(LOST, stacklevel=8)
-        if self.belief is None or not self.belief.held_out_score < LEAST_EXPLAINED:
-            return self
-        warn(note := EXPLAINS_LITTLE.format(self.belief.held_out_score), stacklevel=8)
-        return replace(self, notes=(*self.notes, note))
 
     def in_units(self, action: float, weight: float) -> Solution:
         """With actions and sample weights measured in units ``1 / action`` and ``1 / weight`` as large."""

@@ -25,7 +25,7 @@ from .belief import solution, weak_prior
 from .candidate import Candidate
 from .choice import Comparison
 from .consistent import by_segments, noise_corrected
-from .constants import LEAST_INFORMATIVE, LEAST_MISFIT, LONG
+from .constants import LEAST_EXPLAINED, LEAST_INFORMATIVE, LEAST_MISFIT, LONG
 from .held_out import held_out_together
 from .kinematics import Jacobian, with_jacobian
 from .likelihood import maximise
@@ -43,6 +43,8 @@ THINNED = (
     "what solution_.free is about; those that look wrong are left out, but not listed."
 )
 
+EXPLAINS_LITTLE = "The policy explains next to nothing of held-out motion ({:.2g}): look at columns, units and groups=."
+NOTHING_MOVED = "No action is other than zero: nothing can be learnt of them. Look at the columns."
 BY_AGREEMENT = (
     "Without some of the demonstrations the others tell too little of these: left out in turn, {0:.0%} of their motion "
     "is missed. What is said of held-out motion is instead what to expect if the policy has the form of this model, "
@@ -70,7 +72,8 @@ class SampleLearner(Learner):
         found = self._learnt(training, training.samples)
         thinned = _thinned(training)
         listed = suspects[:0] if thinned else suspects  # which they are among all is not known
-        return replace(found, belief=replace(found.believed, suspects=listed), notes=(*found.notes, *thinned))
+        found = replace(found, belief=replace(found.believed, suspects=listed))
+        return replace(found, notes=(*found.notes, *thinned, *_warned(found.believed, training.samples)))
 
     def _learnt(self, training: Training, everything: Samples) -> Solution:
         samples = held_out_together(everything.counted)
@@ -388,6 +391,15 @@ def _compared(best: Mapping[str, Candidate], views: Mapping[str, Samples]) -> Co
     each, any_ = [views[name] for name in best], next(iter(views.values()))
     noise = noise_of_each(any_.actions, any_.groups, most_noise(any_), any_.noise)
     return Comparison(list(best.values()), np.minimum(noise, min(one.variance for one in best.values())), each)
+
+
+def _warned(belief: Belief, samples: Samples) -> tuple[str, ...]:
+    """Warn of what makes a policy next to worthless; the warning, for its notes."""
+    if samples.energy > 0.0 and not belief.held_out_score < LEAST_EXPLAINED:
+        return ()
+    said = EXPLAINS_LITTLE.format(belief.held_out_score) if samples.energy > 0.0 else NOTHING_MOVED
+    warnings.warn(said, UserWarning, stacklevel=9)
+    return (said,)
 
 
 def _thinned(training: Training) -> tuple[str, ...]:
