@@ -187,6 +187,46 @@ class TestPlates:
         assert np.median(open_[:6]) < 0.05
         assert open_[6:].min() > 0.3
 
+    TURNING = np.array([[-1.0, -0.8, -0.2], [0.8, -1.0, -0.5], [0.2, 0.5, -0.8]])
+
+    def noisy(self, demos, share, rng):
+        size = np.sqrt((uc.stack(demos).actions ** 2).mean())
+        return [
+            uc.Demonstration(d.states, d.actions + share * size * rng.standard_normal(d.actions.shape), d.times)
+            for d in demos
+        ]
+
+    def test_cranks_about_one_place_in_planes_of_other_tilts_tell_nothing_towards_it(self):
+        rng, demos = np.random.default_rng(1), []
+        for _ in range(8):
+            axis = np.append(rng.uniform(-0.15, 0.15, 2), 1.0)
+            start = rng.uniform(-1, 1, 3)
+            start -= (start @ axis) * axis / (axis @ axis)
+            held = lambda x, t, axis=axis: np.stack([np.tile(axis, (len(x), 1)), x], axis=1)  # noqa: E731
+            demos.append(uc.rollout(lambda x: x @ self.TURNING, start, 80, 0.03, held))
+        demos = self.noisy(demos, 0.02, rng)
+        policy = uc.ParametricPolicy(uc.Affine(), uc.Segments("groups")).fit_demonstrations(demos)
+        spread = policy.uncertainty(uc.stack(demos).states)
+        assert policy.solution_.determined[0] < 12
+        assert (spread.undetermined > spread.from_noise).any(axis=1).mean() > 0.9
+
+    def test_the_error_of_an_estimated_plane_shows_nothing_across_it(self):
+        rng, plate, demos = np.random.default_rng(0), uc.constraints.Plane([0.3, 0.2, 1.0]), []
+        for k in range(42):
+            one = uc.rollout(lambda x: x @ self.TURNING, rng.uniform(-1, 1, 3), 80, 0.03, plate if k < 40 else None)
+            demos += self.noisy([one], 0.05, rng)
+        policy = uc.ParametricPolicy(uc.Affine(), uc.Robust())
+        belief = policy.fit_demonstrations(demos).solution_.believed
+        assert belief.told_together < 0.3  # 1.0 if what noise turned the plane by counted
+
+    def test_what_never_moved_shows_nothing(self):
+        rng, time = np.random.default_rng(1), np.linspace(0, 6, 80)
+        states = [np.sin(rng.uniform(1.5, 4.0, 3) * time[:, None] + rng.uniform(0, 6, 3)) for _ in range(6)]
+        demos = [uc.Demonstration(one, one @ self.TURNING, time) for one in states]
+        rest = uc.Demonstration(np.tile(rng.uniform(-1, 1, 3), (60, 1)), np.zeros((60, 3)), np.arange(60) * 0.03)
+        policy = uc.ParametricPolicy(uc.Affine(), uc.Segments("groups"))
+        assert policy.fit_demonstrations([*demos, rest]).solution_.determined == [12]
+
 
 def swung(seed, dimensions=2):
     """Doors that are opened about one hinge, held at radii that differ a little."""

@@ -1,9 +1,9 @@
 """What the actions show of the policy, whatever the constraints and the prior; the basis of what counts as determined.
 
 An action shows the policy along itself only. Noise adds a component along directions in which nobody ever moved; its
-expectation is subtracted. To a learner by segments, a demonstration that was held in one plane all the time shows all
-components in it. Along a bent rail in that plane it would look the same; but where nothing else is recorded, what
-points out of the plane stays open.
+expectation is subtracted. To a learner by segments, a demonstration that was held in one plane all the time is taken
+to show all components in it, unless it went about one place at one distance: so do cranks. A rail of another bend looks
+as its plane does.
 
 A direction that a learner may call determined must be shown by more than two
 demonstrations: constraints that one or two met, or that all had in common, may have hidden anything there.
@@ -53,7 +53,7 @@ class Evidence:
     seen : ndarray, shape (M, d, d)
         Projection onto the directions of action space in which there was motion.
     error : ndarray, shape (M,)
-        Standard error of the noise that was subtracted, as a share of ``Σ w φφᵀ ⊗ I``.
+        Standard error of the noise that was subtracted of samples along themselves, as a share of ``Σ w φφᵀ ⊗ I``.
     """
 
     consistent: list[Quadratic]
@@ -92,8 +92,7 @@ def shown(samples: Samples, policy: Array, variance: float, free: Array, by_segm
     unit, parts = _residual(samples, policy, noise, time), parts_of(samples)
     seen = _seen(samples, parts, noise, time)
     consistent, as_free, free = [], [], _of_free_demonstrations(samples, free)
-    each = beyond_misfit(noise_of_each(samples.actions, samples.groups, most_noise(samples), samples.noise), samples)
-    held, moved = held_throughout(samples.actions, samples.groups, each)
+    held, moved, sure = _held(samples)
     held &= by_segments
     missed = _missed(samples[held], policy[held], moved[held], noise)
     for part in counted_off(range(int(parts.max()) + 1), "evidence: part"):
@@ -101,11 +100,37 @@ def shown(samples: Samples, policy: Array, variance: float, free: Array, by_segm
         some, turned = samples[rows], np.where(held[rows], 0.0, 1.0)
         weighted, plain = (some.moments(some.actions, turned * by) for by in ((some.actions**2).sum(axis=1), 1.0))
         own = (1.0 / unit) * inconsistency(corrected(weighted, plain, noise))
-        throughout = samples[rows & held].constrained(moved[rows & held]) if held[rows].any() else 0.0 * own
+        throughout = samples[rows & held].constrained(sure[rows & held]) if held[rows].any() else 0.0 * own
         consistent.append(own + (1.0 / missed) * throughout)
         as_free.append(_as_free(some, free[rows] / (max(variance, noise) * time), noise, seen))
     error = EIGENVALUE_STANDARD_ERRORS * noise * np.sqrt(2.0 * time / np.maximum(samples.sizes, 1.0)) / unit
     return Evidence(consistent, np.stack(as_free), seen, error)
+
+
+def _held(samples: Samples) -> tuple[NDArray[np.bool_], Array, Array]:
+    """Which samples are of demonstrations that were held all the time, (N,), where these moved, and what they show.
+
+    Both are (N, d, d). Noise of variance σ² turns N̂ by a mean square of ``t = σ² Σ 1 / λ`` over the eigenvalues of
+    ``Σ u uᵀ``: along what was held it seems to show as much, and ``N̂ − t (I − N̂)`` shows nothing there on average.
+    """
+    noise = beyond_misfit(noise_of_each(samples.actions, samples.groups, most_noise(samples), samples.noise), samples)
+    held, moved = held_throughout(samples.actions, samples.groups, noise)
+    sure, d = moved.copy(), samples.actions.shape[1]
+    for group in np.unique(samples.groups[held]):
+        rows = samples.groups == group
+        own, onto = samples[rows], moved[rows][0]
+        rank = round(np.trace(onto))
+        held[rows] = rank > 0 and (rank == 1 or pivot_of(_path(own), own.actions) is None)
+        if rank:
+            squares = np.linalg.eigvalsh(onto @ own.actions.T @ own.actions @ onto)[-rank:]
+            sure[rows] -= min(float(noise[rows].mean() * (1.0 / squares).sum()), 1.0) * (np.eye(d) - onto)
+    return held, moved, sure
+
+
+def _path(samples: Samples) -> Array:
+    """States of one demonstration, or where its actions lead, in unknown units, where these are not of that shape."""
+    alike = samples.states.shape == samples.actions.shape
+    return samples.states if alike else np.cumsum(samples.actions, axis=0) - 0.5 * samples.actions
 
 
 def _missed(samples: Samples, policy: Array, moved: Array, noise: float) -> Array:
@@ -154,7 +179,7 @@ def _of_free_demonstrations(samples: Samples, free: Array) -> Array:
     mostly = of_group > 0.5 * counts
     for group in np.flatnonzero(mostly):
         rows = samples.groups == group
-        mostly[group] = pivot_of(samples.states[rows], samples.actions[rows]) is None
+        mostly[group] = pivot_of(_path(samples[rows]), samples.actions[rows]) is None
     return np.asarray(free * mostly[samples.groups])
 
 
