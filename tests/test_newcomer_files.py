@@ -63,6 +63,24 @@ def test_rows_without_numbers_are_no_gap_of_the_clock(tmp_path):
     assert "clock-gap" in [one["code"] for one in found["warnings"]]
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_strokes_on_plates_that_are_tilted_a_little_are_not_taken_for_free(tmp_path, seed):
+    """Four free strokes to a place and sixteen on plates, as positions that a tracker sees to 0.3 mm."""
+    rng, goal, time, written = np.random.default_rng(seed), np.array([20.0, -10.0, 30.0]), np.arange(150) * 0.02, []
+    for k in range(20):
+        tilt, way = np.radians(rng.uniform(0, 10)), rng.uniform(0, 2 * np.pi)
+        normal = np.array([np.sin(tilt) * np.cos(way), np.sin(tilt) * np.sin(way), np.cos(tilt)])
+        onto = np.eye(3) - (k >= 4) * np.outer(normal, normal)
+        start = rng.uniform(-120, 120, 3)
+        path = goal + start - np.outer(1.0 - np.exp(-time), onto @ start) + 0.3 * rng.standard_normal((150, 3))
+        written.append(write(tmp_path / f"s{k:02}.csv", "t,x,y,z", np.column_stack([time, path])))
+    run("fit", *written, "--state", "x,y,z", "--differentiate", "-o", tmp_path / "p.npz")
+    policy = uc.load(tmp_path / "p.npz")
+    at = goal + rng.uniform(-80, 80, (200, 3))
+    assert np.linalg.norm(policy.predict(at) - goal + at) < 0.4 * np.linalg.norm(at - goal)
+    assert policy.solution_.free_share < 0.5
+
+
 def test_a_row_without_its_time_is_named_as_any_other(tmp_path):
     rows = stroke(0)
     rows[12, 0] = np.nan

@@ -132,11 +132,30 @@ def test_demonstrations_keep_their_noise():
     assert (2 * quiet.noise < loud.noise).all()
     assert_allclose(quiet.actions, smoothing.kalman_velocities(TIMES, noisy(0.01, 3)).velocities)
     assert_allclose(quiet[5:9].noise, quiet.noise)
-    assert prepare(recordings, Recipe(("x", "y"), differentiate="savgol"))[0].noise is None
     policy = uc.LocallyLinearPolicy(1.0).fit_demonstrations([quiet, loud])
     each = policy.training_.samples.noise * policy.training_.action_unit
     expected = np.sqrt((np.stack([quiet.noise, loud.noise]) ** 2).mean(axis=1))
     assert_allclose(np.unique(each.round(9)), expected.round(9))
+
+
+@pytest.mark.parametrize("method", ["savgol", "central"])
+@pytest.mark.parametrize("size", [0.003, 0.03])
+def test_the_noise_of_velocities_is_that_of_positions_after_the_filter(method, size):
+    """Of smoothed velocities their own differences show a fraction of it."""
+    exact, recipe = noisy(0.0, 3), Recipe(("x", "y"), differentiate=method)
+    [found] = prepare(uc.Recording(("x", "y"), noisy(size, 3), TIMES), recipe)
+    off = (found.actions - prepare(uc.Recording(("x", "y"), exact, TIMES), recipe)[0].actions)[10:-10]
+    assert_allclose(found.noise, np.sqrt((off**2).mean(axis=0)), rtol=0.35)
+    by_differences = uc.learners.robust.noise_by_differences(found.actions, np.zeros(len(found), dtype=int)) ** 0.5
+    assert by_differences < 0.5 * found.noise.mean() or method == "central"
+
+
+def test_positions_that_were_rounded_have_that_noise():
+    coarse = np.round(noisy(0.0, 3), 2)
+    [found] = prepare(uc.Recording(("x", "y"), coarse, TIMES), Recipe(("x", "y"), differentiate="central"))
+    rounding = 0.01 / np.sqrt(12.0) * np.sqrt(0.5) / (TIMES[1] - TIMES[0])
+    assert (found.noise > 0.99 * rounding).all()
+    assert (found.noise < 3.0 * rounding).all()
 
 
 def test_pieces_between_gaps_are_smoothed_by_themselves_at_stamps_of_any_distance():

@@ -55,7 +55,7 @@ def score(
         click.echo(f"Note: {policy}: learnt far from most of these states: are they of another task?", err=True)
     with shown("scoring"):
         short = [one.name for one in demonstrations if len(one) < LEAST]
-        demonstrations, still = _moved(moving, _with_noise(demonstrations, recipe))
+        demonstrations, still = _moved(moving, _long_enough(demonstrations))
         rows = [_scores(moving, held, [demo], demo.name) for demo in demonstrations]
         whole = _scores(moving, held, demonstrations, "all")
         planes = uc.evaluation.metrics.explained_in_planes(moving, demonstrations)
@@ -91,13 +91,12 @@ def _row(name: str, size: int, fast: int, share: float, *rest: float | None) -> 
     return [name, f"{fast} of {size}" if fast < size else str(size), said, *(number(one, "{:.4g}") for one in rest)]
 
 
-def _with_noise(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe) -> list[uc.Demonstration]:
-    """Those that are long enough, with the noise of their actions, :data:`ENOUGH` of which may be half a usual one."""
+def _long_enough(demonstrations: Sequence[uc.Demonstration]) -> list[uc.Demonstration]:
+    """Those that are, with the noise of their actions, :data:`ENOUGH` of which may be half a usual one."""
     if not (enough := [one for one in demonstrations if len(one) >= LEAST]):
         raise InvalidDataError(f"no demonstration has {LEAST} samples or more: nothing to score. Trim less of them.")
-    found, usual = uc.evaluation.metrics.with_noise(enough, recipe), (uc.stack(enough).actions ** 2).sum(axis=1).mean()
-    half = 0.5 * usual**0.5
-    return [one if one.noise is None else replace(one, noise=_judged(one.noise, half)) for one in found]
+    half = 0.5 * (uc.stack(enough).actions ** 2).sum(axis=1).mean() ** 0.5
+    return [one if one.noise is None else replace(one, noise=_judged(one.noise, half)) for one in enough]
 
 
 def _judged(noise: Any, half: float) -> Any:

@@ -17,7 +17,6 @@ Examples
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -26,7 +25,7 @@ from ..base.errors import InvalidDataError, SettingError
 from ..constraints import Constraint, constraint_matrices
 from ..learners import robust
 from ..models import spaces
-from ..recordings import Demonstration, Recipe, preparation, stack
+from ..recordings import Demonstration, stack
 from ..risks import TURNED as TURNED
 from ..risks import action_projection, null_space_projection, project
 from ..risks import along_motion as along
@@ -161,19 +160,6 @@ def along_motion(policy: PolicyLike, demonstrations: Demonstrations, usual: floa
     demos = _listed(demonstrations)
     noise = np.repeat([_noise(demo) for demo in demos], [len(demo) for demo in demos])
     return along(stack(demos).actions, _predicted(policy, demos), usual=usual, noise=noise)
-
-
-def with_noise(demonstrations: Sequence[Demonstration], recipe: Recipe) -> list[Demonstration]:
-    """With the noise of positions, times the gain, where a recipe's filter makes it smooth, which differences miss."""
-    if recipe.actions or recipe.differentiate not in ("savgol", "central"):
-        return [*demonstrations]
-    paths = [one.space.unrolled(one.states) for one in demonstrations]
-    rounding, one_group = [_rounding(column) for column in np.vstack(paths).T], np.zeros(max(map(len, paths)), np.intp)
-    noise = [
-        [robust.noise_by_differences(column[:, None], one_group[: len(column)]) for column in path.T] for path in paths
-    ]
-    white = np.sqrt(np.maximum(noise, rounding))
-    return [replace(one, noise=_gain(one, recipe) * own) for one, own in zip(demonstrations, white, strict=True)]
 
 
 def explained_in_planes(policy: PolicyLike, demonstrations: Demonstrations) -> Array:
@@ -334,24 +320,6 @@ def _noise(demo: Demonstration) -> float:
         return float(np.mean(demo.noise**2))
     found = robust.noise_by_differences(demo.actions, np.zeros(len(demo), dtype=np.intp))
     return found if np.isfinite(found) else 0.0
-
-
-def _rounding(values: Array) -> float:
-    """Variance of rounding values (N,) to multiples of a step that recur, such as whole pixels, or zero."""
-    found, counts = np.unique(values, return_counts=True)
-    steps = np.diff(found[counts > 2])
-    steps = steps[steps > 1e-9 * np.ptp(values)]
-    whole = len(steps) > 2 and np.allclose(times := steps / steps.min(), np.round(times))
-    return float(steps.min() ** 2) / 12.0 if whole else 0.0
-
-
-def _gain(demo: Demonstration, recipe: Recipe) -> float:
-    """Standard deviation of velocities over that of white noise of the positions, away from both ends."""
-    interval = float(np.median(np.diff(np.asarray(demo.times))))
-    unit = np.eye(round(recipe.window_s / interval) + 5)
-    method = recipe.differentiate or "", recipe.window_s / interval, recipe.order
-    filtered = preparation.differentiate(np.arange(len(unit), dtype=np.float64), unit, *method)
-    return float(np.linalg.norm(filtered[len(unit) // 2])) / interval
 
 
 def _squares(vectors: Array) -> float:

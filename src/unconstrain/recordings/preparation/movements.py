@@ -22,7 +22,7 @@ from ..demonstration import Demonstration, Recording, Source
 from ..readers.clocks import usual
 from ..remarks import Remark
 from ..signals.jumps import glitches, repaired, seams
-from ..signals.smoothing import LEAST, kalman_velocities
+from ..signals.smoothing import LEAST, kalman_velocities, white_noise
 from ..signals.stillness import pauses
 from .continuity import continuous
 from .decisions import decide
@@ -460,14 +460,16 @@ class _Moving(NamedTuple):
 
 def _velocities(piece: _Piece, recipe: Recipe, samples: int) -> _Moving:
     times, positions = piece.times, piece.states
+    interval, white = float(np.mean(np.diff(times))), white_noise(positions)
     if recipe.differentiate == "central":
-        return _Moving(np.asarray(np.gradient(positions, times, axis=0, edge_order=2)))
+        return _Moving(np.asarray(np.gradient(positions, times, axis=0, edge_order=2)), white * np.sqrt(0.5) / interval)
     if recipe.differentiate == "kalman":
         return _Moving(*kalman_velocities(times, positions))
-    from scipy.signal import savgol_filter  # takes half a second to import
+    from scipy.signal import savgol_coeffs, savgol_filter  # takes half a second to import
 
-    interval = float(np.mean(np.diff(times)))
-    return _Moving(np.asarray(savgol_filter(positions, samples, recipe.order, deriv=1, delta=interval, axis=0)))
+    gain = np.linalg.norm(savgol_coeffs(samples, recipe.order, deriv=1, delta=interval))
+    found = savgol_filter(positions, samples, recipe.order, deriv=1, delta=interval, axis=0)
+    return _Moving(np.asarray(found), white * float(gain))
 
 
 def _joined(pieces: Sequence[_Piece]) -> _Piece:

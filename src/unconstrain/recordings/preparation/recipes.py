@@ -46,7 +46,7 @@ class Recipe:
         Columns that make the action. Guessed if neither these nor ``differentiate`` are given.
     differentiate : {"savgol", "kalman", "central"}, optional
         Take the velocity of the states as actions: by a Savitzky-Golay filter; by a Kalman smoother, which finds how
-        much noise there is and keeps that of the velocities with the demonstration; or by central differences.
+        much noise there is; or by central differences. Demonstrations keep the noise of these velocities.
     window_s : float
         Length of the smoothing window of ``"savgol"`` in seconds; short beside one turn of the movement.
     order : {2, 3}

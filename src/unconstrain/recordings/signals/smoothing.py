@@ -33,6 +33,9 @@ ROUNDING = 1e-13
 BAND = 5
 """Above the diagonal: steps couple the three numbers of a sample with those of the next."""
 
+MEDIAN_SQUARE = 0.4549
+"""Median of the square of a standard normal number."""
+
 PLACES = 20
 """Samples at which the variance of the velocity is computed."""
 
@@ -161,3 +164,24 @@ def _velocity_variance(factor: Array, samples: int) -> float:
     units = np.zeros((3 * samples, len(rows)))
     units[rows, np.arange(len(rows))] = 1.0
     return float(_solved(factor, units)[rows, np.arange(len(rows))].mean())
+
+
+def white_noise(positions: Array) -> Array:
+    """Standard deviation of white noise of positions (T, n), by fourth differences, at least that of rounding: (n,).
+
+    Velocities that were smoothed hide it from their own differences. Of fewer than five positions: rounding alone.
+    """
+    rounding = np.array([_rounding(column) for column in positions.T])
+    if len(positions) < LEAST:
+        return rounding
+    squares = np.median(np.diff(positions, 4, axis=0) ** 2, axis=0) / (MEDIAN_SQUARE * 70.0)
+    return np.asarray(np.sqrt(np.maximum(squares, rounding**2)))
+
+
+def _rounding(values: Array) -> float:
+    """Standard deviation of rounding values (T,) to multiples of a step that recur, such as whole pixels, or zero."""
+    found, counts = np.unique(values, return_counts=True)
+    steps = np.diff(found[counts > 2])
+    steps = steps[steps > 1e-9 * np.ptp(values)]
+    whole = len(steps) > 2 and np.allclose(times := steps / steps.min(), np.round(times))
+    return float(steps.min()) / np.sqrt(12.0) if whole else 0.0

@@ -77,7 +77,7 @@ def deepened(flat: Sequence[uc.Demonstration], other: Sequence[uc.Demonstration]
         along = np.interp(np.linspace(0, 1, len(demo)), np.linspace(0, 1, len(depth)), depth)
         speed = np.gradient(along, demo.times)
         states, actions = np.column_stack([demo.states, along]), np.column_stack([demo.actions, speed])
-        found.append(replace(demo, states=states, actions=actions))
+        found.append(replace(demo, states=states, actions=actions, noise=None))
     return found
 
 
