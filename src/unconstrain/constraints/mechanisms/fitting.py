@@ -42,11 +42,22 @@ class Fit:
 
     @cached_property
     def jacobian(self) -> Array:
-        """Change of the residuals with the chart, (k, N, c), by central differences."""
-        steps = STEP * np.eye(self.mechanism.count)
-        ends = [[self.mechanism.moved(way * step).residuals(self.track) for way in (1, -1)] for step in steps]
-        slopes = np.array([(ahead - behind) / (2 * STEP) for ahead, behind in ends])
+        """Change of the residuals with the chart, (k, N, c), by central differences: of a share of a large radius.
+
+        It is that on the mechanism itself: noise across a short arc, larger than its rise, would tell its axis.
+        """
+        track, steps = self._nearest, STEP * self.mechanism.units(max(abs(self.mechanism.radius), 1.0))
+        ends = [[self.mechanism.moved(way * step).residuals(track) for way in (1, -1)] for step in np.diag(steps)]
+        slopes = np.array([(ahead - behind) / (2 * step) for (ahead, behind), step in zip(ends, steps, strict=True)])
         return slopes.reshape(self.mechanism.count, *self.residuals.shape)
+
+    @property
+    def _nearest(self) -> Track:
+        """The track without distances from the mechanism, where orientations are not tied to it."""
+        if self.mechanism.form.ties or not self.mechanism.count:
+            return self.track
+        rows = self.mechanism.rows(self.track.positions)
+        return replace(self.track, positions=self.track.positions - np.einsum("nk,nkd->nd", self.residuals, rows))
 
     @cached_property
     def time(self) -> float:
@@ -58,13 +69,19 @@ class Fit:
         return np.einsum("inc,jnc,c->ij", self.jacobian, self.jacobian, 1 / variances, optimize=True)
 
     def certain(self, variances: Array) -> Mechanism:
-        """The mechanism with the covariance of its parameters."""
+        """The mechanism with the covariance of its parameters.
+
+        Of a nearly straight arc the information is singular to working precision, and the Jacobian is not.
+        """
         if not self.mechanism.count:
             return self.mechanism
-        information: Any = self.information(variances) / self.time
+        whitened = (self.jacobian / np.sqrt(variances * self.time)).reshape(self.mechanism.count, -1)
+        lengths = np.linalg.norm(whitened, axis=1, keepdims=True)
+        lengths = np.maximum(lengths, 1e-12 * lengths.max())
+        inverse: Any = np.linalg.pinv(whitened / lengths).T / lengths
         freedom = self.residuals.size / self.time - self.mechanism.count
         quantile = float(stdtrit(max(freedom, 1.0), 0.975))
-        return replace(self.mechanism, covariance=np.linalg.pinv(information, hermitian=True), quantile=quantile)
+        return replace(self.mechanism, covariance=inverse @ inverse.T, quantile=quantile)
 
 
 def fit(kind: type[Mechanism], track: Track) -> Fit:

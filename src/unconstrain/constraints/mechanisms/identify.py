@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,10 +14,10 @@ from ...base.arrays import Array, Groups, as_groups, as_matrix
 from ...base.display import Shown
 from ...base.errors import InvalidDataError
 from ...risks import unit_actions
-from .evidence import log_evidences
+from .evidence import Explained, log_evidences
 from .fitting import Fit, fit, noise
 from .forces import Witness, witnesses
-from .kinds import FLAT_KINDS, KINDS
+from .kinds import FLAT_KINDS, KINDS, Free
 from .mechanism import Mechanism, on_one_side, small_length
 from .tied import TIED_KINDS
 from .track import Track, noise_by_differences, winding
@@ -34,9 +37,6 @@ LIKELY = 20.0
 NEAR = 0.15
 """A path is near a circle that it leaves by less than this share of the radius."""
 
-VAGUE = 0.5
-"""A radius is not known whose margin is more than this share of it: a whole family of curves does as well."""
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidate(Shown):
@@ -45,20 +45,23 @@ class Candidate(Shown):
     Parameters
     ----------
     mechanisms : tuple of Mechanism
-        One for all demonstrations; or one of the same kind for each, in the order of their sorted names.
+        One for all demonstrations, or one for each, in the order of their sorted names.
     log_evidence : float
     noise : float
-        Standard deviation from them in each direction that they hold; NaN where they hold none.
+        Standard deviation from them in each direction that they hold; NaN where they hold none, or kinds differ.
+    alone : tuple of Identification
+        Each demonstration by itself, where their kinds differ; empty where all are of one kind.
     """
 
     mechanisms: tuple[Mechanism, ...]
     log_evidence: float
     noise: float
+    alone: tuple[Identification, ...] = ()
 
     @property
     def kind(self) -> str:
-        """point, line, plane, circle, sphere, cylinder, screw; slider, hinge where orientations tell; or free."""
-        return self.mechanisms[0].kind
+        """point, line, plane, circle, sphere, cylinder, screw; slider, hinge where orientations tell; free; mixed."""
+        return "mixed" if self.alone else self.mechanisms[0].kind
 
     @property
     def free(self) -> int:
@@ -68,18 +71,22 @@ class Candidate(Shown):
     def bends(self, other: Candidate) -> bool:
         """Whether the other is what it is where it does not bend."""
         straight = self.mechanisms[0].form.straight
-        return straight is not None and straight.form == other.mechanisms[0].form
+        mixed = self.alone or other.alone
+        return not mixed and straight is not None and straight.form == other.mechanisms[0].form
 
     @property
     def sentence(self) -> str:
         """Each mechanism in words."""
-        each = "; ".join(mechanism.sentence for mechanism in self.mechanisms)
+        each = "; ".join(one.sentence for one in self.alone or self.mechanisms)
         return each if len(self.mechanisms) == 1 else f"{self.summary}: {each}"
 
     @property
     def summary(self) -> str:
         """One mechanism in words, or how many there are of which kind."""
         count = len(self.mechanisms)
+        if self.alone:
+            kinds = Counter(f"a {one.kind}" if one.decided else "undecided" for one in self.alone)
+            return f"{', '.join(f'{kind} for {some}' for kind, some in kinds.items())} of {count} demonstrations"
         return self.mechanisms[0].sentence if count == 1 else f"a {self.kind} for each of {count} demonstrations"
 
     def _summary(self) -> tuple[str, ...]:
@@ -135,12 +142,12 @@ class Identification(Shown):
 
     @property
     def decided(self) -> bool:
-        """Whether one kind is likely enough to speak of, and its radius known at all."""
+        """Whether one kind, or that kinds differ, is likely enough to speak of, and its radius known at all."""
         return self.odds >= LIKELY and not self._vague
 
     @property
     def _vague(self) -> bool:
-        return bool(self.mechanism.margins.get("radius", np.zeros(1)).item() > VAGUE * self.mechanism.radius)
+        return not self.candidates[0].alone and any(one.vague for one in self.candidates[0].mechanisms)
 
     @property
     def sentence(self) -> str:
@@ -156,6 +163,8 @@ class Identification(Shown):
     def doubt(self) -> str:
         """What a stroke by itself does not tell of its mechanism, in words; empty if there is nothing."""
         best, apart = self.candidates[0], "strokes from other starts would tell whether it is held"
+        if best.alone:
+            return next((one.doubt for one in best.alone if one.doubt), "")
         alone = self.demonstrations == len(best.mechanisms)
         if not alone or self.witnesses or best.free not in (1, len(self.mechanism.centre) - 1):
             return ""
@@ -179,7 +188,8 @@ class Identification(Shown):
         if self._odds(rival) < LIKELY or self._vague:
             verdict = f"undecided: {best}; or else {rival.sentence} ({_said(self._odds(rival))})"
         else:
-            other = "nothing held" if rival.kind == "free" else f"a {rival.kind}"
+            other = {"free": "nothing held", "mixed": "kinds that differ"}.get(rival.kind, f"a {rival.kind}")
+            other = "one kind for all" if self.kind == "mixed" else other
             verdict = f"{best}, against {other} {_said(self._odds(rival))}"
         if bent and self._odds(bent[0]) < LIKELY:
             verdict += f"; whether it bends a little, as a {bent[0].kind}, does not show ({_said(self._odds(bent[0]))})"
@@ -210,7 +220,8 @@ def identify(
     forces : array_like, shape (N, 2) or (N, 3), optional
         On the mechanism, in N and in the frame of the positions, without the tool's weight.
     groups : sequence, shape (N,), optional
-        Which demonstration each sample is from. One mechanism for all is compared with one of a kind for each.
+        Which demonstration each sample is from. One mechanism for all is compared with one for each, of one kind or of
+        kinds that differ.
     unit : str
         Of the positions; empty where it is not known.
 
@@ -221,17 +232,13 @@ def identify(
     """
     track, order, scale, origin = _track(positions, orientations, groups)
     pushed = None if forces is None else _as_long(forces, "forces", track.positions.shape)[order]
-    explained = _fits(track)
-    time = min(max(one.time for one in fits) for fits in explained.values() if fits[0].mechanism.count)
+    whole, *alone = _fits(track)
+    times = [min(max(fit.time for fit in fits) for fits in one.values() if fits[0].mechanism.count) for one in alone]
+    longest = min(max(fit.time for fit in fits) for fits in whole.values() if fits[0].mechanism.count)
     white = noise_by_differences(track.positions, track.groups)
-    found = log_evidences(explained, time, white)
-    ranked = sorted(found, key=lambda each: -found[each])
-    candidates = tuple(_candidate(explained[each], found[each], scale, origin, unit) for each in ranked)
-    said: list[Witness] = []
-    if pushed is not None:
-        said = witnesses(candidates[0].mechanisms, origin + scale * track.positions, pushed, track.groups)
-    steps = [np.diff(one.positions, axis=0) for one in track.demonstrations]
-    return Identification(candidates, len(order) / time, said, len(steps), winding(steps))
+    setting = _Setting(min(longest, max(times, default=longest)), white, scale, origin, unit)
+    parts = [None if pushed is None else pushed[track.groups == group] for group in np.unique(track.groups)]
+    return _judged(whole, pushed, setting, [_judged(*one, setting) for one in zip(alone, parts, strict=False)])
 
 
 def _said(odds: float) -> str:
@@ -273,23 +280,66 @@ def _as_long(values: ArrayLike, what: str, shape: tuple[int, ...]) -> Array:
     return table
 
 
-def _fits(track: Track) -> dict[tuple[type[Mechanism], int], list[Fit]]:
-    """By kind, and by how many mechanisms there are: one for all demonstrations, or one for each."""
+def _fits(track: Track) -> list[Explained]:
+    """By kind, and by how many mechanisms there are: one for all demonstrations, or one for each; then those alone."""
     kinds = KINDS if track.dimensions == 3 else FLAT_KINDS
     if track.poses:
         kinds = (*kinds[:-1], *TIED_KINDS)
     parts = track.demonstrations
-    each = {(kind, len(parts)): _each(kind, parts) for kind in kinds[1:] if len(parts) > 1}
-    return {**{(kind, 1): _each(kind, [track]) for kind in kinds}, **each}
+    alone = [{(kind, 1): _each([fit(kind, part)]) for kind in kinds} for part in parts if len(parts) > 1]
+    each = {(kind, len(parts)): _each([one[kind, 1][0] for one in alone]) for kind in kinds[1:] if alone}
+    return [{**{(kind, 1): _each([fit(kind, track)]) for kind in kinds}, **each}, *alone]
 
 
-def _each(kind: type[Mechanism], parts: list[Track]) -> list[Fit]:
+def _each(fits: list[Fit]) -> list[Fit]:
     """Their axes on one side."""
-    turned = on_one_side([fit(kind, part).mechanism for part in parts])
-    return [Fit(mechanism, part) for mechanism, part in zip(turned, parts, strict=True)]
+    turned = on_one_side([one.mechanism for one in fits])
+    return [Fit(mechanism, one.track) for mechanism, one in zip(turned, fits, strict=True)]
 
 
-def _candidate(fits: list[Fit], evidence: float, scale: float, origin: Array, unit: str) -> Candidate:
+class _Setting(NamedTuple):
+    """What all explanations share: samples that are worth one, what is white, and where and how large the track is."""
+
+    time: float
+    white: float
+    scale: float
+    origin: Array
+    unit: str
+
+
+def _judged(
+    explained: Explained, pushed: Array | None, setting: _Setting, alone: Sequence[Identification] = ()
+) -> Identification:
+    """All explanations of a recording, whose demonstrations were judged by themselves."""
+    track = explained[Free, 1][0].track
+    found = log_evidences(explained, setting.time, setting.white)
+    every = [_candidate(fits, found[each], setting) for each, fits in explained.items()]
+    candidates = tuple(sorted([*every, *_mixed(every, alone)], key=lambda each: -each.log_evidence))
+    said: list[Witness] = []
+    if pushed is not None and not candidates[0].alone:
+        positions = setting.origin + setting.scale * track.positions
+        said = witnesses(candidates[0].mechanisms, positions, pushed, track.groups)
+    steps = [np.diff(one.positions, axis=0) for one in track.demonstrations]
+    return Identification(candidates, len(track.positions) / setting.time, said, len(steps), winding(steps))
+
+
+def _candidate(fits: list[Fit], evidence: float, setting: _Setting) -> Candidate:
     variances = noise(fits)
+    scale, origin, unit = setting[2:]
     mechanisms = tuple(one.certain(variances).placed(scale, origin, unit) for one in fits)
     return Candidate(mechanisms, evidence, scale * float(np.sqrt(variances[0])) if len(variances) else np.nan)
+
+
+def _mixed(candidates: Sequence[Candidate], alone: Sequence[Identification]) -> list[Candidate]:
+    """Each demonstration with a kind of its own, if these differ: what that gains over the best kind for all of them.
+
+    The gain is by what each is alone, with noise of its own on both sides; each choice but the first is paid for.
+    """
+    if len({one.kind for one in alone}) < 2:
+        return []
+    values = [{each.kind: each.log_evidence for each in one.candidates} for one in alone]
+    same = {each: sum(one[each.kind] for one in values) for each in candidates if len(each.mechanisms) == len(alone)}
+    best = max(same, key=lambda each: same[each])
+    gain = sum(max(one.values()) for one in values) - same[best] - (len(alone) - 1) * np.log(len(values[0]))
+    mechanisms = tuple(one.mechanism for one in alone)
+    return [Candidate(mechanisms, best.log_evidence + float(gain), np.nan, tuple(alone))]

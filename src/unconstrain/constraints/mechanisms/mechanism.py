@@ -22,6 +22,9 @@ from .track import Track
 ANGLES = ("tilt", "turn")
 """Entries of a chart that are radians; all others are lengths."""
 
+VAGUE = 0.5
+"""A radius is not known whose margin is more than this share of it: a whole family of curves does as well."""
+
 
 class Form(NamedTuple):
     """What makes a kind; ``phrase`` has places for ``centre``, ``axis``, ``radius`` and ``pitch``."""
@@ -121,13 +124,31 @@ class Mechanism(Shown):
 
     @property
     def margins(self) -> dict[str, Array]:
-        """Half of the 95 % interval of each entry of the chart: lengths, or radians; empty where it was not fitted."""
-        return {} if self.covariance is None else self._named(self.quantile * np.sqrt(np.diag(self.covariance)))
+        """Half of the 95 % interval of each entry of the chart: lengths, or radians; empty where it was not fitted.
+
+        An arc tells its curvature: the interval of a radius r and of its centre, whose curvature is known to a share q,
+        reaches to ``r / (1 - q)``, and has no end where the arc may as well be straight.
+        """
+        if self.covariance is None:
+            return {}
+        found = self._named(self.quantile * np.sqrt(np.diag(self.covariance)))
+        if self.form.straight is not None:
+            left = max(abs(self.radius) - float(found["radius"].item()), 0.0)
+            wider = abs(self.radius) / left if left else np.inf
+            found |= {name: found[name] * wider for name in ("centre", "across", "radius") if name in found}
+        return found
+
+    @property
+    def vague(self) -> bool:
+        """Whether the radius is not known."""
+        return bool(self.margins.get("radius", np.zeros(1)).item() > VAGUE * abs(self.radius))
 
     @property
     def sentence(self) -> str:
         """What it is, with 95 % intervals."""
         sure = {name: float(np.max(values)) for name, values in self.margins.items()}
+        if self.vague and self.form.straight is not None:
+            return f"{self.title} of a radius that the recording does not tell"
         near = max(sure.get("centre", 0.0), sure.get("across", 0.0), sure.get("along", 0.0))
         tilt = f" ± {np.degrees(sure['tilt']):.2g}°" if "tilt" in sure else ""
         return self.form.phrase.format(
@@ -180,7 +201,7 @@ class Mechanism(Shown):
 
     def placed(self, scale: float, origin: Array, unit: str) -> Self:
         """In other units and about another origin: ``scale`` of theirs are one of these."""
-        units = np.repeat([1.0 if name in ANGLES else scale for name in self.form.chart], self.sizes)
+        units = self.units(scale)
         return replace(
             self,
             centre=origin + scale * self.centre,
@@ -189,6 +210,17 @@ class Mechanism(Shown):
             unit=unit,
             covariance=None if self.covariance is None else units[:, None] * self.covariance * units,
         )
+
+    def is_parallel(self, other: Mechanism) -> bool:
+        """Whether the other is of the same kind, and has the same axis to within both 95 % intervals."""
+        if self.kind != other.kind or "tilt" not in self.form.chart:
+            return False
+        apart = np.arccos(min(abs(float(self.axis @ other.axis)), 1.0))
+        return bool(apart <= sum(one.margins["tilt"].max() for one in (self, other)))
+
+    def units(self, scale: float) -> Array:
+        """That of each number of the chart (k,), where lengths are in units of ``scale``."""
+        return np.repeat([1.0 if name in ANGLES else scale for name in self.form.chart], self.sizes)
 
     def cylindrical(self, positions: Array) -> tuple[Array, Array, Array]:
         """Along the axis (N,), the unit vector away from it (N, D), the distance from it (N,)."""
