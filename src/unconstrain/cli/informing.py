@@ -32,9 +32,6 @@ MARK = "verdict"
 OF, HELD_BY, SHOWN, WHERE, WOUND = "of", "held by", "shown by positions", "least and largest states", "winding"
 """Notes of a constraint: of which demonstrations; mechanism; if that is sure; where; if they turn more than free."""
 
-DIFFER = "mechanisms that differ"
-"""What positions of each demonstration keep to, where one constraint for all says too little."""
-
 NAMED = "named, but not held to"
 """Note of the mechanism that positions may keep to, where the directions that were learnt are followed all the same."""
 
@@ -146,8 +143,6 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
     if isinstance(held, uc.LearntConstraint):
         found = uc.evaluation.verdicts.of_constraint(held, shown=notes.get(SHOWN), wound=notes.get(WOUND))
         named = notes.get(HELD_BY) and uc.constraints.mechanisms.restored(notes[HELD_BY])
-        if notes.get(DIFFER):
-            return uc.evaluation.verdicts.of_differing(found, notes[DIFFER])
         return uc.evaluation.verdicts.of_mechanism(found, held.rank_, named, sure=True) if named else found
     if not hasattr(innermost(held), "solution_"):
         mark = uc.evaluation.verdicts.Mark.BAD

@@ -299,14 +299,6 @@ def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool) -> Verdict:
     return found._replace(said=said + found.said.partition(" directions were held")[2], next=then)
 
 
-def of_differing(found: Verdict, held: str) -> Verdict:
-    """Say of a constraint, or of one for each demonstration, that positions keep to mechanisms that differ."""
-    said = f"Demonstrations differ: {held}. {found.said.replace('were held;', 'were held in all of them;')}"
-    doubt = f"That each was held: a free stroke may look the same. {found.doubt}".strip()
-    then = "Learn those of one mechanism by themselves, with --episodes or --leave-out."
-    return Verdict(no_better(found.mark), said, found.trust, doubt, then)
-
-
 def of_support(support: Array, times: Array | None, unknown: Array | None = None) -> Verdict:
     """Judge a movement of a policy by how near data is along it, (T,) each; times are steps where not known.
 

@@ -42,22 +42,14 @@ class Fit:
 
     @cached_property
     def jacobian(self) -> Array:
-        """Change of the residuals with the chart, (k, N, c), by central differences: of a share of a large radius.
-
-        It is that on the mechanism itself: noise across a short arc, larger than its rise, would tell its axis.
-        """
-        track, steps = self._nearest, STEP * self.mechanism.units(max(abs(self.mechanism.radius), 1.0))
+        """Change of the residuals with the chart, (k, N, c), by central differences where the mechanism is."""
+        track, steps = self.track, STEP * self.mechanism.units(max(abs(self.mechanism.radius), 1.0))
+        if self.mechanism.count and not self.mechanism.form.ties:
+            off = np.einsum("nk,nkd->nd", self.residuals, self.mechanism.rows(track.positions))
+            track = replace(track, positions=track.positions - off)
         ends = [[self.mechanism.moved(way * step).residuals(track) for way in (1, -1)] for step in np.diag(steps)]
         slopes = np.array([(ahead - behind) / (2 * step) for (ahead, behind), step in zip(ends, steps, strict=True)])
         return slopes.reshape(self.mechanism.count, *self.residuals.shape)
-
-    @property
-    def _nearest(self) -> Track:
-        """The track without distances from the mechanism, where orientations are not tied to it."""
-        if self.mechanism.form.ties or not self.mechanism.count:
-            return self.track
-        rows = self.mechanism.rows(self.track.positions)
-        return replace(self.track, positions=self.track.positions - np.einsum("nk,nkd->nd", self.residuals, rows))
 
     @cached_property
     def time(self) -> float:
@@ -69,16 +61,11 @@ class Fit:
         return np.einsum("inc,jnc,c->ij", self.jacobian, self.jacobian, 1 / variances, optimize=True)
 
     def certain(self, variances: Array) -> Mechanism:
-        """The mechanism with the covariance of its parameters.
-
-        Of a nearly straight arc the information is singular to working precision, and the Jacobian is not.
-        """
+        """With the covariance of its parameters, by the Jacobian: of a nearly straight arc its square is singular."""
         if not self.mechanism.count:
             return self.mechanism
         whitened = (self.jacobian / np.sqrt(variances * self.time)).reshape(self.mechanism.count, -1)
-        lengths = np.linalg.norm(whitened, axis=1, keepdims=True)
-        lengths = np.maximum(lengths, 1e-12 * lengths.max())
-        inverse: Any = np.linalg.pinv(whitened / lengths).T / lengths
+        inverse: Any = np.linalg.pinv(whitened).T
         freedom = self.residuals.size / self.time - self.mechanism.count
         quantile = float(stdtrit(max(freedom, 1.0), 0.975))
         return replace(self.mechanism, covariance=inverse @ inverse.T, quantile=quantile)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +16,7 @@ from ...risks import unit_actions
 from .evidence import Explained, log_evidences
 from .fitting import Fit, fit, noise
 from .forces import Witness, witnesses
-from .kinds import FLAT_KINDS, KINDS, Free
+from .kinds import FLAT_KINDS, KINDS
 from .mechanism import Mechanism, on_one_side, small_length
 from .tied import TIED_KINDS
 from .track import Track, noise_by_differences, winding
@@ -49,45 +48,49 @@ class Candidate(Shown):
     log_evidence : float
     noise : float
         Standard deviation from them in each direction that they hold; NaN where they hold none, or kinds differ.
-    alone : tuple of Identification
-        Each demonstration by itself, where their kinds differ; empty where all are of one kind.
+    odds : tuple of float
+        Of the kind of each against the next, where kinds differ; else empty.
     """
 
     mechanisms: tuple[Mechanism, ...]
     log_evidence: float
     noise: float
-    alone: tuple[Identification, ...] = ()
+    odds: tuple[float, ...] = ()
 
     @property
     def kind(self) -> str:
         """point, line, plane, circle, sphere, cylinder, screw; slider, hinge where orientations tell; free; mixed."""
-        return "mixed" if self.alone else self.mechanisms[0].kind
+        return "mixed" if self.odds else self.mechanisms[0].kind
+
+    @property
+    def kinds(self) -> list[str]:
+        """Of each mechanism; undecided where that is, or a radius is not known."""
+        told = zip(self.odds or len(self.mechanisms) * (LIKELY,), self.mechanisms, strict=True)
+        return ["undecided" if odds < LIKELY or one.vague else one.kind for odds, one in told]
 
     @property
     def free(self) -> int:
-        """In how many directions it moves."""
-        return len(self.mechanisms[0].centre) - self.mechanisms[0].rank
+        """In how many directions it moves; the least of several."""
+        return min(len(one.centre) - one.rank for one in self.mechanisms)
 
     def bends(self, other: Candidate) -> bool:
         """Whether the other is what it is where it does not bend."""
         straight = self.mechanisms[0].form.straight
-        mixed = self.alone or other.alone
-        return not mixed and straight is not None and straight.form == other.mechanisms[0].form
+        return straight is not None and not self.odds and straight.form.kind == other.kind
 
     @property
     def sentence(self) -> str:
         """Each mechanism in words."""
-        each = "; ".join(one.sentence for one in self.alone or self.mechanisms)
+        each = "; ".join(mechanism.sentence for mechanism in self.mechanisms)
         return each if len(self.mechanisms) == 1 else f"{self.summary}: {each}"
 
     @property
     def summary(self) -> str:
         """One mechanism in words, or how many there are of which kind."""
         count = len(self.mechanisms)
-        if self.alone:
-            kinds = Counter(f"a {one.kind}" if one.decided else "undecided" for one in self.alone)
-            return f"{', '.join(f'{kind} for {some}' for kind, some in kinds.items())} of {count} demonstrations"
-        return self.mechanisms[0].sentence if count == 1 else f"a {self.kind} for each of {count} demonstrations"
+        kinds = ", ".join(f"{kind} for {some}" for kind, some in Counter(self.kinds).items())
+        each = kinds if self.odds else f"a {self.kind} for each"
+        return self.mechanisms[0].sentence if count == 1 else f"{each} of {count} demonstrations"
 
     def _summary(self) -> tuple[str, ...]:
         return (self.sentence,)
@@ -142,12 +145,8 @@ class Identification(Shown):
 
     @property
     def decided(self) -> bool:
-        """Whether one kind, or that kinds differ, is likely enough to speak of, and its radius known at all."""
-        return self.odds >= LIKELY and not self._vague
-
-    @property
-    def _vague(self) -> bool:
-        return not self.candidates[0].alone and any(one.vague for one in self.candidates[0].mechanisms)
+        """Whether a kind is likely enough to speak of, that of each where they differ, and each radius known at all."""
+        return self.odds >= LIKELY and "undecided" not in self.candidates[0].kinds
 
     @property
     def sentence(self) -> str:
@@ -163,15 +162,14 @@ class Identification(Shown):
     def doubt(self) -> str:
         """What a stroke by itself does not tell of its mechanism, in words; empty if there is nothing."""
         best, apart = self.candidates[0], "strokes from other starts would tell whether it is held"
-        if best.alone:
-            return next((one.doubt for one in best.alone if one.doubt), "")
         alone = self.demonstrations == len(best.mechanisms)
         if not alone or self.witnesses or best.free not in (1, len(self.mechanism.centre) - 1):
             return ""
         if best.free == 1:
             return f"a policy that keeps to this path within a surface looks the same in one stroke; {apart}"
         if not self.winding:
-            return f"free strokes keep to a {best.kind} of their own, too, where they turn as little as here; {apart}"
+            kind = self.mechanism.kind
+            return f"free strokes keep to a {kind} of their own, too, where they turn as little as here; {apart}"
         circle = next((one for one in self.candidates if one.kind == "circle"), best)
         if self.demonstrations > 1 or not circle.noise < NEAR * circle.mechanisms[0].radius or circle.free != 1:
             return ""
@@ -185,7 +183,7 @@ class Identification(Shown):
     def _judged(self, best: str) -> str:
         bent = [one for one in self.candidates if one.bends(self.candidates[0]) and self.candidates[0].free == 2]
         rival = next(one for one in self.candidates if one.kind != self.kind and one not in bent)
-        if self._odds(rival) < LIKELY or self._vague:
+        if self._odds(rival) < LIKELY or (self.kind != "mixed" and "undecided" in self.candidates[0].kinds):
             verdict = f"undecided: {best}; or else {rival.sentence} ({_said(self._odds(rival))})"
         else:
             other = {"free": "nothing held", "mixed": "kinds that differ"}.get(rival.kind, f"a {rival.kind}")
@@ -220,8 +218,7 @@ def identify(
     forces : array_like, shape (N, 2) or (N, 3), optional
         On the mechanism, in N and in the frame of the positions, without the tool's weight.
     groups : sequence, shape (N,), optional
-        Which demonstration each sample is from. One mechanism for all is compared with one for each, of one kind or of
-        kinds that differ.
+        Which demonstration each sample is from. One mechanism for all is compared with one for each.
     unit : str
         Of the positions; empty where it is not known.
 
@@ -232,13 +229,17 @@ def identify(
     """
     track, order, scale, origin = _track(positions, orientations, groups)
     pushed = None if forces is None else _as_long(forces, "forces", track.positions.shape)[order]
-    whole, *alone = _fits(track)
-    times = [min(max(fit.time for fit in fits) for fits in one.values() if fits[0].mechanism.count) for one in alone]
-    longest = min(max(fit.time for fit in fits) for fits in whole.values() if fits[0].mechanism.count)
-    white = noise_by_differences(track.positions, track.groups)
-    setting = _Setting(min(longest, max(times, default=longest)), white, scale, origin, unit)
-    parts = [None if pushed is None else pushed[track.groups == group] for group in np.unique(track.groups)]
-    return _judged(whole, pushed, setting, [_judged(*one, setting) for one in zip(alone, parts, strict=False)])
+    every = _fits(track)
+    times = [min(max(fit.time for fit in fits) for fits in one.values() if fits[0].mechanism.count) for one in every]
+    time, white = min(times[0], max(times[1:] or times)), noise_by_differences(track.positions, track.groups)
+    found = [(fits, log_evidences(fits, time, white)) for fits in every]
+    whole, *alone = ([_candidate(one[key], worth[key], scale, origin, unit) for key in one] for one, worth in found)
+    ranked = tuple(sorted([*whole, *_mixed(whole, alone)], key=attrgetter("log_evidence"), reverse=True))
+    said: list[Witness] = []
+    if pushed is not None and not ranked[0].odds:
+        said = witnesses(ranked[0].mechanisms, origin + scale * track.positions, pushed, track.groups)
+    steps = [np.diff(one.positions, axis=0) for one in track.demonstrations]
+    return Identification(ranked, len(order) / time, said, len(steps), winding(steps))
 
 
 def _said(odds: float) -> str:
@@ -281,65 +282,38 @@ def _as_long(values: ArrayLike, what: str, shape: tuple[int, ...]) -> Array:
 
 
 def _fits(track: Track) -> list[Explained]:
-    """By kind, and by how many mechanisms there are: one for all demonstrations, or one for each; then those alone."""
+    """Of all demonstrations, by one mechanism or by one for each; where there are several, then of each by itself."""
     kinds = KINDS if track.dimensions == 3 else FLAT_KINDS
     if track.poses:
         kinds = (*kinds[:-1], *TIED_KINDS)
-    parts = track.demonstrations
-    alone = [{(kind, 1): _each([fit(kind, part)]) for kind in kinds} for part in parts if len(parts) > 1]
-    each = {(kind, len(parts)): _each([one[kind, 1][0] for one in alone]) for kind in kinds[1:] if alone}
-    return [{**{(kind, 1): _each([fit(kind, track)]) for kind in kinds}, **each}, *alone]
+    every = [track, *parts] if len(parts := track.demonstrations) > 1 else parts
+    whole, *alone = ({(kind, 1): _turned([fit(kind, one)]) for kind in kinds} for one in every)
+    each = {(kind, len(parts)): _turned([one[kind, 1][0] for one in alone]) for kind in kinds[1:] if alone}
+    return [whole | each, *alone]
 
 
-def _each(fits: list[Fit]) -> list[Fit]:
+def _turned(fits: list[Fit]) -> list[Fit]:
     """Their axes on one side."""
     turned = on_one_side([one.mechanism for one in fits])
     return [Fit(mechanism, one.track) for mechanism, one in zip(turned, fits, strict=True)]
 
 
-class _Setting(NamedTuple):
-    """What all explanations share: samples that are worth one, what is white, and where and how large the track is."""
-
-    time: float
-    white: float
-    scale: float
-    origin: Array
-    unit: str
-
-
-def _judged(
-    explained: Explained, pushed: Array | None, setting: _Setting, alone: Sequence[Identification] = ()
-) -> Identification:
-    """All explanations of a recording, whose demonstrations were judged by themselves."""
-    track = explained[Free, 1][0].track
-    found = log_evidences(explained, setting.time, setting.white)
-    every = [_candidate(fits, found[each], setting) for each, fits in explained.items()]
-    candidates = tuple(sorted([*every, *_mixed(every, alone)], key=lambda each: -each.log_evidence))
-    said: list[Witness] = []
-    if pushed is not None and not candidates[0].alone:
-        positions = setting.origin + setting.scale * track.positions
-        said = witnesses(candidates[0].mechanisms, positions, pushed, track.groups)
-    steps = [np.diff(one.positions, axis=0) for one in track.demonstrations]
-    return Identification(candidates, len(track.positions) / setting.time, said, len(steps), winding(steps))
-
-
-def _candidate(fits: list[Fit], evidence: float, setting: _Setting) -> Candidate:
-    variances = noise(fits)
-    scale, origin, unit = setting[2:]
-    mechanisms = tuple(one.certain(variances).placed(scale, origin, unit) for one in fits)
-    return Candidate(mechanisms, evidence, scale * float(np.sqrt(variances[0])) if len(variances) else np.nan)
-
-
-def _mixed(candidates: Sequence[Candidate], alone: Sequence[Identification]) -> list[Candidate]:
-    """Each demonstration with a kind of its own, if these differ: what that gains over the best kind for all of them.
-
-    The gain is by what each is alone, with noise of its own on both sides; each choice but the first is paid for.
-    """
-    if len({one.kind for one in alone}) < 2:
+def _mixed(whole: list[Candidate], parts: list[list[Candidate]]) -> list[Candidate]:
+    """Each with a kind of its own, if these differ: what each gains by it alone, less the price of each choice."""
+    alone = [sorted(one, key=attrgetter("log_evidence"), reverse=True) for one in parts]
+    if len({one[0].kind for one in alone}) < 2:
         return []
-    values = [{each.kind: each.log_evidence for each in one.candidates} for one in alone]
-    same = {each: sum(one[each.kind] for one in values) for each in candidates if len(each.mechanisms) == len(alone)}
+    values = [{each.kind: each.log_evidence for each in one} for one in alone]
+    same = {each: sum(one[each.kind] for one in values) for each in whole if len(each.mechanisms) == len(alone)}
     best = max(same, key=lambda each: same[each])
     gain = sum(max(one.values()) for one in values) - same[best] - (len(alone) - 1) * np.log(len(values[0]))
-    mechanisms = tuple(one.mechanism for one in alone)
-    return [Candidate(mechanisms, best.log_evidence + float(gain), np.nan, tuple(alone))]
+    rivals = [next(each for each in one[1:] if one[0].free != 2 or not each.bends(one[0])) for one in alone]
+    apart = (one[0].log_evidence - rival.log_evidence for one, rival in zip(alone, rivals, strict=True))
+    odds = tuple(float(np.exp(min(each, MOST_CERTAIN))) for each in apart)
+    return [Candidate(tuple(one[0].mechanisms[0] for one in alone), best.log_evidence + gain, np.nan, odds)]
+
+
+def _candidate(fits: list[Fit], evidence: float, scale: float, origin: Array, unit: str) -> Candidate:
+    variances = noise(fits)
+    mechanisms = tuple(one.certain(variances).placed(scale, origin, unit) for one in fits)
+    return Candidate(mechanisms, evidence, scale * float(np.sqrt(variances[0])) if len(variances) else np.nan)

@@ -124,17 +124,11 @@ class Mechanism(Shown):
 
     @property
     def margins(self) -> dict[str, Array]:
-        """Half of the 95 % interval of each entry of the chart: lengths, or radians; empty where it was not fitted.
-
-        An arc tells its curvature: the interval of a radius r and of its centre, whose curvature is known to a share q,
-        reaches to ``r / (1 - q)``, and has no end where the arc may as well be straight.
-        """
-        if self.covariance is None:
-            return {}
-        found = self._named(self.quantile * np.sqrt(np.diag(self.covariance)))
-        if self.form.straight is not None:
-            left = max(abs(self.radius) - float(found["radius"].item()), 0.0)
-            wider = abs(self.radius) / left if left else np.inf
+        """Half of the 95 % interval, of a radius by its curvature, of each entry of the chart: lengths, or radians."""
+        found = {} if self.covariance is None else self._named(self.quantile * np.sqrt(np.diag(self.covariance)))
+        if found and self.form.straight is not None:
+            left = abs(self.radius) - float(found["radius"].item())
+            wider = abs(self.radius) / left if left > 0 else np.inf
             found |= {name: found[name] * wider for name in ("centre", "across", "radius") if name in found}
         return found
 
@@ -211,12 +205,11 @@ class Mechanism(Shown):
             covariance=None if self.covariance is None else units[:, None] * self.covariance * units,
         )
 
-    def is_parallel(self, other: Mechanism) -> bool:
+    def parallel(self, other: Mechanism) -> bool:
         """Whether the other is of the same kind, and has the same axis to within both 95 % intervals."""
-        if self.kind != other.kind or "tilt" not in self.form.chart:
-            return False
         apart = np.arccos(min(abs(float(self.axis @ other.axis)), 1.0))
-        return bool(apart <= sum(one.margins["tilt"].max() for one in (self, other)))
+        within = sum(one.margins["tilt"].max() for one in (self, other) if "tilt" in one.margins)
+        return bool(self.kind == other.kind and apart <= 1.5 * within)
 
     def units(self, scale: float) -> Array:
         """That of each number of the chart (k,), where lengths are in units of ``scale``."""
