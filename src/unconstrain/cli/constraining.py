@@ -120,9 +120,8 @@ def _judged(
     shown, rank = None if named is None else named.shown(learnt), max(one.rank_ for one in learnt.values())
     found = uc.evaluation.verdicts.of_constraint(*learnt.values(), shown=shown, wound=wound)
     if named is not None and named.differs(learnt):
-        said = f"Demonstrations differ: {named.found.candidates[0].summary}. {found.said}"
-        then = "Learn those of one mechanism by themselves, with --episodes or --leave-out."
-        return found._replace(said=said.replace(" were held;", " were held in all of them;"), next=then)
+        said = f"Demonstrations differ: {named.found.summary}. {found.said.replace('held;', 'held in all;')}"
+        return found._replace(said=said, next="Learn those of one mechanism alone, with --episodes or --leave-out.")
     judged = uc.evaluation.verdicts.of_mechanism
     return found if named is None else judged(found, rank, named.found.mechanism, named.is_followed(learnt))
 
@@ -287,7 +286,7 @@ class Named(NamedTuple):
     def differs(self, learnt: Mapping[str, uc.LearntConstraint]) -> bool:
         """Whether kinds of mechanisms differ, or one constraint for all holds less than those of each."""
         less = "" in learnt and learnt[""].rank_ < max(one.rank for one in self.held)
-        return self.found.kind == "mixed" or (less and len(self.held) > 1 and self.found.decided)
+        return self.found.kind == "mixture" or (less and len(self.held) > 1 and self.found.decided)
 
     def is_followed(self, learnt: Mapping[str, uc.LearntConstraint]) -> bool:
         """Whether each of what was learnt, by name, is held by the mechanism, not by the directions learnt."""
@@ -300,8 +299,7 @@ class Named(NamedTuple):
         told = {"mechanism": dict(self.each).get(name, self.found.summary), SHOWN: self.shown({name: learnt})}
         if self.is_followed({name: learnt}):
             return told | {HELD_BY: own.numbers()}
-        of_one = self.found.decided and (name or self.found.kind != "mixed")
-        more = of_one and (own.rank > learnt.rank_ or own.form.straight is not None)
+        more = self.shown({name: learnt}) is not False and (own.rank > learnt.rank_ or own.form.straight is not None)
         return told | ({NAMED: own.title} if more else {})
 
     @property
@@ -396,7 +394,7 @@ def table_of(
     names = list(own)
     if named is not None and named.each:
         names, held, kinds = named.names, named.held, named.found.candidates[0].kinds
-        columns["kind"] = kinds if named.found.kind == "mixed" else []
+        columns["kind"] = kinds if named.found.kind == "mixture" else []
         what = f"angle of {'normal' if {*kinds} == {'plane'} else 'axis'} to {bare(named.up)} axis"
         angles = [f"{math.degrees(math.acos(min(abs(one.axis[-1]), 1.0))):.1f}°" for one in held]
         columns[what] = [each * ("tilt" in one.margins) for each, one in zip(angles, held, strict=True)]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from operator import attrgetter
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,8 +58,8 @@ class Candidate(Shown):
 
     @property
     def kind(self) -> str:
-        """point, line, plane, circle, sphere, cylinder, screw; slider, hinge where orientations tell; free; mixed."""
-        return "mixed" if self.odds else self.mechanisms[0].kind
+        """point, line, plane, circle, sphere, cylinder, screw; slider, hinge where orientations tell; free; mixture."""
+        return "mixture" if self.odds else self.mechanisms[0].kind
 
     @property
     def kinds(self) -> list[str]:
@@ -77,6 +76,10 @@ class Candidate(Shown):
         """Whether the other is what it is where it does not bend."""
         straight = self.mechanisms[0].form.straight
         return straight is not None and not self.odds and straight.form.kind == other.kind
+
+    def against(self, other: Candidate) -> float:
+        """Odds against another."""
+        return float(np.exp(min(self.log_evidence - other.log_evidence, MOST_CERTAIN)))
 
     @property
     def sentence(self) -> str:
@@ -141,7 +144,7 @@ class Identification(Shown):
     @property
     def odds(self) -> float:
         """Of the likeliest kind against the next."""
-        return self._odds(next(one for one in self.candidates if one.kind != self.kind))
+        return self.candidates[0].against(next(one for one in self.candidates if one.kind != self.kind))
 
     @property
     def decided(self) -> bool:
@@ -168,8 +171,7 @@ class Identification(Shown):
         if best.free == 1:
             return f"a policy that keeps to this path within a surface looks the same in one stroke; {apart}"
         if not self.winding:
-            kind = self.mechanism.kind
-            return f"free strokes keep to a {kind} of their own, too, where they turn as little as here; {apart}"
+            return f"free strokes keep to a {best.kind} of their own, too, where they turn as little as here; {apart}"
         circle = next((one for one in self.candidates if one.kind == "circle"), best)
         if self.demonstrations > 1 or not circle.noise < NEAR * circle.mechanisms[0].radius or circle.free != 1:
             return ""
@@ -181,20 +183,20 @@ class Identification(Shown):
         )
 
     def _judged(self, best: str) -> str:
-        bent = [one for one in self.candidates if one.bends(self.candidates[0]) and self.candidates[0].free == 2]
+        first = self.candidates[0]
+        bent = [one for one in self.candidates if one.bends(first) and first.free == 2]
         rival = next(one for one in self.candidates if one.kind != self.kind and one not in bent)
-        if self._odds(rival) < LIKELY or (self.kind != "mixed" and "undecided" in self.candidates[0].kinds):
-            verdict = f"undecided: {best}; or else {rival.sentence} ({_said(self._odds(rival))})"
+        odds = first.against(rival)
+        if odds < LIKELY or (not first.odds and "undecided" in first.kinds):
+            verdict = f"undecided: {best}; or else {rival.sentence} ({_said(odds)})"
         else:
-            other = {"free": "nothing held", "mixed": "kinds that differ"}.get(rival.kind, f"a {rival.kind}")
-            other = "one kind for all" if self.kind == "mixed" else other
-            verdict = f"{best}, against {other} {_said(self._odds(rival))}"
-        if bent and self._odds(bent[0]) < LIKELY:
-            verdict += f"; whether it bends a little, as a {bent[0].kind}, does not show ({_said(self._odds(bent[0]))})"
+            other = "nothing held" if rival.kind == "free" else f"a {rival.kind}"
+            verdict = f"{best}, against {'one kind for all' if first.odds else other} {_said(odds)}"
+        if bent and first.against(bent[0]) < LIKELY:
+            verdict += (
+                f"; whether it bends a little, as a {bent[0].kind}, does not show ({_said(first.against(bent[0]))})"
+            )
         return "; ".join([verdict, *map(str, self.witnesses)])
-
-    def _odds(self, other: Candidate) -> float:
-        return float(np.exp(min(self.candidates[0].log_evidence - other.log_evidence, MOST_CERTAIN)))
 
     def _summary(self) -> tuple[str, ...]:
         return (self.sentence,)
@@ -234,10 +236,9 @@ def identify(
     time, white = min(times[0], max(times[1:] or times)), noise_by_differences(track.positions, track.groups)
     found = [(fits, log_evidences(fits, time, white)) for fits in every]
     whole, *alone = ([_candidate(one[key], worth[key], scale, origin, unit) for key in one] for one, worth in found)
-    ranked = tuple(sorted([*whole, *_mixed(whole, alone)], key=attrgetter("log_evidence"), reverse=True))
-    said: list[Witness] = []
-    if pushed is not None and not ranked[0].odds:
-        said = witnesses(ranked[0].mechanisms, origin + scale * track.positions, pushed, track.groups)
+    ranked = tuple(sorted([*whole, *_mixtures(whole, alone)], key=lambda one: -one.log_evidence))
+    places = origin + scale * track.positions
+    said = [] if pushed is None or ranked[0].odds else witnesses(ranked[0].mechanisms, places, pushed, track.groups)
     steps = [np.diff(one.positions, axis=0) for one in track.demonstrations]
     return Identification(ranked, len(order) / time, said, len(steps), winding(steps))
 
@@ -283,9 +284,7 @@ def _as_long(values: ArrayLike, what: str, shape: tuple[int, ...]) -> Array:
 
 def _fits(track: Track) -> list[Explained]:
     """Of all demonstrations, by one mechanism or by one for each; where there are several, then of each by itself."""
-    kinds = KINDS if track.dimensions == 3 else FLAT_KINDS
-    if track.poses:
-        kinds = (*kinds[:-1], *TIED_KINDS)
+    kinds = FLAT_KINDS if track.dimensions == 2 else (*KINDS[:-1], *TIED_KINDS) if track.poses else KINDS
     every = [track, *parts] if len(parts := track.demonstrations) > 1 else parts
     whole, *alone = ({(kind, 1): _turned([fit(kind, one)]) for kind in kinds} for one in every)
     each = {(kind, len(parts)): _turned([one[kind, 1][0] for one in alone]) for kind in kinds[1:] if alone}
@@ -298,19 +297,23 @@ def _turned(fits: list[Fit]) -> list[Fit]:
     return [Fit(mechanism, one.track) for mechanism, one in zip(turned, fits, strict=True)]
 
 
-def _mixed(whole: list[Candidate], parts: list[list[Candidate]]) -> list[Candidate]:
+def _own(found: list[Candidate]) -> tuple[Candidate, float, dict[str, float]]:
+    """Of one demonstration: the likeliest, or the straight one if that does as well; its odds, and lead on each."""
+    best, *_ = ranked = sorted(found, key=lambda one: -one.log_evidence)
+    own = next((one for one in ranked if best.bends(one) and best.against(one) < LIKELY), best)
+    rival = next(one for one in ranked if one is not own and (own.free != 2 or not one.bends(own)))
+    return own, own.against(rival), {one.kind: own.log_evidence - one.log_evidence for one in found}
+
+
+def _mixtures(whole: list[Candidate], alone: list[list[Candidate]]) -> list[Candidate]:
     """Each with a kind of its own, if these differ: what each gains by it alone, less the price of each choice."""
-    alone = [sorted(one, key=attrgetter("log_evidence"), reverse=True) for one in parts]
-    if len({one[0].kind for one in alone}) < 2:
+    if len({_own(one)[0].kind for one in alone}) < 2:
         return []
-    values = [{each.kind: each.log_evidence for each in one} for one in alone]
-    same = {each: sum(one[each.kind] for one in values) for each in whole if len(each.mechanisms) == len(alone)}
-    best = max(same, key=lambda each: same[each])
-    gain = sum(max(one.values()) for one in values) - same[best] - (len(alone) - 1) * np.log(len(values[0]))
-    rivals = [next(each for each in one[1:] if one[0].free != 2 or not each.bends(one[0])) for one in alone]
-    apart = (one[0].log_evidence - rival.log_evidence for one, rival in zip(alone, rivals, strict=True))
-    odds = tuple(float(np.exp(min(each, MOST_CERTAIN))) for each in apart)
-    return [Candidate(tuple(one[0].mechanisms[0] for one in alone), best.log_evidence + gain, np.nan, odds)]
+    own, odds, leads = zip(*map(_own, alone), strict=True)
+    gains = {each: sum(lead[each.kind] for lead in leads) for each in whole if len(each.mechanisms) == len(alone)}
+    best = min(gains, key=lambda each: gains[each])
+    worth = best.log_evidence + gains[best] - (len(alone) - 1) * float(np.log(len(leads[0])))
+    return [Candidate(tuple(one.mechanisms[0] for one in own), worth, np.nan, odds)]
 
 
 def _candidate(fits: list[Fit], evidence: float, scale: float, origin: Array, unit: str) -> Candidate:
