@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from math import lgamma, log
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -306,14 +307,18 @@ def _own(found: list[Candidate]) -> tuple[Candidate, float, dict[str, float]]:
 
 
 def _mixtures(whole: list[Candidate], alone: list[list[Candidate]]) -> list[Candidate]:
-    """Each with a kind of its own, if these differ: what each gains by it alone, less the price of each choice."""
-    if len({_own(one)[0].kind for one in alone}) < 2:
+    """Each with a kind of its own, if these differ: what each gains by it alone, less the price of which has which."""
+    counts = Counter(_own(one)[0].kind for one in alone)
+    if len(counts) < 2:
         return []
     own, odds, leads = zip(*map(_own, alone), strict=True)
     gains = {each: sum(lead[each.kind] for lead in leads) for each in whole if len(each.mechanisms) == len(alone)}
     best = min(gains, key=lambda each: gains[each])
-    worth = best.log_evidence + gains[best] - (len(alone) - 1) * float(np.log(len(leads[0])))
-    return [Candidate(tuple(one.mechanisms[0] for one in own), worth, np.nan, odds)]
+    price = (
+        lgamma(len(alone) + 1) - sum(lgamma(n + 1) for n in counts.values()) + (len(counts) - 1) * log(len(leads[0]))
+    )
+    mechanisms = tuple(one.mechanisms[0] for one in own)
+    return [Candidate(mechanisms, best.log_evidence + gains[best] - price, np.nan, odds)]
 
 
 def _candidate(fits: list[Fit], evidence: float, scale: float, origin: Array, unit: str) -> Candidate:

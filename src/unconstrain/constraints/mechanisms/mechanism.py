@@ -22,9 +22,6 @@ from .track import Track
 ANGLES = ("tilt", "turn")
 """Entries of a chart that are radians; all others are lengths."""
 
-VAGUE = 0.5
-"""A radius is not known whose margin is more than this share of it: a whole family of curves does as well."""
-
 
 class Form(NamedTuple):
     """What makes a kind; ``phrase`` has places for ``centre``, ``axis``, ``radius`` and ``pitch``."""
@@ -134,8 +131,8 @@ class Mechanism(Shown):
 
     @property
     def vague(self) -> bool:
-        """Whether the radius is not known."""
-        return bool(self.margins.get("radius", np.zeros(1)).item() > VAGUE * abs(self.radius))
+        """Whether the radius is not known to half of itself: a whole family of curves does as well."""
+        return bool(self.margins.get("radius", np.zeros(1)).item() > abs(self.radius) / 2)
 
     @property
     def sentence(self) -> str:
@@ -206,10 +203,9 @@ class Mechanism(Shown):
         )
 
     def parallel(self, other: Mechanism) -> bool:
-        """Whether the other is of the same kind, and has the same axis to within both 95 % intervals."""
-        apart = np.arccos(min(abs(float(self.axis @ other.axis)), 1.0))
-        within = sum(one.margins["tilt"].max() for one in (self, other) if "tilt" in one.margins)
-        return bool(self.kind == other.kind and apart <= 1.5 * within)
+        """Whether the other is of the same kind, and has the same axis, to within half more than both intervals."""
+        within = 1.5 * sum(one.margins["tilt"].max() for one in (self, other) if "tilt" in one.margins)
+        return bool(self.kind == other.kind and np.arccos(min(abs(float(self.axis @ other.axis)), 1.0)) <= within)
 
     def units(self, scale: float) -> Array:
         """That of each number of the chart (k,), where lengths are in units of ``scale``."""
