@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from math import lgamma, log
+from math import factorial, log, prod
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -314,11 +314,8 @@ def _mixtures(whole: list[Candidate], alone: list[list[Candidate]]) -> list[Cand
     own, odds, leads = zip(*map(_own, alone), strict=True)
     gains = {each: sum(lead[each.kind] for lead in leads) for each in whole if len(each.mechanisms) == len(alone)}
     best = min(gains, key=lambda each: gains[each])
-    price = (
-        lgamma(len(alone) + 1) - sum(lgamma(n + 1) for n in counts.values()) + (len(counts) - 1) * log(len(leads[0]))
-    )
-    mechanisms = tuple(one.mechanisms[0] for one in own)
-    return [Candidate(mechanisms, best.log_evidence + gains[best] - price, np.nan, odds)]
+    price = log(factorial(len(alone)) // prod(map(factorial, counts.values())) * len(leads[0]) ** (len(counts) - 1))
+    return [Candidate(tuple(one.mechanisms[0] for one in own), best.log_evidence + gains[best] - price, np.nan, odds)]
 
 
 def _candidate(fits: list[Fit], evidence: float, scale: float, origin: Array, unit: str) -> Candidate:
