@@ -293,6 +293,47 @@ def test_free_strokes_that_are_flat_are_not_called_held(falling, tmp_path, actio
     assert run("info", tmp_path / "c_fall_1.npz").startswith("! Whether anything was held cannot be told")
 
 
+def strokes_to(folder, ways):
+    """Straight strokes, by name the direction of each, from places that differ."""
+    rng, time = np.random.default_rng(0), np.linspace(0, 3, 150)
+    for name, way in ways.items():
+        along = 0.25 * (1 - np.cos(np.pi * time / 3))[:, None] * np.array(way) / np.linalg.norm(way)
+        states = rng.uniform(-0.3, 0.3, 3) + along + 1e-3 * rng.standard_normal((150, 3))
+        write(folder / f"{name}.csv", "t,x [m],y [m],z [m]", [time, states])
+    return folder
+
+
+def test_rails_that_differ_are_doubted_and_strokes_that_share_no_direction_are_named(tmp_path):
+    rails = {f"rail_{number}": (0.0, 1.0, 0.0) for number in range(3)}
+    free = {"free_0": (0.1, 1.0, 0.2), "free_1": (-0.1, 1.0, -0.2)}
+    said = run("constraint", strokes_to(tmp_path, rails | free), "-o", tmp_path / "c.npz")
+    assert said.startswith("!")
+    assert "a line for each of 5 demonstrations" in said
+    assert "Maybe free, as no other has an axis of that direction: free_0, free_1." in " ".join(said.split())
+
+
+def test_rails_of_one_direction_leave_nothing_that_may_be_free(tmp_path):
+    rails = {f"rail_{number}": (0.0, 1.0, 0.0) for number in range(4)}
+    said = run("constraint", strokes_to(tmp_path, rails), "-o", tmp_path / "c.npz")
+    assert "Maybe free" not in said
+    assert "Demonstrations differ" not in said
+
+
+def test_doors_and_drawers_have_a_kind_each_in_the_table(tmp_path):
+    rng, time = np.random.default_rng(0), np.linspace(0, 3, 400)
+    strokes_to(tmp_path, {"drawer_0": (0.0, 1.0, 0.0), "drawer_1": (1.0, 1.0, 0.3)})
+    for number in range(2):
+        angle = number + 0.6 * (1 - np.cos(np.pi * time / 3))
+        hand = np.column_stack([0.7 * np.cos(angle), 0.7 * np.sin(angle), 0 * angle]) + number
+        columns = [time, hand + 1e-3 * rng.standard_normal((400, 3))]
+        write(tmp_path / f"door_{number}.csv", "t,x [m],y [m],z [m]", columns)
+    said = run("constraint", tmp_path, "-o", tmp_path / "c.npz")
+    rows = {line.split()[0]: line for line in said.splitlines() if line.startswith(("door_", "drawer_"))}
+    assert said.startswith("! Demonstrations differ: circle for 2, line for 2 of 4 demonstrations")
+    assert all(" circle " in rows[name] and " 0.7" in rows[name] for name in ("door_0", "door_1"))
+    assert all(" line " in rows[name] and " m" not in rows[name] for name in ("drawer_0", "drawer_1"))
+
+
 def test_mechanisms_that_differ_are_told_by_name(tilted, tmp_path):
     paths = [tilted / "plate_0.csv", tilted / "plate_1.csv"]
     told = json.loads(run("constraint", *paths, "--features", "constant", "-o", tmp_path / "p.npz", "--json"))

@@ -12,6 +12,9 @@ from recorded import DATA, needs_rim
 from unconstrain.base.errors import InvalidDataError
 from unconstrain.constraints import identify
 from unconstrain.constraints.mechanisms import restored
+from unconstrain.constraints.mechanisms.fitting import fit
+from unconstrain.constraints.mechanisms.fitting import noise as one_noise
+from unconstrain.constraints.mechanisms.identify import _track
 from unconstrain.constraints.mechanisms.kinds import Circle, Cylinder, Line, Plane, Point, Screw, Sphere
 from unconstrain.constraints.mechanisms.mechanism import frame_of, on_one_side
 from unconstrain.constraints.mechanisms.tied import Hinge, Slider, TurningScrew
@@ -368,6 +371,93 @@ def test_a_hinge_turns_its_tool_and_a_circle_does_not():
 def test_what_does_not_fit_is_refused(arguments, sentence):
     with pytest.raises(InvalidDataError, match=sentence):
         identify(**arguments)
+
+
+def door(rng, samples=150, degrees=70.0, centre=None, size=3e-3):
+    """Opened once about a vertical hinge, which is anywhere unless it is told."""
+    way = np.clip(np.linspace(-0.1, 1.1, samples), 0, 1)
+    angle, middle = np.radians(degrees) * way + rng.uniform(0, 6), rng.uniform(-0.5, 0.5, 2)
+    x, y = middle if centre is None else centre
+    exact = np.column_stack([x + 0.7 * np.cos(angle), y + 0.7 * np.sin(angle), np.full(samples, 0.3)])
+    return exact + size * rng.standard_normal(exact.shape)
+
+
+def drawer(rng, samples=150, along=None, size=3e-3):
+    """Pulled once by 0.5 m, from anywhere, along any direction unless it is told."""
+    way = rng.standard_normal(3) if along is None else np.array(along)
+    exact = 0.5 * np.clip(np.linspace(-0.1, 1.1, samples), 0, 1)[:, None] * way / np.linalg.norm(way)
+    start = rng.uniform(-0.5, 0.5, 3) if along is None else np.zeros(3)
+    return start + exact + size * rng.standard_normal(exact.shape)
+
+
+def together(parts):
+    return identify(np.concatenate(parts), groups=np.repeat(np.arange(len(parts)), [len(one) for one in parts]))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_doors_and_drawers_are_called_what_each_is(seed):
+    rng = np.random.default_rng(seed)
+    found = together([door(rng, 400), door(rng, 400), drawer(rng, 400), drawer(rng, 400)])
+    assert found.kind == "mixture"
+    assert [one.kind for one in found.candidates[0].mechanisms] == ["circle", "circle", "line", "line"]
+    assert found.candidates[0].kinds[:2] == ["circle", "circle"]
+    assert "circle" not in found.candidates[0].kinds[2:]
+    for one in found.candidates[0].mechanisms[:2]:
+        assert_allclose(one.radius, 0.7, atol=2 * one.margins["radius"].item())
+    assert "looks the same in one stroke" in found.doubt
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_of_one_kind_is_called_a_mixture_by_nobody(seed):
+    rng = np.random.default_rng(seed)
+    kinds = {
+        "circle": [door(rng, centre=(0.1, 0.2)) for _ in range(3)],
+        "line": [drawer(rng, along=(0.0, 0.6, 0.8)) for _ in range(3)],
+    }
+    for kind, parts in kinds.items():
+        found = together(parts)
+        assert (found.kind, len(found.candidates[0].mechanisms)) == (kind, 1)
+    for kind, make in {"circle": door, "line": drawer}.items():
+        found = together([make(rng, size=size) for size in (2e-3, 3e-3, 3e-3)])
+        assert (found.kind, len(found.candidates[0].mechanisms)) == (kind, 3)
+
+
+def test_in_a_mixture_a_short_arc_is_undecided_by_itself():
+    rng = np.random.default_rng(1)
+    found = together([door(rng, 400), door(rng, degrees=7.0), drawer(rng, 400), drawer(rng, 400)])
+    assert found.candidates[0].kinds == ["circle", "undecided", "line", "line"]
+    assert not found.decided
+    assert "circle for 1, undecided for 1, line for 2 of 4 demonstrations" in found.summary
+
+
+def test_forces_beside_mechanisms_of_several_kinds_are_no_witnesses():
+    rng = np.random.default_rng(0)
+    positions, groups = np.concatenate([door(rng), drawer(rng)]), np.repeat([0, 1], 150)
+    assert identify(positions, forces=np.ones((300, 3)), groups=groups).witnesses == []
+
+
+@pytest.mark.parametrize(("degrees", "size"), [(5, 5e-4), (10, 2e-3), (20, 5e-3), (90, 5e-3)])
+def test_intervals_of_an_arc_hold_what_is_true_however_short_it_is(degrees, size):
+    """Radius and axis; binomial with 0.95 of 40, at least 33 in all but one of a thousand."""
+    angle = np.radians(degrees) * np.linspace(0, 1, 120)
+    exact = 0.7 * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(120)])
+    held = []
+    for seed in range(40):
+        track, _, scale, origin = _track(exact + noise(exact.shape, seed, size), None, None)
+        one = fit(Circle, track)
+        circle = one.certain(one_noise([one])).placed(scale, origin, "m")
+        off = np.arccos(abs(circle.axis[2])) <= np.hypot(*circle.margins["tilt"]) * 1.25
+        held.append((abs(circle.radius - 0.7) <= circle.margins["radius"].item(), off))
+    assert np.sum(held, axis=0).min() >= 33
+
+
+def test_a_radius_that_a_straight_path_does_not_tell_is_not_told():
+    rng = np.random.default_rng(0)
+    track, _, scale, origin = _track(drawer(rng), None, None)
+    one = fit(Circle, track)
+    circle = one.certain(one_noise([one])).placed(scale, origin, "m")
+    assert circle.vague
+    assert circle.sentence == "a circle (hinge) of a radius that the recording does not tell"
 
 
 @needs_rim

@@ -117,8 +117,11 @@ def _judged(
     learnt: Mapping[str, uc.LearntConstraint], named: Named | None, wound: bool
 ) -> uc.evaluation.verdicts.Verdict:
     """What was learnt, and what it is by name where that holds more."""
-    shown, rank = None if named is None else named.shown, max(one.rank_ for one in learnt.values())
+    shown, rank = None if named is None else named.shown(learnt), max(one.rank_ for one in learnt.values())
     found = uc.evaluation.verdicts.of_constraint(*learnt.values(), shown=shown, wound=wound)
+    if named is not None and named.differs(learnt):
+        said = f"Demonstrations differ: {named.found.summary}. {found.said.replace('held;', 'held in all;')}"
+        return found._replace(said=said, next="Learn those of one mechanism alone, with --episodes or --leave-out.")
     judged = uc.evaluation.verdicts.of_mechanism
     return found if named is None else judged(found, rank, named.found.mechanism, named.is_followed(learnt))
 
@@ -267,39 +270,44 @@ def known_arms() -> Any:
 
 
 class Named(NamedTuple):
-    """What may have held some demonstrations, by name, and whether their unit is known."""
+    """What may have held some demonstrations, by name: one mechanism for all, or one for each."""
 
     found: Any
     names: list[str]
     up: str
     """The last column."""
+    held: Sequence[Any]
 
-    @property
-    def shown(self) -> bool | None:
+    def shown(self, learnt: Mapping[str, uc.LearntConstraint]) -> bool | None:
         """Whether positions show what held them, and a movement can be held by it; None where it may be a habit."""
-        decided = self.found.decided and self.found.mechanism.rank
+        decided = self.found.decided and self.found.kind != "free" and not ("" in learnt and self.differs(learnt))
         return False if not decided else None if self.found.doubt else True
+
+    def differs(self, learnt: Mapping[str, uc.LearntConstraint]) -> bool:
+        """Whether kinds of mechanisms differ, or one constraint for all holds less than those of each."""
+        less = "" in learnt and learnt[""].rank_ < max(one.rank for one in self.held)
+        return self.found.kind == "mixture" or (less and len(self.held) > 1 and self.found.decided)
 
     def is_followed(self, learnt: Mapping[str, uc.LearntConstraint]) -> bool:
         """Whether each of what was learnt, by name, is held by the mechanism, not by the directions learnt."""
-        one = len(self.found.candidates[0].mechanisms) == 1
-        return bool(self.shown) and all((one or name) and not each.task for name, each in learnt.items())
+        one = len(self.held) == 1
+        return bool(self.shown(learnt)) and all((one or name) and not each.task for name, each in learnt.items())
 
     def notes(self, name: str, learnt: uc.LearntConstraint) -> dict[str, Any]:
         """What goes into the file of one demonstration, or of all together: words, and numbers where it is sure."""
-        mechanisms = self.found.candidates[0].mechanisms
-        own = mechanisms[self.names.index(name)] if name and len(mechanisms) > 1 else mechanisms[0]
-        told = {"mechanism": dict(self.each).get(name, self.found.summary), SHOWN: self.shown}
+        own = self.held[self.names.index(name)] if name and len(self.held) > 1 else self.held[0]
+        told = {"mechanism": dict(self.each).get(name, self.found.summary), SHOWN: self.shown({name: learnt})}
         if self.is_followed({name: learnt}):
             return told | {HELD_BY: own.numbers()}
-        more = self.shown is not False and (own.rank > learnt.rank_ or own.form.straight is not None)
+        more = self.shown({name: learnt}) is not False and (own.rank > learnt.rank_ or own.form.straight is not None)
         return told | ({NAMED: own.title} if more else {})
 
     @property
     def each(self) -> list[tuple[str, str]]:
         """Name and mechanism of each, where they differ."""
-        held = self.found.candidates[0].mechanisms
-        return [] if len(held) == 1 else [(name, one.sentence) for name, one in zip(self.names, held, strict=True)]
+        open_ = ["undecided: " * (kind == "undecided") for kind in self.found.candidates[0].kinds]
+        told = [doubt + one.sentence for doubt, one in zip(open_, self.held, strict=True)]
+        return list(zip(self.names, told, strict=True)) if len(told) > 1 else []
 
     @property
     def sentences(self) -> list[str]:
@@ -307,7 +315,12 @@ class Named(NamedTuple):
         known = "Mechanism" if self.found.mechanism.unit else "Mechanism, if these are positions"
         doubt = self.found.doubt
         meant = "± is half of a 95 % interval, 10:1 are odds" if "±" in self.found.summary else "10:1 are odds"
-        return [f"{known}: {self.found.summary} ({meant}).", *([f"{doubt[0].upper()}{doubt[1:]}."] if doubt else [])]
+        apart = [
+            name for name, one in zip(self.names, self.held, strict=False) if sum(map(one.parallel, self.held)) < 2
+        ]
+        free = f"Maybe free, as no other has an axis of that direction: {listed(apart)}."
+        said = [f"{known}: {self.found.summary} ({meant}).", *([f"{doubt[0].upper()}{doubt[1:]}."] if doubt else [])]
+        return [*said, free] if doubt and 0 < len(apart) < len(self.held) else said
 
 
 def mechanism_of(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe, first: uc.Recording) -> Named | None:
@@ -323,12 +336,13 @@ def mechanism_of(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe, 
     try:
         unit = _length_of([recipe.units(first.units).get(name, "") for name in names])
         found = uc.constraints.identify(positions[::every], groups=groups[::every], unit=unit)
-        if found.mechanism.rank == len(names):
+        if found.kind == "point":
             raise InvalidDataError("positions keep to a point, which would hold every motion.")
     except InvalidDataError as error:
         click.echo(f"Note: no mechanism is named: {error}", err=True)
         return None
-    return Named(found, [demonstrations[number].name for number in sorted({*groups[::every].tolist()})], names[-1])
+    told = [demonstrations[number].name for number in sorted({*groups[::every].tolist()})]
+    return Named(found, told, names[-1], found.candidates[0].mechanisms)
 
 
 def _length_of(units: Sequence[str]) -> str:
@@ -354,7 +368,7 @@ def _say(
     head, rows = table_of(learnt, named)
     if rows:
         print_table(head, rows)
-    if named is not None and named.shown is not False and named.each:
+    if named is not None and named.each:
         click.echo("Where each is: --json, and --report draws it.")
 
 
@@ -378,10 +392,13 @@ def table_of(
         "missed where held out": [f"{one.choice_.held_out:.3g}" for one in own.values()],
     }
     names = list(own)
-    if named is not None and named.shown is not False and named.each:
-        names, held = named.names, named.found.candidates[0].mechanisms
-        what = f"angle of {'normal' if held[0].kind == 'plane' else 'axis'} to {bare(named.up)} axis"
-        columns[what] = [f"{math.degrees(math.acos(min(abs(one.axis[-1]), 1.0))):.1f}°" for one in held]
+    if named is not None and named.each:
+        names, held, kinds = named.names, named.held, named.found.candidates[0].kinds
+        columns["kind"] = kinds if named.found.kind == "mixture" else []
+        what = f"angle of {'normal' if {*kinds} == {'plane'} else 'axis'} to {bare(named.up)} axis"
+        angles = [f"{math.degrees(math.acos(min(abs(one.axis[-1]), 1.0))):.1f}°" for one in held]
+        columns[what] = [each * ("tilt" in one.margins) for each, one in zip(angles, held, strict=True)]
+        columns["radius"] = ["" if one.vague or not one.radius else f"{one.radius:.3g} {one.unit}" for one in held]
         columns["mechanism"] = [text for _, text in named.each] if whole else []
-    shown = {head: values for head, values in columns.items() if values}
+    shown = {head: values for head, values in columns.items() if any(values)}
     return ["demonstration", *shown], [list(row) for row in zip(names, *shown.values(), strict=True)]

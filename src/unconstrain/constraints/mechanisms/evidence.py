@@ -109,7 +109,8 @@ def _log_evidence(fits: list[Fit], straight: list[Fit] | None, time: float, whit
     bends = sum(one.mechanism.count for one in fits) - sum(one.mechanism.count for one in straight)
     strength = sum(len(one.residuals) for one in fits) / len(fits) / time / variances[0]
     gain = _explained(fits, time) - _explained(straight, time)
-    spread = strength * np.geomspace(LEAST_BEND, 1.0, 60) ** 2
+    own = np.mean([one.track.positions.var(axis=0).sum() for one in fits])  # a demonstration is less wide than all
+    spread = strength * own * np.geomspace(LEAST_BEND, 1.0, 60) ** 2
     bent = logsumexp(-bends / 2 * np.log1p(spread) - gain / (1 + spread)) - np.log(len(spread))
     return value + float(bends / 2 * np.log(strength) + bent)
 

@@ -42,10 +42,13 @@ class Fit:
 
     @cached_property
     def jacobian(self) -> Array:
-        """Change of the residuals with the chart, (k, N, c), by central differences."""
-        steps = STEP * np.eye(self.mechanism.count)
-        ends = [[self.mechanism.moved(way * step).residuals(self.track) for way in (1, -1)] for step in steps]
-        slopes = np.array([(ahead - behind) / (2 * STEP) for ahead, behind in ends])
+        """Change of the residuals with the chart, (k, N, c), by central differences where the mechanism is."""
+        track, steps = self.track, STEP * self.mechanism.units(max(abs(self.mechanism.radius), 1.0))
+        if self.mechanism.count and not self.mechanism.form.ties:
+            off = np.einsum("nk,nkd->nd", self.residuals, self.mechanism.rows(track.positions))
+            track = replace(track, positions=track.positions - off)
+        ends = [[self.mechanism.moved(way * step).residuals(track) for way in (1, -1)] for step in np.diag(steps)]
+        slopes = np.array([(ahead - behind) / (2 * step) for (ahead, behind), step in zip(ends, steps, strict=True)])
         return slopes.reshape(self.mechanism.count, *self.residuals.shape)
 
     @cached_property
@@ -58,13 +61,14 @@ class Fit:
         return np.einsum("inc,jnc,c->ij", self.jacobian, self.jacobian, 1 / variances, optimize=True)
 
     def certain(self, variances: Array) -> Mechanism:
-        """The mechanism with the covariance of its parameters."""
+        """With the covariance of its parameters, by the Jacobian: of a nearly straight arc its square is singular."""
         if not self.mechanism.count:
             return self.mechanism
-        information: Any = self.information(variances) / self.time
+        whitened = (self.jacobian / np.sqrt(variances * self.time)).reshape(self.mechanism.count, -1)
+        inverse: Any = np.linalg.pinv(whitened).T
         freedom = self.residuals.size / self.time - self.mechanism.count
         quantile = float(stdtrit(max(freedom, 1.0), 0.975))
-        return replace(self.mechanism, covariance=np.linalg.pinv(information, hermitian=True), quantile=quantile)
+        return replace(self.mechanism, covariance=inverse @ inverse.T, quantile=quantile)
 
 
 def fit(kind: type[Mechanism], track: Track) -> Fit:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
+from math import factorial, log, prod
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +13,7 @@ from ...base.arrays import Array, Groups, as_groups, as_matrix
 from ...base.display import Shown
 from ...base.errors import InvalidDataError
 from ...risks import unit_actions
-from .evidence import log_evidences
+from .evidence import Explained, log_evidences
 from .fitting import Fit, fit, noise
 from .forces import Witness, witnesses
 from .kinds import FLAT_KINDS, KINDS
@@ -34,9 +36,6 @@ LIKELY = 20.0
 NEAR = 0.15
 """A path is near a circle that it leaves by less than this share of the radius."""
 
-VAGUE = 0.5
-"""A radius is not known whose margin is more than this share of it: a whole family of curves does as well."""
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidate(Shown):
@@ -45,30 +44,43 @@ class Candidate(Shown):
     Parameters
     ----------
     mechanisms : tuple of Mechanism
-        One for all demonstrations; or one of the same kind for each, in the order of their sorted names.
+        One for all demonstrations, or one for each, in the order of their sorted names.
     log_evidence : float
     noise : float
-        Standard deviation from them in each direction that they hold; NaN where they hold none.
+        Standard deviation from them in each direction that they hold; NaN where they hold none, or kinds differ.
+    odds : tuple of float
+        Of the kind of each against the next, where kinds differ; else empty.
     """
 
     mechanisms: tuple[Mechanism, ...]
     log_evidence: float
     noise: float
+    odds: tuple[float, ...] = ()
 
     @property
     def kind(self) -> str:
-        """point, line, plane, circle, sphere, cylinder, screw; slider, hinge where orientations tell; or free."""
-        return self.mechanisms[0].kind
+        """point, line, plane, circle, sphere, cylinder, screw; slider, hinge where orientations tell; free; mixture."""
+        return "mixture" if self.odds else self.mechanisms[0].kind
+
+    @property
+    def kinds(self) -> list[str]:
+        """Of each mechanism; undecided where that is, or a radius is not known."""
+        told = zip(self.odds or len(self.mechanisms) * (LIKELY,), self.mechanisms, strict=True)
+        return ["undecided" if odds < LIKELY or one.vague else one.kind for odds, one in told]
 
     @property
     def free(self) -> int:
-        """In how many directions it moves."""
-        return len(self.mechanisms[0].centre) - self.mechanisms[0].rank
+        """In how many directions it moves; the least of several."""
+        return min(len(one.centre) - one.rank for one in self.mechanisms)
 
     def bends(self, other: Candidate) -> bool:
         """Whether the other is what it is where it does not bend."""
         straight = self.mechanisms[0].form.straight
-        return straight is not None and straight.form == other.mechanisms[0].form
+        return straight is not None and not self.odds and straight.form.kind == other.kind
+
+    def against(self, other: Candidate) -> float:
+        """Odds against another."""
+        return float(np.exp(min(self.log_evidence - other.log_evidence, MOST_CERTAIN)))
 
     @property
     def sentence(self) -> str:
@@ -80,7 +92,9 @@ class Candidate(Shown):
     def summary(self) -> str:
         """One mechanism in words, or how many there are of which kind."""
         count = len(self.mechanisms)
-        return self.mechanisms[0].sentence if count == 1 else f"a {self.kind} for each of {count} demonstrations"
+        kinds = ", ".join(f"{kind} for {some}" for kind, some in Counter(self.kinds).items())
+        each = kinds if self.odds else f"a {self.kind} for each"
+        return self.mechanisms[0].sentence if count == 1 else f"{each} of {count} demonstrations"
 
     def _summary(self) -> tuple[str, ...]:
         return (self.sentence,)
@@ -131,16 +145,12 @@ class Identification(Shown):
     @property
     def odds(self) -> float:
         """Of the likeliest kind against the next."""
-        return self._odds(next(one for one in self.candidates if one.kind != self.kind))
+        return self.candidates[0].against(next(one for one in self.candidates if one.kind != self.kind))
 
     @property
     def decided(self) -> bool:
-        """Whether one kind is likely enough to speak of, and its radius known at all."""
-        return self.odds >= LIKELY and not self._vague
-
-    @property
-    def _vague(self) -> bool:
-        return bool(self.mechanism.margins.get("radius", np.zeros(1)).item() > VAGUE * self.mechanism.radius)
+        """Whether a kind is likely enough to speak of, that of each where they differ, and each radius known at all."""
+        return self.odds >= LIKELY and "undecided" not in self.candidates[0].kinds
 
     @property
     def sentence(self) -> str:
@@ -174,19 +184,20 @@ class Identification(Shown):
         )
 
     def _judged(self, best: str) -> str:
-        bent = [one for one in self.candidates if one.bends(self.candidates[0]) and self.candidates[0].free == 2]
+        first = self.candidates[0]
+        bent = [one for one in self.candidates if one.bends(first) and first.free == 2]
         rival = next(one for one in self.candidates if one.kind != self.kind and one not in bent)
-        if self._odds(rival) < LIKELY or self._vague:
-            verdict = f"undecided: {best}; or else {rival.sentence} ({_said(self._odds(rival))})"
+        odds = first.against(rival)
+        if odds < LIKELY or (not first.odds and "undecided" in first.kinds):
+            verdict = f"undecided: {best}; or else {rival.sentence} ({_said(odds)})"
         else:
             other = "nothing held" if rival.kind == "free" else f"a {rival.kind}"
-            verdict = f"{best}, against {other} {_said(self._odds(rival))}"
-        if bent and self._odds(bent[0]) < LIKELY:
-            verdict += f"; whether it bends a little, as a {bent[0].kind}, does not show ({_said(self._odds(bent[0]))})"
+            verdict = f"{best}, against {'one kind for all' if first.odds else other} {_said(odds)}"
+        if bent and first.against(bent[0]) < LIKELY:
+            verdict += (
+                f"; whether it bends a little, as a {bent[0].kind}, does not show ({_said(first.against(bent[0]))})"
+            )
         return "; ".join([verdict, *map(str, self.witnesses)])
-
-    def _odds(self, other: Candidate) -> float:
-        return float(np.exp(min(self.candidates[0].log_evidence - other.log_evidence, MOST_CERTAIN)))
 
     def _summary(self) -> tuple[str, ...]:
         return (self.sentence,)
@@ -210,7 +221,7 @@ def identify(
     forces : array_like, shape (N, 2) or (N, 3), optional
         On the mechanism, in N and in the frame of the positions, without the tool's weight.
     groups : sequence, shape (N,), optional
-        Which demonstration each sample is from. One mechanism for all is compared with one of a kind for each.
+        Which demonstration each sample is from. One mechanism for all is compared with one for each.
     unit : str
         Of the positions; empty where it is not known.
 
@@ -221,17 +232,16 @@ def identify(
     """
     track, order, scale, origin = _track(positions, orientations, groups)
     pushed = None if forces is None else _as_long(forces, "forces", track.positions.shape)[order]
-    explained = _fits(track)
-    time = min(max(one.time for one in fits) for fits in explained.values() if fits[0].mechanism.count)
-    white = noise_by_differences(track.positions, track.groups)
-    found = log_evidences(explained, time, white)
-    ranked = sorted(found, key=lambda each: -found[each])
-    candidates = tuple(_candidate(explained[each], found[each], scale, origin, unit) for each in ranked)
-    said: list[Witness] = []
-    if pushed is not None:
-        said = witnesses(candidates[0].mechanisms, origin + scale * track.positions, pushed, track.groups)
+    every = _fits(track)
+    times = [min(max(fit.time for fit in fits) for fits in one.values() if fits[0].mechanism.count) for one in every]
+    time, white = min(times[0], max(times[1:] or times)), noise_by_differences(track.positions, track.groups)
+    found = [(fits, log_evidences(fits, time, white)) for fits in every]
+    whole, *alone = ([_candidate(one[key], worth[key], scale, origin, unit) for key in one] for one, worth in found)
+    ranked = tuple(sorted([*whole, *_mixtures(whole, alone)], key=lambda one: -one.log_evidence))
+    places = origin + scale * track.positions
+    said = [] if pushed is None or ranked[0].odds else witnesses(ranked[0].mechanisms, places, pushed, track.groups)
     steps = [np.diff(one.positions, axis=0) for one in track.demonstrations]
-    return Identification(candidates, len(order) / time, said, len(steps), winding(steps))
+    return Identification(ranked, len(order) / time, said, len(steps), winding(steps))
 
 
 def _said(odds: float) -> str:
@@ -273,20 +283,39 @@ def _as_long(values: ArrayLike, what: str, shape: tuple[int, ...]) -> Array:
     return table
 
 
-def _fits(track: Track) -> dict[tuple[type[Mechanism], int], list[Fit]]:
-    """By kind, and by how many mechanisms there are: one for all demonstrations, or one for each."""
-    kinds = KINDS if track.dimensions == 3 else FLAT_KINDS
-    if track.poses:
-        kinds = (*kinds[:-1], *TIED_KINDS)
-    parts = track.demonstrations
-    each = {(kind, len(parts)): _each(kind, parts) for kind in kinds[1:] if len(parts) > 1}
-    return {**{(kind, 1): _each(kind, [track]) for kind in kinds}, **each}
+def _fits(track: Track) -> list[Explained]:
+    """Of all demonstrations, by one mechanism or by one for each; where there are several, then of each by itself."""
+    kinds = FLAT_KINDS if track.dimensions == 2 else (*KINDS[:-1], *TIED_KINDS) if track.poses else KINDS
+    every = [track, *parts] if len(parts := track.demonstrations) > 1 else parts
+    whole, *alone = ({(kind, 1): _turned([fit(kind, one)]) for kind in kinds} for one in every)
+    each = {(kind, len(parts)): _turned([one[kind, 1][0] for one in alone]) for kind in kinds[1:] if alone}
+    return [whole | each, *alone]
 
 
-def _each(kind: type[Mechanism], parts: list[Track]) -> list[Fit]:
+def _turned(fits: list[Fit]) -> list[Fit]:
     """Their axes on one side."""
-    turned = on_one_side([fit(kind, part).mechanism for part in parts])
-    return [Fit(mechanism, part) for mechanism, part in zip(turned, parts, strict=True)]
+    turned = on_one_side([one.mechanism for one in fits])
+    return [Fit(mechanism, one.track) for mechanism, one in zip(turned, fits, strict=True)]
+
+
+def _own(found: list[Candidate]) -> tuple[Candidate, float, dict[str, float]]:
+    """Of one demonstration: the likeliest, or the straight one if that does as well; its odds, and lead on each."""
+    best, *_ = ranked = sorted(found, key=lambda one: -one.log_evidence)
+    own = next((one for one in ranked if best.bends(one) and best.against(one) < LIKELY), best)
+    rival = next(one for one in ranked if one is not own and (own.free != 2 or not one.bends(own)))
+    return own, own.against(rival), {one.kind: own.log_evidence - one.log_evidence for one in found}
+
+
+def _mixtures(whole: list[Candidate], alone: list[list[Candidate]]) -> list[Candidate]:
+    """Each with a kind of its own, if these differ: what each gains by it alone, less the price of which has which."""
+    counts = Counter(_own(one)[0].kind for one in alone)
+    if len(counts) < 2:
+        return []
+    own, odds, leads = zip(*map(_own, alone), strict=True)
+    gains = {each: sum(lead[each.kind] for lead in leads) for each in whole if len(each.mechanisms) == len(alone)}
+    best = min(gains, key=lambda each: gains[each])
+    price = log(factorial(len(alone)) // prod(map(factorial, counts.values())) * len(leads[0]) ** (len(counts) - 1))
+    return [Candidate(tuple(one.mechanisms[0] for one in own), best.log_evidence + gains[best] - price, np.nan, odds)]
 
 
 def _candidate(fits: list[Fit], evidence: float, scale: float, origin: Array, unit: str) -> Candidate:

@@ -121,13 +121,25 @@ class Mechanism(Shown):
 
     @property
     def margins(self) -> dict[str, Array]:
-        """Half of the 95 % interval of each entry of the chart: lengths, or radians; empty where it was not fitted."""
-        return {} if self.covariance is None else self._named(self.quantile * np.sqrt(np.diag(self.covariance)))
+        """Half of the 95 % interval, of a radius by its curvature, of each entry of the chart: lengths, or radians."""
+        found = {} if self.covariance is None else self._named(self.quantile * np.sqrt(np.diag(self.covariance)))
+        if found and self.form.straight is not None:
+            left = abs(self.radius) - float(found["radius"].item())
+            wider = abs(self.radius) / left if left > 0 else np.inf
+            found |= {name: found[name] * wider for name in ("centre", "across", "radius") if name in found}
+        return found
+
+    @property
+    def vague(self) -> bool:
+        """Whether the radius is not known to half of itself: a whole family of curves does as well."""
+        return bool(self.margins.get("radius", np.zeros(1)).item() > abs(self.radius) / 2)
 
     @property
     def sentence(self) -> str:
         """What it is, with 95 % intervals."""
         sure = {name: float(np.max(values)) for name, values in self.margins.items()}
+        if self.vague and self.form.straight is not None:
+            return f"{self.title} of a radius that the recording does not tell"
         near = max(sure.get("centre", 0.0), sure.get("across", 0.0), sure.get("along", 0.0))
         tilt = f" ± {np.degrees(sure['tilt']):.2g}°" if "tilt" in sure else ""
         return self.form.phrase.format(
@@ -180,7 +192,7 @@ class Mechanism(Shown):
 
     def placed(self, scale: float, origin: Array, unit: str) -> Self:
         """In other units and about another origin: ``scale`` of theirs are one of these."""
-        units = np.repeat([1.0 if name in ANGLES else scale for name in self.form.chart], self.sizes)
+        units = self.units(scale)
         return replace(
             self,
             centre=origin + scale * self.centre,
@@ -189,6 +201,15 @@ class Mechanism(Shown):
             unit=unit,
             covariance=None if self.covariance is None else units[:, None] * self.covariance * units,
         )
+
+    def parallel(self, other: Mechanism) -> bool:
+        """Whether the other is of the same kind, and has the same axis, to within half more than both intervals."""
+        within = 1.5 * sum(one.margins["tilt"].max() for one in (self, other) if "tilt" in one.margins)
+        return bool(self.kind == other.kind and np.arccos(min(abs(float(self.axis @ other.axis)), 1.0)) <= within)
+
+    def units(self, scale: float) -> Array:
+        """That of each number of the chart (k,), where lengths are in units of ``scale``."""
+        return np.repeat([1.0 if name in ANGLES else scale for name in self.form.chart], self.sizes)
 
     def cylindrical(self, positions: Array) -> tuple[Array, Array, Array]:
         """Along the axis (N,), the unit vector away from it (N, D), the distance from it (N,)."""
