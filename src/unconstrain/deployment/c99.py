@@ -93,7 +93,7 @@ def c_source(
     fill = {"name": name, "NAME": name.upper(), "macro": f"{name.upper()}_SELF_TEST", "file": file}
     fill |= _sizes(form, described) | _numbers(form, name, policy, single)
     said = _single if single else _double
-    fill |= {"speed_limit": said(max(described.fastest, _fastest(form, policy)))} | _correction(form, name, said)
+    fill |= {"speed_limit": said(speed_limit(form, policy, described))} | _correction(form, name, said)
     fill["under"] = filled("under.h", fill) if form.correction else ""
     header = filled("header.h", fill)
     return Source(header, header + "\n" + "".join(filled(f"{part}.c", fill) for part in _parts(form)))
@@ -185,6 +185,11 @@ def _limits(form: ClosedForm) -> Array:
         parts.append(ends[place : place + size] if straight else np.tile([-np.inf, np.inf], (columns, 1)))
         place += size
     return np.concatenate(parts)
+
+
+def speed_limit(form: ClosedForm, policy: Callable[[Array], Array], described: Description) -> float:
+    """No action was larger where there was data, neither demonstrated nor of the policy."""
+    return max(described.fastest, _fastest(form, policy))
 
 
 def _fastest(form: ClosedForm, policy: Callable[[Array], Array]) -> float:

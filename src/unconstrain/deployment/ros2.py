@@ -12,7 +12,7 @@ from ..base.display import bare, speed_of, with_unit
 from ..base.errors import SettingError
 from ..base.files import put_folder, workshop
 from ..models import ClosedForm, spaces
-from .c99 import c_name, c_source
+from .c99 import c_name, c_source, speed_limit
 from .description import Description
 from .filling import filled, own_version
 
@@ -53,13 +53,14 @@ def export_ros2(
 ) -> None:
     """Write a package with a node that takes each state to a velocity, in place of a folder that is there.
 
-    The node limits the speed, stops where the support of the data ends, and stops when no state comes.
+    Node and loop limit the speed, stop where the support of the data ends, and stop when no state comes.
     """
     package = c_name(Path(os.path.realpath(folder)).name if name is None else name).lower()
     coordinates = [bare(name)[-1:].lower() for name in described.states] == ["x", "y", "z"]
     kind = messages or ("pose" if coordinates else "joints")
     _check(form, kind, described)
     fill = _words(package, form, described, kind)
+    fill |= {"limit": repr(max(1e-9, speed_limit(form, policy, described)))} | _plane(form, fill)
     with workshop(folder) as made:
         made.joinpath("new").mkdir()
         root = made / "new"
@@ -96,6 +97,23 @@ def _words(package: str, form: ClosedForm, described: Description, kind: Message
         "n": str(form.columns),
         "d": str(form.sizes[1]),
         "scale": "1000.0" if millimetres else "1.0",
+    }
+
+
+def _plane(form: ClosedForm, fill: dict[str, str]) -> dict[str, str]:
+    """What takes the normal of a plane that a guided policy is told of; other policies need not know it."""
+    name, words = fill["name"], ("plane", "plane_is", "plane_member", "normal", "told")
+    if form.correction is None:
+        step = f"{name}_step(state.data(), action.data())"
+        return dict.fromkeys(words, "") | {"velocity": step, "step_of": "policy.step"}
+    return {
+        "plane": filled("ros2_plane.cpp", fill),
+        "plane_is": ",\n    plane_(plane())",
+        "plane_member": f"  std::array<double, {fill['n']} * {fill['n']}> plane_;\n",
+        "velocity": f"{name}_under(state.data(), plane_.data(), action.data())",
+        "normal": filled("ros2_plane.py", fill),
+        "step_of": "told(policy)",
+        "told": filled("ros2_plane.yaml", fill),
     }
 
 

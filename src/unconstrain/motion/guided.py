@@ -1,4 +1,4 @@
-"""A policy that arrives: free and under any constraint."""
+"""A policy that arrives: free and under any constraint that it is told of."""
 
 from __future__ import annotations
 
@@ -69,7 +69,10 @@ class Moved:
 
 
 class Guided(Exportable, Shown):
-    """A policy that arrives at a goal or on a cycle, from anywhere and under any constraint, by construction.
+    """A policy that arrives at a goal or on a cycle, from anywhere and under any constraint it is told of.
+
+    A constraint that holds the robot has to be told, by :meth:`under`, as :func:`rollout` does; :meth:`step` is free,
+    and movements that something holds unbeknown to it need not arrive.
 
     **At a goal.** Along every movement a convex potential V falls (:class:`~unconstrain.motion.potential.Potential`),
     which is learnt from the demonstrations so that the policy descends it by itself where it was shown. Elsewhere the
@@ -112,7 +115,8 @@ class Guided(Exportable, Shown):
         Or the middle of the cycle.
     potential_ : Potential
     dt_ : float
-        Seconds. With Euler steps of this length V falls, or cycles are wider than told by a few hundredths.
+        Seconds. With Euler steps of this length V falls, or cycles are wider than told by a few hundredths; a delay
+        counts as twice such a step.
 
     Raises
     ------
