@@ -32,7 +32,10 @@ MODELS = {"auto": "", "Affine": "So may a --model that bends: 'local', or 'auto'
 ANOTHER = "So may another --model: 'auto' tries several."
 
 ROUNDS = 1.5
-"""Rounds, at least, of which the last is compared with the first."""
+"""Rounds, at least, that have a pace, and of which the last is compared with the first: a bent reach may make one."""
+
+PASSING = 0.2
+"""Nearer to the middle than this share of the usual distance from it, noise turns what goes straight."""
 
 
 class Replay(NamedTuple):
@@ -41,7 +44,7 @@ class Replay(NamedTuple):
     extent: float
     """Of the roll-out, root mean square distance from its middle, over that of the demonstration."""
     pace: float
-    """Turns of the roll-out over those of the demonstration; NaN where that made less than one."""
+    """Turns of the roll-out over those of the demonstration; NaN where that made fewer than :data:`ROUNDS`."""
     last: float
     """Size of the last round of the roll-out over its first, over the same of the demonstration; NaN without two."""
     apart: float
@@ -159,18 +162,20 @@ def _compared(done: Demonstration, run: Demonstration, plane: Array, held: bool)
     both = done.states, run.states
     size = [float(np.sqrt(one.var(axis=0).sum())) for one in both]
     turns = [_turns((one - one.mean(axis=0)) @ plane.T) for one in both]
-    pace = turns[1][-1] / turns[0][-1] if abs(turns[0][-1]) >= 1 else np.nan
+    pace = turns[1][-1] / turns[0][-1] if abs(turns[0][-1]) >= ROUNDS else np.nan
     lasting = [_lasting(one, done) for one, done in zip(both, turns, strict=True)]
     apart = cKDTree(done.states).query(run.states)[0].mean()
     return Replay(size[1] / size[0], float(pace), lasting[1] / lasting[0], float(apart), held, done, run)
 
 
 def _turns(points: Array) -> Array:
-    """How often points (T, 2) have gone round the origin, (T,)."""
+    """How often points (T, 2) have gone round the origin, (T,); passing it by less than :data:`PASSING` turns nothing."""
     if points.shape[1] < 2:
         return np.zeros(len(points))
-    angles = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
-    return np.asarray((angles - angles[0]) / (2 * np.pi))
+    away = np.linalg.norm(points, axis=1)
+    far = np.flatnonzero(away >= PASSING * np.sqrt((away**2).mean()))
+    angles = np.unwrap(np.arctan2(*points[far, ::-1].T))
+    return np.interp(np.arange(len(points)), far, (angles - angles[0]) / (2 * np.pi))
 
 
 def _lasting(states: Array, turns: Array) -> float:
