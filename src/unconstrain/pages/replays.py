@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -11,14 +12,13 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Array
 from ..base.display import innermost, unit_of
-from ..base.errors import DivergedError
+from ..base.errors import DivergedError, InvalidDataError, SettingError
 from ..evaluation import diagnosis, verdicts
 from ..models import spaces
-from ..motion import rollout
+from ..motion import Guided, rollout
 from ..recordings import Demonstration
 
 if TYPE_CHECKING:
-    from ..motion import Guided
     from ..policies import Policy
     from ..recordings import Recipe
 
@@ -26,6 +26,8 @@ MOST, STEPS = 20, 1000
 """Demonstrations, and steps of each, that are run at most: seconds."""
 
 GUIDE = "'unconstrain fit --guided auto' keeps it to the goal or the cycle that was shown, from anywhere."
+GUIDE_TO = "'unconstrain fit --guided 0.1,0' with the place of its goal{} keeps it there, from anywhere."
+"""The latter where demonstrations do not show one, and perhaps a cycle."""
 
 MODELS = {"auto": "", "Affine": "So may a --model that bends: 'local', or 'auto', which tries several."}
 """What else may cure a policy of some features, by what they are called; of others :data:`ANOTHER`."""
@@ -81,7 +83,7 @@ def replayed(
     try:
         runs = replays(policy, demos, recipe, held, free)
     except DivergedError:
-        return Replayed(_advised(verdicts.of_divergence(found), found, policy), None)
+        return Replayed(_advised(verdicts.of_divergence(found), found, policy, demos), None)
     known = [one for one in runs if one.held]
     if not known:
         unknown = " Its size and pace over time: not compared, as what held these recordings is not known."
@@ -94,29 +96,46 @@ def replayed(
     alike = "" if held is not None else ", each held in the same way all the time (along a line, in a plane)"
     of = "" if len(known) == len(demos) else f"for {len(known)} of {len(demos)} demonstrations{alike}, "
     judged = verdicts.of_replays(found, extents, paces, said, lasts, of)
-    return Replayed(_advised(judged, found, policy), told, runs, verdicts.size_and_pace(extents, paces, lasts, of))
+    return Replayed(
+        _advised(judged, found, policy, demos), told, runs, verdicts.size_and_pace(extents, paces, lasts, of)
+    )
 
 
-def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Replayed:
+def retraced(found: verdicts.Verdict, policy: Policy | Guided, demos: Sequence[Demonstration], *of: Any) -> Replayed:
     """:func:`replayed` on what was learnt from: a guided policy, fitted to that, is judged no better than by itself."""
-    guided, alone = replayed(found, policy, *of), innermost(policy)
+    guided, alone = replayed(found, policy, demos, *of), innermost(policy)
     if alone is policy:
         return guided
-    (plain, _, _, ran), words = replayed(found, alone, *of), guided.in_words
+    (plain, _, _, ran), words = replayed(found, alone, demos, *of), guided.in_words
     mark = max(plain.mark, guided.verdict.mark, key=[*verdicts.Mark].index)
     more = f" {'Guided' if mark is plain.mark else 'But guided'}: {words}." if words else ""
-    judged = plain._replace(mark=mark, said=plain.said + more, next=plain.next.removesuffix(GUIDE).rstrip())
+    judged = plain._replace(
+        mark=mark, said=plain.said + more, next=plain.next.removesuffix(_guide(alone, demos)).rstrip()
+    )
     return guided._replace(verdict=judged, in_words="; guided ".join(filter(None, (ran, words))))
 
 
-def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Policy | Guided) -> verdicts.Verdict:
+def _advised(
+    judged: verdicts.Verdict, before: verdicts.Verdict, policy: Policy | Guided, demos: Sequence[Demonstration]
+) -> verdicts.Verdict:
     """With what cures a policy that strays, unless it was tried."""
     if judged.next == before.next:
         return judged
     features = getattr(innermost(policy), "features", None)
     model = MODELS.get(features if isinstance(features, str) else type(features).__name__, ANOTHER)
-    more = model, GUIDE if innermost(policy) is policy else ""
+    more = model, _guide(policy, demos) if innermost(policy) is policy else ""
     return judged._replace(next=" ".join(filter(None, (judged.next, *more))))
+
+
+def _guide(policy: Policy | Guided, demos: Sequence[Demonstration]) -> str:
+    """What keeps a policy to where demonstrations lead, if they show it, or to what is given."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            Guided.goes_round(demos, policy=lambda states: np.asarray(policy(states)))  # without proposing a goal
+        except (SettingError, InvalidDataError) as error:
+            return GUIDE_TO.format(", or '--guided cycle'," if "orbit=" in str(error) else "")
+    return GUIDE
 
 
 def replays(
@@ -169,7 +188,7 @@ def _compared(done: Demonstration, run: Demonstration, plane: Array, held: bool)
 
 
 def _turns(points: Array) -> Array:
-    """How often points (T, 2) have gone round the origin, (T,); passing it by less than :data:`PASSING` turns nothing."""
+    """How often points (T, 2) have gone round the origin, (T,); what is nearer than :data:`PASSING` turns nothing."""
     if points.shape[1] < 2:
         return np.zeros(len(points))
     away = np.linalg.norm(points, axis=1)
