@@ -242,7 +242,7 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
     if counts or models:
         click.echo(f"{', '.join(filter(None, (counts, models)))}.")
     if getattr(policy, "features", None) == "auto":
-        click.echo(f"Features of least estimated error: {policy.training_.model.features}.")
+        click.echo(f"Features of least estimated error: {uc.evaluation.diagnosis.models_of(policy)}.")
     if solution.belief is not None:
         click.echo(_said_of_samples(solution, () if policy.scale_ else stream.recipe.labels(stream.first.units)[1]))
         if known:

@@ -86,4 +86,6 @@ def _named(names: Sequence[str] | None, count: int, letter: str) -> list[str]:
 
 
 def _said(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
     return value if isinstance(value, str) else json.dumps(value) if value not in (None, [], {}) else ""
