@@ -452,7 +452,7 @@ def test_a_fit_doubts_what_it_learns_where_a_recording_stood_still_before_its_st
     files = [write(tmp_path / "late.csv", HEAD, late), *(folder / f"same_{k}.csv" for k in range(11, 14))]
     how = "--state", "x,y,z", "--differentiate", "--learner", "hybrid", "--variance", 500, "--json", *trim
     doubt = json.loads(run("fit", *files, *how, "-o", tmp_path / "p.npz"))["verdict"]["doubt"]
-    assert ("Where 'late' stood still before the start: rest is learnt there; --still trims it." in doubt) != bool(trim)
+    assert ("Where 'late' stood still at an end: rest is learnt there; --still trims it." in doubt) != bool(trim)
 
 
 @pytest.mark.parametrize("command", ["fit", "diagnose"])

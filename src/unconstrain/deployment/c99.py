@@ -189,16 +189,13 @@ def _limits(form: ClosedForm) -> Array:
 
 def speed_limit(form: ClosedForm, policy: Callable[[Array], Array], described: Description) -> float:
     """No action was larger where there was data, neither demonstrated nor of the policy."""
-    return max(described.fastest, _fastest(form, policy))
-
-
-def _fastest(form: ClosedForm, policy: Callable[[Array], Array]) -> float:
-    """The largest action at the centres of the kernels, or within half of the reach, where most of the data is."""
+    # Of the policy at the centres of the kernels, or within half of the reach, where most of the data is.
     if form.exponents is None or form.precisions is None:
         z = form.reach * np.random.default_rng(0).uniform(-0.5, 0.5, (SELF_TESTS, len(form.origin)))
     else:
         z = form.exponents[:, :-1] / form.precisions
-    return float(np.linalg.norm(policy(form.embedding.states(form.origin + z)), axis=1).max())
+    own = np.linalg.norm(policy(form.embedding.states(form.origin + z)), axis=1)
+    return max(described.fastest, float(own.max()))
 
 
 def _own_coordinates(form: ClosedForm, name: str, said: Callable[[Any], str]) -> Iterator[str]:

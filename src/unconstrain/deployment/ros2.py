@@ -102,19 +102,11 @@ def _words(package: str, form: ClosedForm, described: Description, kind: Message
 
 def _plane(form: ClosedForm, fill: dict[str, str]) -> dict[str, str]:
     """What takes the normal of a plane that a guided policy is told of; other policies need not know it."""
-    name, words = fill["name"], ("plane", "plane_is", "plane_member", "normal", "told")
+    parts = {"plane": "ros2_plane.cpp", "normal": "ros2_plane.py", "told": "ros2_plane.yaml"}
     if form.correction is None:
-        step = f"{name}_step(state.data(), action.data())"
-        return dict.fromkeys(words, "") | {"velocity": step, "step_of": "policy.step"}
-    return {
-        "plane": filled("ros2_plane.cpp", fill),
-        "plane_is": ",\n    plane_(plane())",
-        "plane_member": f"  std::array<double, {fill['n']} * {fill['n']}> plane_;\n",
-        "velocity": f"{name}_under(state.data(), plane_.data(), action.data())",
-        "normal": filled("ros2_plane.py", fill),
-        "step_of": "told(policy)",
-        "told": filled("ros2_plane.yaml", fill),
-    }
+        return dict.fromkeys(parts, "") | {"call": "step(state.data(), ", "step_of": "policy.step"}
+    said = {word: filled(part, fill) for word, part in parts.items()}
+    return said | {"call": "under(state.data(), plane_.data(), ", "step_of": "told(policy)"}
 
 
 def _check(form: ClosedForm, kind: Messages, described: Description) -> None:

@@ -127,10 +127,7 @@ class ClosedForm(Shown):
         return 1 if self.monomials is None else self.monomials.shape[1]
 
     def support(self, states: ArrayLike) -> Array:
-        """How near to the data states (N, n) are, as exports say it, (N,): from 1 to 0 far from all of it.
-
-        Without kernels it is 1 where each coordinate is within the reach of the data, and else 0.
-        """
+        """How near the data states (N, n) are, as exports say, (N,): 1 to 0; without kernels 1 within reach, else 0."""
         z = self.embedding(np.asarray(states, np.float64)) - self.origin
         if self.exponents is None or self.precisions is None:
             return (np.abs(z) <= self.within).all(axis=1).astype(float)

@@ -162,15 +162,9 @@ class Guided(Exportable, Shown):
 
     @staticmethod
     def goes_round(
-        demos: Sequence[Demonstration],
-        goal: ArrayLike | None = None,
-        orbit: str | None = None,
-        policy: Callable[[Array], Array] | None = None,
+        demos: Sequence[Demonstration], goal: ArrayLike | None = None, orbit: str | None = None, policy: Any = None
     ) -> bool:
-        """Whether demonstrations show a cycle rather than a goal; a SettingError if they show neither to any policy.
-
-        Of a goal also an InvalidDataError, where a policy is given, if it is not one place.
-        """
+        """Whether they show a cycle; an error if neither that nor a goal, with a policy also if it is not one place."""
         if goal is not None:
             as_vector(goal, "goal", demos[0].states.shape[1])
             return False

@@ -96,28 +96,24 @@ def replayed(
     alike = "" if held is not None else ", each held in the same way all the time (along a line, in a plane)"
     of = "" if len(known) == len(demos) else f"for {len(known)} of {len(demos)} demonstrations{alike}, "
     judged = verdicts.of_replays(found, extents, paces, said, lasts, of)
-    return Replayed(
-        _advised(judged, found, policy, demos), told, runs, verdicts.size_and_pace(extents, paces, lasts, of)
-    )
+    judged = _advised(judged, found, policy, demos)
+    return Replayed(judged, told, runs, verdicts.size_and_pace(extents, paces, lasts, of))
 
 
-def retraced(found: verdicts.Verdict, policy: Policy | Guided, demos: Sequence[Demonstration], *of: Any) -> Replayed:
+def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Replayed:
     """:func:`replayed` on what was learnt from: a guided policy, fitted to that, is judged no better than by itself."""
-    guided, alone = replayed(found, policy, demos, *of), innermost(policy)
+    guided, alone = replayed(found, policy, *of), innermost(policy)
     if alone is policy:
         return guided
-    (plain, _, _, ran), words = replayed(found, alone, demos, *of), guided.in_words
+    (plain, _, _, ran), words = replayed(found, alone, *of), guided.in_words
     mark = max(plain.mark, guided.verdict.mark, key=[*verdicts.Mark].index)
     more = f" {'Guided' if mark is plain.mark else 'But guided'}: {words}." if words else ""
-    judged = plain._replace(
-        mark=mark, said=plain.said + more, next=plain.next.removesuffix(_guide(alone, demos)).rstrip()
-    )
+    then = plain.next.partition(" 'unconstrain fit --guided")[0]  # it is
+    judged = plain._replace(mark=mark, said=plain.said + more, next=then)
     return guided._replace(verdict=judged, in_words="; guided ".join(filter(None, (ran, words))))
 
 
-def _advised(
-    judged: verdicts.Verdict, before: verdicts.Verdict, policy: Policy | Guided, demos: Sequence[Demonstration]
-) -> verdicts.Verdict:
+def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Any, demos: Any) -> verdicts.Verdict:
     """With what cures a policy that strays, unless it was tried."""
     if judged.next == before.next:
         return judged
