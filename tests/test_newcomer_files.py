@@ -397,11 +397,24 @@ def test_rest_at_both_ends_is_told_with_the_still_that_trims_it(tmp_path, before
     assert ("at its end" in said) == bool(after)
     told = re.search(r"rest: .* learnt as rest there; --still (\S+) trims it\.", said)
     assert bool(told) == bool(before + after)
+    head = "t,x [mm],y [mm],z [mm]"
+    more = [write(tmp_path / f"{k}.csv", head, rounds(before, after) * [1.0, 1.1, k, 1.0]) for k in (1, 2)]
+    noted = "nothing odd: ready to learn from (rest is noted below)."
+    assert (noted in text(call("inspect", path, *more, "--state", "x,y,z", "--differentiate"))) == bool(told)
     if told:
         kept = uc.prepare(uc.read(path), uc.Recipe(("x", "y", "z"), differentiate="savgol", still=float(told[1])))[0]
         assert abs(len(kept) - 250) <= 20
         again = text(call("inspect", path, "--state", "x,y,z", "--differentiate", "--still", told[1]))
         assert "rest: " not in again
+
+
+def test_a_goal_that_is_come_to_slowly_is_no_rest_at_the_end(tmp_path):
+    times = 0.02 * np.arange(300)
+    for rate in (1.0, 2.0, 4.0):
+        table = np.column_stack([times, np.exp(-rate * times)[:, None] * [100.0, 50.0, 20.0]])
+        table[:, 1:] += 0.2 * np.random.default_rng(0).standard_normal((300, 3))
+        path = write(tmp_path / "r.csv", "t,x,y,z", table)
+        assert "rest: " not in text(call("inspect", path, "--state", "x,y,z", "--differentiate"))
 
 
 @pytest.mark.parametrize(

@@ -188,8 +188,7 @@ def _limits(form: ClosedForm) -> Array:
 
 
 def speed_limit(form: ClosedForm, policy: Callable[[Array], Array], described: Description) -> float:
-    """No action was larger where there was data, neither demonstrated nor of the policy."""
-    # Of the policy at the centres of the kernels, or within half of the reach, where most of the data is.
+    """No action demonstrated was larger, nor one of the policy at a kernel's centre, or within half of the reach."""
     if form.exponents is None or form.precisions is None:
         z = form.reach * np.random.default_rng(0).uniform(-0.5, 0.5, (SELF_TESTS, len(form.origin)))
     else:

@@ -91,12 +91,13 @@ def stops(values: Array, shortest: int) -> list[tuple[int, int]]:
     return _left(found, values, LEFT * np.ptp(values, axis=0))
 
 
-def rest_at_start(values: Array, shortest: int) -> int:
-    """Rows (T, n) at the start, so many or more, in which nothing moves, if soon after all does; 0 of others."""
-    moved, runs, fast = _slow_runs(values, shortest, 0.9)  # many slow down all the way
-    begun = [stop for start, stop in runs if start == 0 and stop < len(values)]
-    after = [moved[stop + 1 - 2 * (shortest // 3) :][: stop // SOON] for stop in begun]
-    return begun[0] if begun and after[0].max(initial=0.0) > fast else 0
+def rest_at_start(values: Array, shortest: int, soon: int) -> int:
+    """Rows (T, n) at the start, so many or more, in which nothing moves, if soon after, too, all does; 0 of others."""
+    moved, runs, _ = _slow_runs(values, shortest, 0.9)  # many slow down all the way
+    for _, stop in [run for run in runs if run[0] == 0 and run[1] < len(values)]:
+        after = moved[stop + 1 - 2 * (shortest // 3) :]
+        return stop * bool(after[: min(stop // SOON, soon)].max(initial=0.0) > RISE * np.quantile(after, 0.9))
+    return 0
 
 
 def _slow_runs(values: Array, shortest: int, usually: float) -> tuple[Array, list[tuple[int, int]], float]:

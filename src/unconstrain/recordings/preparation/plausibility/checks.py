@@ -288,7 +288,10 @@ def rest(subject: Subject) -> Remark | None:
     interval = 0.0 if stamps is None else float(np.median(np.diff(stamps)))
     known = 0.0 < interval <= SHORTEST_STOP_S / STOP_ROWS
     lengths = [round(share * SHORTEST_STOP_S / interval) for share in LONGER] if known else [max(20, len(states) // 10)]
-    first, last = (max(rest_at_start(way, rows) for rows in lengths) for way in (states, states[::-1]))
+    first = max(rest_at_start(states, rows, len(states)) for rows in lengths)
+    last = max(
+        rest_at_start(states[::-1], rows, lengths[0]) for rows in lengths
+    )  # who comes to a goal slows down for longer
     ends = (first, "before it starts"), (last, "at its end")
     said = " and ".join(f"{subject.lasting(rows)} {where}" for rows, where in ends if rows)
     cure = _trimmed_by(subject, interval, first, last) if said else ""
