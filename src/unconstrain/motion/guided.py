@@ -361,9 +361,8 @@ def _slowing(demos: Sequence[Demonstration]) -> NDArray[np.bool_]:
     """Which slow down before their end, (K,), by their way, to which standing adds little; to one place all do."""
     found = np.full(len(demos), len(demos) > 1 and _apart(demos) <= _TOGETHER)
     for row, speeds in enumerate(np.linalg.norm(demo.actions, axis=1) for demo in demos):
-        way = speeds.cumsum() / (speeds.sum() or 1.0)
-        late = speeds[np.searchsorted(way, _LATE[0]) : np.searchsorted(way, _LATE[1]) + 1]
-        found[row] |= np.median(late) <= _SLOWED * _usual(np.sort(speeds))
+        first, last = np.searchsorted(speeds.cumsum(), np.multiply(_LATE, speeds.sum()))
+        found[row] |= np.median(speeds[first : last + 1]) <= _SLOWED * _usual(np.sort(speeds))
     return found
 
 

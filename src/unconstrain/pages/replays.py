@@ -125,8 +125,7 @@ def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Any, de
 
 def _guide(policy: Policy | Guided, demos: Sequence[Demonstration]) -> str:
     """What keeps a policy to where demonstrations lead, if they show it, or to what is given."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with warnings.catch_warnings(action="ignore"):
         try:
             Guided.goes_round(demos, policy=lambda states: np.asarray(policy(states)))  # without proposing a goal
         except (SettingError, InvalidDataError) as error:

@@ -94,10 +94,9 @@ def stops(values: Array, shortest: int) -> list[tuple[int, int]]:
 def rest_at_start(values: Array, shortest: int, soon: int) -> int:
     """Rows (T, n) at the start, so many or more, in which nothing moves, if soon after, too, all does; 0 of others."""
     moved, runs, _ = _slow_runs(values, shortest, 0.9)  # many slow down all the way
-    for _, stop in [run for run in runs if run[0] == 0 and run[1] < len(values)]:
-        after = moved[stop + 1 - 2 * (shortest // 3) :]
-        return stop * bool(after[: min(stop // SOON, soon)].max(initial=0.0) > RISE * np.quantile(after, 0.9))
-    return 0
+    stop = next((last for first, last in runs if first == 0 and last < len(values)), 0)
+    after = moved[max(stop + 1 - 2 * (shortest // 3), 0) :]
+    return stop if stop and after[: min(stop // SOON, soon)].max() > RISE * np.quantile(after, 0.9) else 0
 
 
 def _slow_runs(values: Array, shortest: int, usually: float) -> tuple[Array, list[tuple[int, int]], float]:

@@ -29,8 +29,7 @@ SHORTEST_STOP_S, STOP_ROWS = 0.3, 6
 """A stop takes so many seconds, and rows, at least: who turns a corner is slow for a shorter time."""
 
 LONGER, STANDING = (1.0, 1.5, 2.0), 1.5
-"""Rest at an end is looked for in such multiples of that, as noise may hide the shorter; and what trims it is so many
-times as fast as noise is there."""
+"""Multiples of that, for rest at an end, as noise hides the shorter; what trims it over the speed of noise there."""
 
 SHORTEST_PIECE = 5
 """Rows before and after a gap; fewer are a stray row at an end."""
