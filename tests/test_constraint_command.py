@@ -341,3 +341,23 @@ def test_mechanisms_that_differ_are_told_by_name(tilted, tmp_path):
     assert list(told["mechanisms"]) == list(told["each"]) == ["plate_0", "plate_1"]
     assert all(text.startswith("a plane through") for text in told["mechanisms"].values())
     assert [one["rank"] for one in told["each"].values()] == [1, 1]
+
+
+def test_where_each_was_held_in_its_own_way_the_options_that_fit_each_are_named(tmp_path):
+    head = "trial,t," + ",".join([*(f"q{i}" for i in range(4)), *(f"v{i}" for i in range(4))])
+    learn = "--state", "q0,q1,q2,q3", "--action", "v0,v1,v2,v3", "-o", tmp_path / "c.npz"
+    for name in ("flat", "curved"):
+        rng, tables = np.random.default_rng(0), []
+        for trial in range(3):
+            states, wanted, mixed = (rng.uniform(-1, 1, shape) for shape in ((80, 4), (80, 4), (4, 4)))
+            normals = np.sin(6.0 * states @ mixed) if name == "curved" else np.tile(mixed[0], (80, 1))
+            along = np.vecdot(wanted, normals) / np.vecdot(normals, normals)
+            actions = wanted - along[:, None] * normals
+            tables.append(np.column_stack([np.full(80, trial), 0.1 * np.arange(80), states, actions]))
+        write(tmp_path / f"{name}.csv", head, [np.vstack(tables)])
+    said = " ".join(refused("constraint", tmp_path / "curved.csv", *learn).split())
+    assert (
+        "constraints differ by demonstration: fit each by itself (its file alone, or --episodes with its name)" in said
+    )
+    assert said.endswith("and of joint angles that a hand's constraint holds, with --jacobian.")
+    assert "by itself (its file" not in run("constraint", tmp_path / "flat.csv", *learn)

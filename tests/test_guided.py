@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from unconstrain.base.errors import InvalidDataError, ModelFileError, SettingErr
 from unconstrain.cli import main
 from unconstrain.constraints.known import Plane, SwitchingLine
 from unconstrain.evaluation.verdicts import GOOD as WELL
+from unconstrain.motion.orbit import Orbit
 from unconstrain.motion.potential import descended, excess, steepest
 from unconstrain.paper.datasets.handwriting import SHAPES, load_handwriting
 
@@ -503,3 +505,49 @@ def test_where_no_cycle_is_found_the_strokes_are_named_and_not_the_rows(monkeypa
     said = r"orbit: demonstrations make \d\.\d\d turns in the mean, and no cycle is near them\. .* or not at all\.$"
     with pytest.raises(SettingError, match=said):
         uc.Guided(spiral, orbit="shown", demonstrations=SHOWN)
+
+
+def stopped(folder, demos, rest):
+    """Files of positions that end in a rest of so many samples, with noise as a tracker has it."""
+    rng = np.random.default_rng(3)
+    for number, demo in enumerate(demos):
+        states = still(np.vstack([demo.states, np.repeat(demo.states[-1:], rest, axis=0)]))
+        table = np.column_stack([0.02 * np.arange(len(states)), states + 0.002 * rng.standard_normal(states.shape)])
+        np.savetxt(folder / f"s_{number}.csv", table, delimiter=",", header="t,x,y,z", comments="")
+    learn = "--state", "x,y,z", "--differentiate", "--model", "affine", "--learner", "direct"
+    return "fit", str(folder / "*.csv"), *learn, "-o", str(folder / "p.npz")
+
+
+def still(table):
+    """With a third column of zeros, and so flat in space."""
+    return np.pad(table, ((0, 0), (0, 1)))
+
+
+def test_who_goes_round_and_then_stops_at_once_shows_a_cycle(tmp_path):
+    demos = uc.rollout(around, [[1.0, 0.0], [0.0, 1.2], [-0.9, 0.1]], 400, 0.02)
+    ran = CliRunner().invoke(main, [*stopped(tmp_path, demos, 50), "--guided", "auto"])
+    assert ran.exit_code == 0, ran.output
+    assert isinstance(uc.load(tmp_path / "p.npz", uc.Guided).aim_, Orbit)
+
+
+def test_who_winds_down_to_several_places_is_told_of_both_options_and_the_verdict_recommends_what_works(tmp_path):
+    def winding(states):
+        return np.column_stack([-states[:, 0] - 4 * states[:, 1], 4 * states[:, 0] - states[:, 1]])
+
+    runs = uc.rollout(winding, [[1.0, 0.0], [0.0, 1.2], [-0.9, 0.1]], 300, 0.02)
+    demos = [replace(run, states=run.states + np.array([0.35 * k, 0.0])) for k, run in enumerate(runs)]
+    learn = stopped(tmp_path, demos, 50)
+    ran = CliRunner().invoke(main, [*learn, "--guided", "auto"])
+    said = flat(ran.output)
+    assert ran.exit_code == 2
+    assert "in one place; pass --guided its place, such as --guided 0.1,0, or --guided cycle" in said
+    for name, show, advised in (("apart", demos, "--guided 0.1,0'"), ("one", runs, "--guided auto'")):
+        folder = tmp_path / name
+        folder.mkdir()
+        assert CliRunner().invoke(main, stopped(folder, show, 50)).exit_code == 0
+        states, velocities, _ = uc.stack(show)
+        other = uc.ParametricPolicy(uc.Affine(), "direct").fit(still(states), 0.75 * still(velocities))
+        uc.save(other, folder / "p.npz", uc.storage.load_notes(folder / "p.npz"))
+        scored = CliRunner().invoke(main, ["score", str(folder / "p.npz"), str(folder / "s_*.csv"), "--json"])
+        then = json.loads(scored.stdout)["verdict"]["next"]
+        assert f"'unconstrain fit {advised}" in then

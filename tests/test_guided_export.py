@@ -1,6 +1,7 @@
 """A policy that arrives says the same in C, C++, ONNX and JavaScript, free and under constraints."""
 
 import ctypes
+import re
 import subprocess
 from contextlib import nullcontext
 from dataclasses import replace
@@ -17,6 +18,7 @@ from test_javascript import in_page
 from test_one_model import FEATURES, of_one_model
 from unconstrain.base.errors import SettingError
 from unconstrain.deployment.description import digest
+from unconstrain.motion.orbit import Orbit
 
 RNG = np.random.default_rng(0)
 BY = np.array([0.2, -0.1, 0.3])
@@ -124,6 +126,13 @@ def test_a_stored_one_is_exported_by_command(guided, tmp_path):
     run("export", stored, "--ros2", tmp_path / "arrive")
     assert "arrive_under" in (tmp_path / "arrive" / "include" / "arrive" / "arrive.h").read_text()
     assert "every state" in " ".join(run("info", stored, "--json").split())
+    places = ("arrive.h", "arrive.js", "arrive/README.md", "arrive/scripts/arrive_loop.py")
+    comments = [(tmp_path / name).read_text("utf-8") for name in places]
+    for said in (*comments, run("info", stored), run("certify", stored)):
+        plain = " ".join(re.sub(r"^( \*|#|-) ", "", said, flags=re.MULTILINE).split())
+        assert "that it is told of (by 'under' with its projection; 'step' knows of none)" in plain
+        step = f"With steps of up to {guided.dt_:.3g} s, to which twice any delay counts, the cycle is wider"
+        assert (step in plain) == isinstance(guided.aim_, Orbit)
 
 
 def test_what_has_no_formula_is_said():

@@ -310,6 +310,25 @@ def test_what_is_slow_beside_its_noise_throughout_is_not_judged_alone(folder, po
     assert alone["said"].startswith("Too slow to be judged: all is below ten times its noise.")
 
 
+@pytest.mark.parametrize(("chosen", "which"), [("local", r"\d+ local models of σ² \S+"), ("affine", r"Affine\(.*\)")])
+def test_auto_names_the_model_it_took_be_it_local_or_features(folder, tmp_path, monkeypatch, chosen, which):
+    every = uc.Model.to_choose_from
+    monkeypatch.setattr(uc.Model, "to_choose_from", lambda *of: {chosen: every(*of)[chosen]})
+    monkeypatch.setattr(uc.LocallyLinearPolicy, "held_out_score", lambda _: -1.0)
+    files = folder / "w1.csv", folder / "w2.csv", folder / "w3.csv"
+    said = text(call("fit", *files, "--learner", "direct", "--model", "auto", "-o", tmp_path / "p.npz"))
+    told = re.search(rf"Features of least estimated error: ({which})\. Sh", said)
+    assert told[1] == json.loads(run("info", tmp_path / "p.npz", "--json"))["model"]
+
+
+@pytest.mark.parametrize(("told", "said"), [(1.0000000000000069, "1"), (0.84375123456, "0.843751")])
+def test_shares_in_comments_of_exports_are_rounded(folder, tmp_path, told, said):
+    run("fit", folder / "w1.csv", folder / "w2.csv", *LINEAR, "-o", tmp_path / "p.npz")
+    uc.save(uc.load(tmp_path / "p.npz"), tmp_path / "p.npz", {"determined share of states": told})
+    run("export", tmp_path / "p.npz", "-o", tmp_path / "p.c")
+    assert f"determined share of states: {said}\n" in (tmp_path / "p.h").read_text()
+
+
 @pytest.mark.parametrize(("explained", "kind"), [(1.0, "LocallyLinearPolicy"), (-1.0, "ParametricPolicy")])
 def test_auto_takes_the_default_model_where_that_explains_more_held_out(folder, tmp_path, monkeypatch, explained, kind):
     monkeypatch.setattr(uc.LocallyLinearPolicy, "held_out_score", lambda _: explained)

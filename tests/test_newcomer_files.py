@@ -1,6 +1,7 @@
 """What somebody meets whose files are not as they seem: what is said, of which line, and what to type."""
 
 import json
+import re
 import shlex
 import shutil
 from itertools import pairwise
@@ -396,3 +397,52 @@ def test_recordings_that_are_the_same_are_counted_and_left_out_as_said(tmp_path)
     assert "same-recording" not in text(call("inspect", *asked, "--leave-out", "copy,other"))
     assert "not as it seems (same-recording)" in call("fit", *asked, *fit, "--strict").err
     assert "same-recording" not in call("fit", *asked, *fit, "--strict", "--leave-out", "copy,other").err
+
+
+def rounds(before, after, noise=0.2):
+    """A round in five seconds at 50 Hz, between rests of so many seconds, with noise of a tracker in mm."""
+    turn = np.concatenate([np.zeros(round(50 * before)), np.arange(250) / 250, np.ones(round(50 * after))])
+    states = 80.0 * np.column_stack([np.cos(2 * np.pi * turn), np.sin(2 * np.pi * turn), 0.0 * turn])
+    states += noise * np.random.default_rng(0).standard_normal(states.shape)
+    return np.column_stack([0.02 * np.arange(len(turn)), states])
+
+
+@pytest.mark.parametrize(("before", "after"), [(0.6, 0.7), (0.6, 0.0), (0.0, 0.7), (0.0, 0.0)])
+def test_rest_at_both_ends_is_told_with_the_still_that_trims_it(tmp_path, before, after):
+    path = write(tmp_path / "r.csv", "t,x [mm],y [mm],z [mm]", rounds(before, after))
+    said = text(call("inspect", path, "--state", "x,y,z", "--differentiate"))
+    assert ("before it starts" in said) == bool(before)
+    assert ("at its end" in said) == bool(after)
+    told = re.search(r"rest: .* learnt as rest there; --still (\S+) trims it\.", said)
+    assert bool(told) == bool(before + after)
+    head = "t,x [mm],y [mm],z [mm]"
+    more = [write(tmp_path / f"{k}.csv", head, rounds(before, after) * [1.0, 1.1, k, 1.0]) for k in (1, 2)]
+    noted = "nothing odd: ready to learn from (rest is noted below)."
+    assert (noted in text(call("inspect", path, *more, "--state", "x,y,z", "--differentiate"))) == bool(told)
+    if told:
+        kept = uc.prepare(uc.read(path), uc.Recipe(("x", "y", "z"), differentiate="savgol", still=float(told[1])))[0]
+        assert abs(len(kept) - 250) <= 20
+        again = text(call("inspect", path, "--state", "x,y,z", "--differentiate", "--still", told[1]))
+        assert "rest: " not in again
+
+
+def test_a_goal_that_is_come_to_slowly_is_no_rest_at_the_end(tmp_path):
+    times = 0.02 * np.arange(300)
+    for rate in (1.0, 2.0, 4.0):
+        table = np.column_stack([times, np.exp(-rate * times)[:, None] * [100.0, 50.0, 20.0]])
+        table[:, 1:] += 0.2 * np.random.default_rng(0).standard_normal((300, 3))
+        path = write(tmp_path / "r.csv", "t,x,y,z", table)
+        assert "rest: " not in text(call("inspect", path, "--state", "x,y,z", "--differentiate"))
+
+
+@pytest.mark.parametrize(
+    ("noise", "told"),
+    [
+        (0.2, r"--still 2\d trims it\."),
+        (2.0, r"--still 2\d\d trims it, and movement as slow as that; with a longer --window noise is slower\."),
+    ],
+)
+def test_rest_that_noise_makes_as_fast_as_movement_is_told_so(tmp_path, noise, told):
+    path = write(tmp_path / "r.csv", "t,x,y,z", rounds(0.6, 0.7, noise))
+    said = text(call("inspect", path, "--state", "x,y,z", "--differentiate"))
+    assert re.search(rf"learnt as rest there; {told}", said)

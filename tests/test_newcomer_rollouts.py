@@ -452,7 +452,7 @@ def test_a_fit_doubts_what_it_learns_where_a_recording_stood_still_before_its_st
     files = [write(tmp_path / "late.csv", HEAD, late), *(folder / f"same_{k}.csv" for k in range(11, 14))]
     how = "--state", "x,y,z", "--differentiate", "--learner", "hybrid", "--variance", 500, "--json", *trim
     doubt = json.loads(run("fit", *files, *how, "-o", tmp_path / "p.npz"))["verdict"]["doubt"]
-    assert ("Where 'late' stood still before the start: rest is learnt there; --still trims it." in doubt) != bool(trim)
+    assert ("Where 'late' stood still at an end: rest is learnt there; --still trims it." in doubt) != bool(trim)
 
 
 @pytest.mark.parametrize("command", ["fit", "diagnose"])
@@ -494,3 +494,24 @@ def test_where_some_demonstrations_alone_are_run_it_is_said_how_many_and_why(fol
     assert f"un from the same starts: {told}" in " ".join(run("info", tmp_path / "p.npz").split())
     assert told in " ".join(run("score", tmp_path / "p.npz", *held, bent).split())
     assert "un from the same starts: size" in " ".join(run("fit", *held, *asked).split())
+
+
+@pytest.mark.parametrize(("seconds", "enough"), [(4.5, False), (6.5, True)])
+def test_pace_is_of_a_round_and_a_half(folder, tmp_path, seconds, enough):
+    held = [write(tmp_path / f"round_{k}.csv", HEAD, oval(k, seconds)) for k in range(3, 6)]
+    found = json.loads(run("score", folder / "same.npz", *held, "--json"))["replayed"]
+    assert (found["pace"] is not None) == enough
+
+
+def test_what_goes_straight_past_its_middle_has_no_pace(tmp_path):
+    rng, way = np.random.default_rng(0), np.linspace(0.0, 1.0, 300)[:, None]
+    for k in range(4):
+        goal = [100.0, 20.0 * k, 30.0]
+        table = np.column_stack([0.01 * np.arange(300), way * goal + 4.0 * rng.standard_normal((300, 3))])
+        write(tmp_path / f"reach_{k}.csv", HEAD, table)
+    reaches = sorted(tmp_path.glob("reach_*.csv"))
+    learn = "--state", "x,y,z", "--by", "central", "--learner", "hybrid", "--model", "affine", "-o", tmp_path / "p.npz"
+    run("fit", *reaches, *learn)
+    found = json.loads(run("score", tmp_path / "p.npz", *reaches, "--plane", "0,0,1", "--json"))
+    assert found["replayed"]["pace"] is None
+    assert "pace" not in found["verdict"]["said"]

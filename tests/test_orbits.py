@@ -222,3 +222,31 @@ def test_v_comes_nearer_for_any_policy_on_any_plane_also_where_what_was_shown_sc
         moved = uc.project(held, guided.under(STARTS, held))
         nearer = off(guided, STARTS) * np.vecdot(guided.potential_.gradient(STARTS), moved)
         assert (nearer < 0.0).all()
+
+
+@pytest.mark.parametrize(("step", "delay", "most"), [(1.0, 0, 0.03), (1 / 3, 1, 0.03), (0.2, 2, 0.03), (5.0, 0, 0.15)])
+def test_by_steps_and_delays_the_cycle_is_wider_by_as_much_as_told(guided, step, delay, most):
+    dt = step * guided.dt_
+    x, waiting = circle(TILTS[0]).copy(), [np.zeros(3)] * delay
+    heights = []
+    for _ in range(int(6 * np.pi / RATE / dt)):
+        waiting.append(guided.step(x))
+        x = x + dt * waiting.pop(0)
+        heights.append(guided.potential_(x[None])[0])
+    wider = np.sqrt(2.0 * np.mean(heights[len(heights) // 2 :])) / guided.aim_.radius - 1.0
+    assert most / 3 < wider < most
+
+
+def test_held_by_a_plane_that_step_is_not_told_of_a_movement_ends_elsewhere_than_with_under():
+    def down(states):
+        return -states * [4.0, 1.0]
+
+    guided = uc.Guided(down, goal=[0.0, 0.0], demonstrations=uc.rollout(down, np.eye(2), 60, 0.05))
+    held, ends = uc.null_space_projection(np.array([[1.0, 1.0]])), []
+    for told in (False, True):
+        x = np.array([1.0, 0.5])
+        for _ in range(4000):
+            x = x + 0.5 * guided.dt_ * held @ (guided.under([x], held[None])[0] if told else guided.step(x))
+        ends.append(x)
+    assert_allclose(held @ guided.potential_.gradient(np.array([ends[1]]))[0], 0.0, atol=1e-6)
+    assert np.diff(guided.potential_(np.array(ends)))[0] < -0.01 * guided.potential_(np.array(ends))[0]

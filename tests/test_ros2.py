@@ -3,6 +3,7 @@
 import subprocess
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from threading import Event
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -146,12 +147,92 @@ def test_the_package_says_what_it_needs(tmp_path):
     assert "@" not in (root / "src" / "my_wiping_node.cpp").read_text()
 
 
+def loop_of(folder):
+    """The loop in Python beside a node."""
+    spec = spec_from_file_location("wiping_loop", folder / "wiping" / "scripts" / "wiping_loop.py")
+    loop = module_from_spec(spec)
+    spec.loader.exec_module(loop)
+    return loop
+
+
+def looped(loop, policy, states):
+    """What the loop commands at states, when then none comes, and at its end."""
+    loop.RATE, loop.TIMEOUT = 1e4, 0.02
+    at, left, commanded, late = iter(states), iter(range(len(states) + 1, -1, -1)), [], Event()
+    loop.run(policy, lambda: next(at, None) if len(commanded) < len(states) else late.wait(1), commanded.append,
+             lambda: next(left) > 0)  # fmt: skip
+    return commanded
+
+
+def aimed(kind):
+    """A policy whose speed grows with the distance, local or one model, guided or not, as a file keeps it."""
+    data = draw(samples=300, policy=lambda x: np.array([0.5, 0.0, 0.0]) - x, dimensions=3)
+    width, _, guided = kind.partition(" ")
+    if width == "parametric":
+        policy = uc.ParametricPolicy(uc.Affine(), "direct")
+    else:
+        policy = uc.LocallyLinearPolicy({"local": 2.0, "affine": np.inf}.get(width, width), learner="direct")
+    policy.fit(data.states, data.actions)
+    if not guided:
+        return policy
+    down = uc.rollout(lambda x: -x, np.random.default_rng(0).uniform(-1, 1, (6, 3)), 60, 0.1)
+    return uc.Guided(policy, [0.0, 0.0, 0.0], demonstrations=down)
+
+
+@pytest.mark.parametrize("kind", ["parametric", "parametric guided", "local", "affine", "cubic", "local guided"])
+def test_the_loop_in_python_is_that_of_the_node(kind, tmp_path):
+    uc.save(aimed(kind), tmp_path / "p.npz", notes={"recipe": {"states": ["x", "y", "z"]}})
+    policy = uc.load(tmp_path / "p.npz", object)
+    drive, loop = node_of(policy, uc.storage.load_notes(tmp_path / "p.npz"), tmp_path), loop_of(tmp_path)
+    rng = np.random.default_rng(1)
+    states = np.concatenate([width * rng.uniform(-1, 1, (8, 3)) for width in (0.1, 1.0, 2.0, 4.0)])
+    states = np.concatenate([states, np.full((1, 3), 1e4), np.full((1, 3), np.nan), [[np.inf, 0.0, 0.0]]])
+    for normal in (None, [0.0, 2.0, 1.0])[: 1 + ("guided" in kind)]:
+        parameters = [*REAL_TIME] if normal is None else [*REAL_TIME, "normal=0,2,1"]
+        lines = ["frame base_link", *map(state, states), state(states[0]), "silence"]
+        _, answers, _ = drive(*lines, parameters=parameters)
+        node = np.array([numbers(line.removesuffix("base_link")) for line in answers])
+        loop.NORMAL = normal
+        commanded = looped(loop, policy, [*states, states[0]])
+        assert_allclose(commanded, [*node, np.zeros(3)], atol=1e-12)
+        speeds = np.linalg.norm(node, axis=1)
+        assert_array_equal(speeds[[*range(16), *range(-5, 0)]] > 0, [True] * 16 + [False] * 3 + [True, False])
+        assert speeds.max() <= loop.VELOCITY_LIMIT * (1 + 1e-12) < np.linalg.norm(policy(states[-3:-2]))
+        if normal is not None:
+            assert np.abs(node @ normal).max() < 1e-12
+
+
+def test_the_loop_in_python_rests_while_nothing_is_read_goes_on_and_says_what_went_wrong(tmp_path):
+    policy, _, notes = learnt(3, ["x", "y", "z"])
+    policy.export_ros2(tmp_path / "wiping", notes=notes)
+    loop, commanded = loop_of(tmp_path), []
+    loop.RATE, loop.TIMEOUT = 1e4, 0.02
+    told = iter(
+        [np.zeros(3), TimeoutError("nothing came"), None, np.zeros(2), np.zeros(3), OSError("the robot is off")]
+    )
+
+    def read():
+        found = next(told)
+        if isinstance(found, Exception):
+            raise found
+        return found
+
+    with pytest.raises(OSError, match="the robot is off"):
+        loop.run(policy, read, commanded.append)
+    assert [velocity.any() for velocity in commanded] == [True, False, False, False, True, False]
+
+
+def test_the_node_takes_no_normal_that_is_none(tmp_path):
+    drive = node_of(aimed("parametric guided"), {"recipe": {"states": ["x", "y", "z"]}}, tmp_path)
+    with pytest.raises(subprocess.CalledProcessError) as refused:
+        drive("frame base_link", parameters=["normal=0,0,0"])
+    assert "normal: expected 3 numbers, not all zero" in refused.value.stderr
+
+
 def test_the_loop_in_python_commands_the_same_and_rests_at_the_end(tmp_path):
     policy, states, notes = learnt(3, ["x", "y", "z"])
     policy.export_ros2(tmp_path / "wiping", notes=notes)
-    spec = spec_from_file_location("wiping_loop", tmp_path / "wiping" / "scripts" / "wiping_loop.py")
-    loop = module_from_spec(spec)
-    spec.loader.exec_module(loop)
+    loop = loop_of(tmp_path)
     loop.RATE, loop.VELOCITY_LIMIT = 1e4, 0.5
     near = states[policy.support(states) > 0.05][:4]
     at, commanded = iter([*near, np.full(3, 50.0)]), []

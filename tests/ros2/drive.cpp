@@ -47,14 +47,21 @@ std::vector<T> rest(std::istream & line)
 }
 }  // namespace
 
-// Arguments: NAME=number, NAME=text, or NAME=a,b,... for a parameter.
+// Arguments: NAME=number, NAME=text, or NAME=1,2,... for a parameter.
 void rclcpp::init(int argc, char ** argv)
 {
   for (int i = 1; i < argc; ++i) {
     const std::string text = argv[i], value = text.substr(text.find('=') + 1);
     std::istringstream number(value);
     double as_number;
-    if (number >> as_number) {
+    if (value.find(',') != std::string::npos) {
+      std::vector<double> numbers;
+      std::istringstream each(value);
+      for (std::string one; std::getline(each, one, ','); ) {
+        numbers.push_back(std::stod(one));
+      }
+      overrides()[text.substr(0, text.find('='))] = numbers;
+    } else if (number >> as_number) {
       overrides()[text.substr(0, text.find('='))] = as_number;
     } else {
       overrides()[text.substr(0, text.find('='))] = value;

@@ -36,7 +36,7 @@ def certify(policy: str, seed: int) -> None:
     found = uc.certify(stored, around, seed)
     click.echo(f"{policy}: {found.said}")
     if not found.holds:
-        click.echo("Next: unconstrain fit with --guided auto, and certify that")
+        click.echo("Next: unconstrain fit with --guided auto, cycle, or a goal such as 0.1,0, and certify that")
         raise SystemExit(1)
     click.echo(f"Next: unconstrain export {shlex.quote(policy)} -o policy.c")
 

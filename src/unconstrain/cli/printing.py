@@ -210,7 +210,7 @@ def as_noted(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.
     if jumps := [title for title, one in told.get(TITLES, {}).get("glitch", {}).items() if not one.cured]:
         verdict = uc.evaluation.verdicts.of_glitches(verdict, listed(jumps, 4))
     if rest := told.get(TITLES, {}).get("rest"):
-        said = f"Where {listed([*rest], 4)} stood still before the start: rest is learnt there; --still trims it."
+        said = f"Where {listed([*rest], 4)} stood still at an end: rest is learnt there; --still trims it."
         verdict = verdict._replace(doubt=f"{verdict.doubt} {said}".lstrip())
     return uc.evaluation.verdicts.of_units_apart(verdict) if OTHER_UNITS & {*told.get(CODES, ())} else verdict
 
@@ -242,7 +242,7 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
     if counts or models:
         click.echo(f"{', '.join(filter(None, (counts, models)))}.")
     if getattr(policy, "features", None) == "auto":
-        click.echo(f"Features of least estimated error: {policy.training_.model.features}.")
+        click.echo(f"Features of least estimated error: {uc.evaluation.diagnosis.models_of(policy)}.")
     if solution.belief is not None:
         click.echo(_said_of_samples(solution, () if policy.scale_ else stream.recipe.labels(stream.first.units)[1]))
         if known:

@@ -273,7 +273,8 @@ def _check(best: _Trial, samples: int) -> None:
     if share >= LOOSE:
         raise InvalidDataError(
             f"no direction is held: along the best one that is a function of the state, {percent(share)} of a mean "
-            "square action moves where held out. The data is free, or constraints differ by demonstration: fit each."
+            "square action moves where held out. The data is free, or constraints differ by demonstration: fit each "
+            "by itself, and of joint angles that a hand's constraint holds, with jacobian=."
         )
     if rate >= PROPORTIONAL:
         raise InvalidDataError(

@@ -93,7 +93,7 @@ def c_source(
     fill = {"name": name, "NAME": name.upper(), "macro": f"{name.upper()}_SELF_TEST", "file": file}
     fill |= _sizes(form, described) | _numbers(form, name, policy, single)
     said = _single if single else _double
-    fill |= {"speed_limit": said(max(described.fastest, _fastest(form, policy)))} | _correction(form, name, said)
+    fill |= {"speed_limit": said(speed_limit(form, policy, described))} | _correction(form, name, said)
     fill["under"] = filled("under.h", fill) if form.correction else ""
     header = filled("header.h", fill)
     return Source(header, header + "\n" + "".join(filled(f"{part}.c", fill) for part in _parts(form)))
@@ -187,13 +187,14 @@ def _limits(form: ClosedForm) -> Array:
     return np.concatenate(parts)
 
 
-def _fastest(form: ClosedForm, policy: Callable[[Array], Array]) -> float:
-    """The largest action at the centres of the kernels, or within half of the reach, where most of the data is."""
+def speed_limit(form: ClosedForm, policy: Callable[[Array], Array], described: Description) -> float:
+    """No action demonstrated was larger, nor one of the policy at a kernel's centre, or within half of the reach."""
     if form.exponents is None or form.precisions is None:
         z = form.reach * np.random.default_rng(0).uniform(-0.5, 0.5, (SELF_TESTS, len(form.origin)))
     else:
         z = form.exponents[:, :-1] / form.precisions
-    return float(np.linalg.norm(policy(form.embedding.states(form.origin + z)), axis=1).max())
+    own = np.linalg.norm(policy(form.embedding.states(form.origin + z)), axis=1)
+    return max(described.fastest, float(own.max()))
 
 
 def _own_coordinates(form: ClosedForm, name: str, said: Callable[[Any], str]) -> Iterator[str]:

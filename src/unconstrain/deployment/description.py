@@ -86,4 +86,5 @@ def _named(names: Sequence[str] | None, count: int, letter: str) -> list[str]:
 
 
 def _said(value: Any) -> str:
+    value = f"{value:.6g}" if isinstance(value, float) else value
     return value if isinstance(value, str) else json.dumps(value) if value not in (None, [], {}) else ""

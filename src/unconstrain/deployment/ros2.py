@@ -12,7 +12,7 @@ from ..base.display import bare, speed_of, with_unit
 from ..base.errors import SettingError
 from ..base.files import put_folder, workshop
 from ..models import ClosedForm, spaces
-from .c99 import c_name, c_source
+from .c99 import c_name, c_source, speed_limit
 from .description import Description
 from .filling import filled, own_version
 
@@ -53,13 +53,14 @@ def export_ros2(
 ) -> None:
     """Write a package with a node that takes each state to a velocity, in place of a folder that is there.
 
-    The node limits the speed, stops where the support of the data ends, and stops when no state comes.
+    Node and loop limit the speed, stop where the support of the data ends, and stop when no state comes.
     """
     package = c_name(Path(os.path.realpath(folder)).name if name is None else name).lower()
     coordinates = [bare(name)[-1:].lower() for name in described.states] == ["x", "y", "z"]
     kind = messages or ("pose" if coordinates else "joints")
     _check(form, kind, described)
     fill = _words(package, form, described, kind)
+    fill |= {"limit": repr(max(1e-9, speed_limit(form, policy, described)))} | _plane(form, fill)
     with workshop(folder) as made:
         made.joinpath("new").mkdir()
         root = made / "new"
@@ -97,6 +98,15 @@ def _words(package: str, form: ClosedForm, described: Description, kind: Message
         "d": str(form.sizes[1]),
         "scale": "1000.0" if millimetres else "1.0",
     }
+
+
+def _plane(form: ClosedForm, fill: dict[str, str]) -> dict[str, str]:
+    """What takes the normal of a plane that a guided policy is told of; other policies need not know it."""
+    parts = {"plane": "ros2_plane.cpp", "normal": "ros2_plane.py", "told": "ros2_plane.yaml"}
+    if form.correction is None:
+        return dict.fromkeys(parts, "") | {"call": "step(state.data(), ", "step_of": "policy.step"}
+    said = {word: filled(part, fill) for word, part in parts.items()}
+    return said | {"call": "under(state.data(), plane_.data(), ", "step_of": "told(policy)"}
 
 
 def _check(form: ClosedForm, kind: Messages, described: Description) -> None:

@@ -307,7 +307,8 @@ def states_told(policy: Policy) -> float | None:
         return None
     states, actions = map(on_host, kept.whole[:2])
     typical = float(np.sqrt((actions**2).sum(axis=1).mean()))
-    return max(float((untold_at(policy.in_own_units(), states, typical) <= SMALL).mean()), belief.told_together)
+    told = max(float((untold_at(policy.in_own_units(), states, typical) <= SMALL).mean()), belief.told_together)
+    return min(told, 1.0)  # a sum of shares may be more by rounding
 
 
 def lost_by_guiding(moving: Any, demonstrations: Sequence[Demonstration]) -> float | None:

@@ -81,11 +81,11 @@ def in_words(method: str) -> str:
 
 def models_of(policy: Any) -> str:
     """Number and width of a fitted policy's local models, or the one for all states; of others their features."""
-    if not hasattr(policy, "fields_"):
-        return str(policy.features_)
-    if policy.variance_ in (np.inf, "cubic"):
+    if hasattr(policy, "fields_") and policy.variance_ in (np.inf, "cubic"):
         return f"one {'cubic' if policy.variance_ == 'cubic' else 'affine'} model for all states"
-    return f"{counted(len(policy.solution_.weights), 'local model')} of σ² {policy.variance_:.4g}"
+    if (variance := policy.training_.model.fields.variance) == np.inf:
+        return str(policy.features_)
+    return f"{counted(len(policy.solution_.weights), 'local model')} of σ² {variance:.4g}"
 
 
 def about_choice(method: str, candidates: Mapping[str, float]) -> str:

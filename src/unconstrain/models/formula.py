@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import Array
 from ..base.display import Shown, counted
@@ -125,6 +125,15 @@ class ClosedForm(Shown):
     def degree(self) -> int:
         """How fast the actions grow far away: at most with this power of the distance."""
         return 1 if self.monomials is None else self.monomials.shape[1]
+
+    def support(self, states: ArrayLike) -> Array:
+        """How near the data states (N, n) are, as exports say, (N,): 1 to 0; without kernels 1 within reach, else 0."""
+        z = self.embedding(np.asarray(states, np.float64)) - self.origin
+        if self.exponents is None or self.precisions is None:
+            return (np.abs(z) <= self.within).all(axis=1).astype(float)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite has no support
+            nearest = (z @ self.exponents[:, :-1].T + self.exponents[:, -1]).max(axis=1) - 0.5 * z**2 @ self.precisions
+        return np.asarray(np.exp(np.minimum(nearest, 0.0)))
 
     def _summary(self) -> tuple[str, ...]:
         return tuple(map(counted, (self.columns, *self.sizes[1:]), ("state", "action", "model")))

@@ -13,7 +13,7 @@ from ..base.arrays import Array
 from ..base.display import Shown
 from ..models import Correction
 from ..risks import project
-from .potential import Potential, radius
+from .potential import TOLD, Potential, radius
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,9 +43,9 @@ class Descent(Shown):
             "Where the policy does not lead to the goal, a velocity is added with which V falls, a bowl with its "
             "bottom at the goal, fitted to the demonstrations. Right where every movement is to end there; ways from "
             f"new starts are not learnt. From every state, movements arrive: free at ({goal}), and under any flat "
-            f"constraint where it is nearest to that, as V measures. Every step of up to {self.dt:.3g} s leads nearer, "
-            f"at {0.75 * self.pace:.3g} a second or faster, and slower only near the end. A constraint that moves, or "
-            "an obstacle, may lead away."
+            f"constraint that it is told of ({TOLD}) where it is nearest to that, as V measures. Every step of up to "
+            f"{self.dt:.3g} s leads nearer, at {0.75 * self.pace:.3g} a second or faster, and slower only near the "
+            "end. A constraint that moves or is not told, or an obstacle, may lead away."
         )
 
     def correction(self) -> Correction:

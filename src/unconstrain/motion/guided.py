@@ -1,4 +1,4 @@
-"""A policy that arrives: free and under any constraint."""
+"""A policy that arrives: free and under any constraint that it is told of."""
 
 from __future__ import annotations
 
@@ -28,6 +28,10 @@ _AT_REST = 0.3
 """A demonstration ends at rest, or nearly, below this share of its fastest motion if all end in one place, as any of
 thirty shapes of handwriting does; else if its last tenth is below this share of its usual speed: half rounds end at 0.5
 of it or faster though one began at four times that, movements to a goal that plates held off it at 0.2 at most."""
+
+_LATE, _SLOWED = (0.93, 0.97), 0.6
+"""Who comes to a goal is slower, in the last part of the way, than the second share of a usual speed; on a cycle many
+stop at once."""
 
 _STILL = 0.02
 """A policy rests where it wants less than this share of its fastest motion, or twice as much as where it rests most."""
@@ -69,7 +73,10 @@ class Moved:
 
 
 class Guided(Exportable, Shown):
-    """A policy that arrives at a goal or on a cycle, from anywhere and under any constraint, by construction.
+    """A policy that arrives at a goal or on a cycle, from anywhere and under any constraint it is told of.
+
+    A constraint that holds the robot has to be told, by :meth:`under`, as :func:`rollout` does; :meth:`step` is free,
+    and movements that something holds unbeknown to it need not arrive.
 
     **At a goal.** Along every movement a convex potential V falls (:class:`~unconstrain.motion.potential.Potential`),
     which is learnt from the demonstrations so that the policy descends it by itself where it was shown. Elsewhere the
@@ -94,11 +101,11 @@ class Guided(Exportable, Shown):
     policy : callable
         States (N, n) to velocities (N, n).
     goal : array_like, shape (n,), optional
-        By default where the demonstrations end at rest, if most do or they do not go round: those that end where the
+        By default where the demonstrations come to rest, if most do or they do not go round: those that end where the
         policy rests, too, if there are any, as constraints stopped the others.
     orbit : array_like, shape (T, n), or "shown", optional
         States on the cycle, all around it; "shown" are those of the demonstrations, from which it is found by default
-        where they go round and most do not end at rest.
+        where they go round and most do not come to rest; if they stop at once on the cycle, they do not.
     demonstrations : Demonstration or sequence of Demonstration, optional
         Movements that are likely, on which the correction is to be small. By default those that the policy has kept.
     dt : float, optional
@@ -112,7 +119,8 @@ class Guided(Exportable, Shown):
         Or the middle of the cycle.
     potential_ : Potential
     dt_ : float
-        Seconds. With Euler steps of this length V falls, or cycles are wider than told by a few hundredths.
+        Seconds. With Euler steps of this length V falls, or cycles are wider than told by a few hundredths; a delay
+        counts as twice such a step.
 
     Raises
     ------
@@ -153,15 +161,17 @@ class Guided(Exportable, Shown):
         self.aim_ = _encircled(demos, policy) if around else _descent(demos, policy, wanted, goal, dt)
 
     @staticmethod
-    def goes_round(demos: Sequence[Demonstration], goal: ArrayLike | None = None, orbit: str | None = None) -> bool:
-        """Whether demonstrations show a cycle rather than a goal; a SettingError if they show neither to any policy."""
+    def goes_round(
+        demos: Sequence[Demonstration], goal: ArrayLike | None = None, orbit: str | None = None, policy: Any = None
+    ) -> bool:
+        """Whether they show a cycle; an error if neither that nor a goal, with a policy also if it is not one place."""
         if goal is not None:
             as_vector(goal, "goal", demos[0].states.shape[1])
             return False
         rests, around = _resting(demos), turns(demos)
         if orbit is not None and around < _HALF and 2 * sum(rests) > len(demos):
             raise _no_cycle(demos)
-        if orbit is not None or (2 * sum(rests) <= len(demos) and around >= _ROUND):
+        if orbit is not None or (around >= _ROUND and 2 * sum(rests & _slowing(demos)) <= len(demos)):
             return True
         if not any(rests):
             where = "" if _apart(demos) <= _TOGETHER else ", nor where another does"
@@ -173,7 +183,9 @@ class Guided(Exportable, Shown):
         ends = np.array([demo.states[-1] for demo, still in zip(demos, rests, strict=True) if still])
         apart = np.linalg.norm(ends[:, None] - ends, axis=2)[np.triu_indices(len(ends), 1)]
         if len(ends) >= _SEVERAL and apart.min() > _TOGETHER * np.linalg.norm(np.ptp(stack(demos).states, axis=0)):
-            raise SettingError("goal: demonstrations end at rest, no two of them in one place; give it with goal=.")
+            raise SettingError(f"goal: demonstrations end at rest, no two of them in one place; {_given(demos)}.")
+        if policy is not None:
+            _found(demos, policy, _velocities(policy, stack(demos).states))
         return False
 
     @property
@@ -283,6 +295,11 @@ def _no_cycle(demos: Sequence[Demonstration]) -> SettingError:
     )
 
 
+def _given(demos: Sequence[Demonstration]) -> str:
+    """What says where to, where demonstrations do not."""
+    return "pass goal=, or orbit='shown' for a cycle" if turns(demos) >= _HALF else "give it with goal="
+
+
 def _descent(
     demos: Sequence[Demonstration], policy: Any, wanted: Array, goal: ArrayLike | None, dt: float | None
 ) -> Descent:
@@ -340,6 +357,15 @@ def _resting(demos: Sequence[Demonstration]) -> NDArray[np.bool_]:
     return np.array([np.median(one[-max(3, len(one) // 10) :]) <= _AT_REST * _usual(np.sort(one)) for one in speeds])
 
 
+def _slowing(demos: Sequence[Demonstration]) -> NDArray[np.bool_]:
+    """Which slow down before their end, (K,), by their way, to which standing adds little; to one place all do."""
+    found = np.full(len(demos), len(demos) > 1 and _apart(demos) <= _TOGETHER)
+    for row, speeds in enumerate(np.linalg.norm(demo.actions, axis=1) for demo in demos):
+        first, last = np.searchsorted(speeds.cumsum(), np.multiply(_LATE, speeds.sum()))
+        found[row] |= np.median(speeds[first : last + 1]) <= _SLOWED * _usual(np.sort(speeds))
+    return found
+
+
 def _usual(speeds: Array) -> float:
     """Of sorted speeds that beyond which half of the way was made: neither a rest nor a fast start changes it much."""
     return float(speeds[np.searchsorted(speeds.cumsum(), speeds.sum() / 2.0)])
@@ -356,7 +382,7 @@ def _found(demos: Sequence[Demonstration], policy: Any, wanted: Array) -> Array:
     if apart > _TOGETHER:
         raise InvalidDataError(
             f"goal: demonstrations end at rest in places up to {apart:.0%} of their extent from the mean of these; "
-            f"expected one place; give it with goal=.{_proposed(policy, ends, demos, wanted)}"
+            f"expected one place; {_given(demos)}.{_proposed(policy, ends, demos, wanted)}"
         )
     if not slow.any():
         warnings.warn(

@@ -14,7 +14,7 @@ from ..base.display import Shown, counted
 from ..models import Correction
 from ..recordings import Demonstration, stack
 from ..risks import project
-from .potential import Potential, spread_over
+from .potential import TOLD, Potential, spread_over
 
 PULL = 0.25
 """The cycle attracts at least at this share of the turning rate, rad/s."""
@@ -83,10 +83,12 @@ class Orbit(Shown):
             "Where the policy does not lead to the cycle, and round, a velocity is added that does, by V, a bowl with "
             "the cycle on its wall, fitted to the demonstrations. Right where every movement is to go round; ways from "
             f"new starts are not learnt. A closed convex surface, round or oval, attracts, typically {self.radius:.4g} "
-            f"off its middle ({middle}), from every state but that, free and under any flat constraint: the distance "
-            f"from it shrinks at rates of {PULL * self.rate:.4g} to {RUSH * self.rate:.4g} per second. A plane through "
-            f"its inside cuts it in one cycle, on which the pace is within {STRAY:.0%} of the one learnt wherever the "
-            "plane lets it turn. A constraint that moves, or an obstacle, may lead off it."
+            f"off its middle ({middle}), from every state but that, free and under any flat constraint that it is told "
+            f"of ({TOLD}): the distance from it shrinks at rates of {PULL * self.rate:.4g} to {RUSH * self.rate:.4g} "
+            f"per second. A plane through its inside cuts it in one cycle, on which the pace is within {STRAY:.0%} of "
+            f"the one learnt wherever the plane lets it turn. With steps of up to {self.dt:.3g} s, to which twice any "
+            "delay counts, the cycle is wider by a few hundredths, with longer ones by more. A constraint that moves "
+            "or is not told, or an obstacle, may lead off it."
         )
 
     def correction(self) -> Correction:
@@ -143,7 +145,7 @@ class Orbit(Shown):
 
     @property
     def dt(self) -> float:
-        """Euler steps of this length widen the cycle by two hundredths, seconds."""
+        """Euler steps of this length widen the cycle by two hundredths, seconds; a delay does as twice such a step."""
         return 0.04 * PULL / self.rate
 
     def single(self) -> Callable[[ArrayLike, Array], None]:

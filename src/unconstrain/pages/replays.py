@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -11,14 +12,13 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Array
 from ..base.display import innermost, unit_of
-from ..base.errors import DivergedError
+from ..base.errors import DivergedError, InvalidDataError, SettingError
 from ..evaluation import diagnosis, verdicts
 from ..models import spaces
-from ..motion import rollout
+from ..motion import Guided, rollout
 from ..recordings import Demonstration
 
 if TYPE_CHECKING:
-    from ..motion import Guided
     from ..policies import Policy
     from ..recordings import Recipe
 
@@ -26,13 +26,18 @@ MOST, STEPS = 20, 1000
 """Demonstrations, and steps of each, that are run at most: seconds."""
 
 GUIDE = "'unconstrain fit --guided auto' keeps it to the goal or the cycle that was shown, from anywhere."
+GUIDE_TO = "'unconstrain fit --guided 0.1,0' with the place of its goal{} keeps it there, from anywhere."
+"""The latter where demonstrations do not show one, and perhaps a cycle."""
 
 MODELS = {"auto": "", "Affine": "So may a --model that bends: 'local', or 'auto', which tries several."}
 """What else may cure a policy of some features, by what they are called; of others :data:`ANOTHER`."""
 ANOTHER = "So may another --model: 'auto' tries several."
 
 ROUNDS = 1.5
-"""Rounds, at least, of which the last is compared with the first."""
+"""Rounds, at least, that have a pace, and of which the last is compared with the first: a bent reach may make one."""
+
+PASSING = 0.2
+"""Nearer to the middle than this share of the usual distance from it, noise turns what goes straight."""
 
 
 class Replay(NamedTuple):
@@ -41,7 +46,7 @@ class Replay(NamedTuple):
     extent: float
     """Of the roll-out, root mean square distance from its middle, over that of the demonstration."""
     pace: float
-    """Turns of the roll-out over those of the demonstration; NaN where that made less than one."""
+    """Turns of the roll-out over those of the demonstration; NaN where that made fewer than :data:`ROUNDS`."""
     last: float
     """Size of the last round of the roll-out over its first, over the same of the demonstration; NaN without two."""
     apart: float
@@ -78,7 +83,7 @@ def replayed(
     try:
         runs = replays(policy, demos, recipe, held, free)
     except DivergedError:
-        return Replayed(_advised(verdicts.of_divergence(found), found, policy), None)
+        return Replayed(_advised(verdicts.of_divergence(found), found, policy, demos), None)
     known = [one for one in runs if one.held]
     if not known:
         unknown = " Its size and pace over time: not compared, as what held these recordings is not known."
@@ -91,7 +96,8 @@ def replayed(
     alike = "" if held is not None else ", each held in the same way all the time (along a line, in a plane)"
     of = "" if len(known) == len(demos) else f"for {len(known)} of {len(demos)} demonstrations{alike}, "
     judged = verdicts.of_replays(found, extents, paces, said, lasts, of)
-    return Replayed(_advised(judged, found, policy), told, runs, verdicts.size_and_pace(extents, paces, lasts, of))
+    judged = _advised(judged, found, policy, demos)
+    return Replayed(judged, told, runs, verdicts.size_and_pace(extents, paces, lasts, of))
 
 
 def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Replayed:
@@ -102,18 +108,29 @@ def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Repl
     (plain, _, _, ran), words = replayed(found, alone, *of), guided.in_words
     mark = max(plain.mark, guided.verdict.mark, key=[*verdicts.Mark].index)
     more = f" {'Guided' if mark is plain.mark else 'But guided'}: {words}." if words else ""
-    judged = plain._replace(mark=mark, said=plain.said + more, next=plain.next.removesuffix(GUIDE).rstrip())
+    then = plain.next.partition(" 'unconstrain fit --guided")[0]  # it is
+    judged = plain._replace(mark=mark, said=plain.said + more, next=then)
     return guided._replace(verdict=judged, in_words="; guided ".join(filter(None, (ran, words))))
 
 
-def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Policy | Guided) -> verdicts.Verdict:
+def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Any, demos: Any) -> verdicts.Verdict:
     """With what cures a policy that strays, unless it was tried."""
     if judged.next == before.next:
         return judged
     features = getattr(innermost(policy), "features", None)
     model = MODELS.get(features if isinstance(features, str) else type(features).__name__, ANOTHER)
-    more = model, GUIDE if innermost(policy) is policy else ""
+    more = model, _guide(policy, demos) if innermost(policy) is policy else ""
     return judged._replace(next=" ".join(filter(None, (judged.next, *more))))
+
+
+def _guide(policy: Policy | Guided, demos: Sequence[Demonstration]) -> str:
+    """What keeps a policy to where demonstrations lead, if they show it, or to what is given."""
+    with warnings.catch_warnings(action="ignore"):
+        try:
+            Guided.goes_round(demos, policy=lambda states: np.asarray(policy(states)))  # without proposing a goal
+        except (SettingError, InvalidDataError) as error:
+            return GUIDE_TO.format(", or '--guided cycle'," if "orbit=" in str(error) else "")
+    return GUIDE
 
 
 def replays(
@@ -159,18 +176,20 @@ def _compared(done: Demonstration, run: Demonstration, plane: Array, held: bool)
     both = done.states, run.states
     size = [float(np.sqrt(one.var(axis=0).sum())) for one in both]
     turns = [_turns((one - one.mean(axis=0)) @ plane.T) for one in both]
-    pace = turns[1][-1] / turns[0][-1] if abs(turns[0][-1]) >= 1 else np.nan
+    pace = turns[1][-1] / turns[0][-1] if abs(turns[0][-1]) >= ROUNDS else np.nan
     lasting = [_lasting(one, done) for one, done in zip(both, turns, strict=True)]
     apart = cKDTree(done.states).query(run.states)[0].mean()
     return Replay(size[1] / size[0], float(pace), lasting[1] / lasting[0], float(apart), held, done, run)
 
 
 def _turns(points: Array) -> Array:
-    """How often points (T, 2) have gone round the origin, (T,)."""
+    """How often points (T, 2) have gone round the origin, (T,); what is nearer than :data:`PASSING` turns nothing."""
     if points.shape[1] < 2:
         return np.zeros(len(points))
-    angles = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
-    return np.asarray((angles - angles[0]) / (2 * np.pi))
+    away = np.linalg.norm(points, axis=1)
+    far = np.flatnonzero(away >= PASSING * np.sqrt((away**2).mean()))
+    angles = np.unwrap(np.arctan2(*points[far, ::-1].T))
+    return np.interp(np.arange(len(points)), far, (angles - angles[0]) / (2 * np.pi))
 
 
 def _lasting(states: Array, turns: Array) -> float:

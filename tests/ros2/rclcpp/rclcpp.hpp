@@ -45,7 +45,7 @@ struct Subscription {
   std::function<void(const Message &)> call;
 };
 
-using Value = std::variant<double, std::string, std::vector<std::string>>;
+using Value = std::variant<double, std::string, std::vector<std::string>, std::vector<double>>;
 
 struct Parameter {
   Value value;

@@ -20,8 +20,8 @@ LEFT = 0.05
 NOISE = 4.5
 """What moves by less than this many standard deviations of the noise stands still."""
 
-SET_OFF = 0.005
-"""Whoever sets off smoothly (least jerk) has made this share of the way after a twelfth of the time."""
+SOON = 2
+"""After a rest of some time movement is fast within this part of it: who sets off smoothly was not at rest."""
 
 SHORTEST = 10
 """Samples that a pause has at least."""
@@ -85,16 +85,29 @@ def stops(values: Array, shortest: int) -> list[tuple[int, int]]:
     Means of neighbouring thirds of so many rows are compared in units of their noise. At a turning point these are near
     each other, too, but not long before and after: there a stop is left at the usual pace.
     """
+    moved, runs, fast = _slow_runs(values, shortest, 0.5)
+    last = 1 - 2 * (shortest // 3)
+    found = [run for run in runs if _is_sudden(moved, run[0], run[1] + last, shortest, fast)]
+    return _left(found, values, LEFT * np.ptp(values, axis=0))
+
+
+def rest_at_start(values: Array, shortest: int, soon: int) -> int:
+    """Rows (T, n) at the start, so many or more, in which nothing moves, if soon after, too, all does; 0 of others."""
+    moved, runs, _ = _slow_runs(values, shortest, 0.9)  # many slow down all the way
+    stop = next((last for first, last in runs if first == 0 and last < len(values)), 0)
+    after = moved[max(stop + 1 - 2 * (shortest // 3), 0) :]
+    return stop if stop and after[: min(stop // SOON, soon)].max() > RISE * np.quantile(after, 0.9) else 0
+
+
+def _slow_runs(values: Array, shortest: int, usually: float) -> tuple[Array, list[tuple[int, int]], float]:
+    """How far means before and after each row are apart, stretches where hardly, and what is fast; none where loud."""
     if len(values) < 4 * shortest:
-        return []
+        return values[:0, 0], [], np.inf
     span = shortest // 3
     moved = np.sqrt(sum(_moved(column, span) ** 2 for column in values.T))
-    usual, noise = float(np.median(moved)), np.sqrt(values.shape[1]) + 1.0
-    if noise > LOUD * usual:
-        return []
-    runs = _stretches(moved <= max(SLOW * usual, noise), 2 * span - 1, shortest)
-    found = [run for run in runs if _is_sudden(moved, run[0], run[1] + 1 - 2 * span, shortest, RISE * usual)]
-    return _left(found, values, LEFT * np.ptp(values, axis=0))
+    usual, noise = float(np.quantile(moved, usually)), np.sqrt(values.shape[1]) + 1.0
+    runs = _stretches(moved <= max(SLOW * usual, noise), 2 * span - 1, shortest) if noise <= LOUD * usual else []
+    return moved, runs, RISE * usual
 
 
 def _is_sudden(moved: Array, first: int, last: int, least: int, fast: float) -> bool:
@@ -110,20 +123,6 @@ def _moved(column: Array, span: int) -> Array:
     moved = np.abs(means[span:] - means[:-span])
     noise = float(np.median(np.abs(np.diff(column, 3)))) / (0.6745 * np.sqrt(20.0)) * np.sqrt(2.0 / span)
     return np.asarray(moved / (max(noise, FINEST * float(np.quantile(moved, 0.9))) or 1.0))
-
-
-def rest_before(values: Array) -> int:
-    """Rows (T, n) at the start in which nothing but noise moves, 0 where these are few or all, or noise is large."""
-    shortest, rows = int(max(2 * SHORTEST, SHORTEST_SHARE * len(values))), len(values)
-    if rows < 2 * shortest:
-        return 0
-    for column in np.flatnonzero(noise_share(values) < 0.3):  # one by one: a table beside it would be as large
-        one = values[:, [column]]
-        extent, near = float(np.ptp(one)), NOISE * float(_noise(one)[0])
-        off = np.abs(one[:, 0] - np.median(one[:shortest])) > max(near, SET_OFF * extent)
-        stays = near <= 2 * LEFT * extent and _stays(one[:shortest], np.array([max(near, SET_OFF * extent)]))
-        rows = min(rows, int((off[:-1] & off[1:]).argmax()) or rows) if stays else 0
-    return rows if shortest <= rows < len(values) else 0
 
 
 def _slow(values: Array, shortest: int) -> list[tuple[int, int]]:

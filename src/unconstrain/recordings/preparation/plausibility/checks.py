@@ -12,7 +12,7 @@ from ....base.display import listed
 from ...readers.clocks import UNITS, usual
 from ...remarks import Remark
 from ...signals.orientations import TURNS, wraps
-from ...signals.stillness import is_noise, noise_share, rest_before, stops
+from ...signals.stillness import is_noise, noise_share, rest_at_start, stops
 from ..meaning import are_backwards, are_targets
 from .subject import FLIPS, GAP_INTERVALS, LEAST_ROWS, Subject
 
@@ -27,6 +27,9 @@ IRREGULAR = 0.01
 
 SHORTEST_STOP_S, STOP_ROWS = 0.3, 6
 """A stop takes so many seconds, and rows, at least: who turns a corner is slow for a shorter time."""
+
+LONGER, STANDING = (1.0, 1.5, 2.0), 1.5
+"""Multiples of that, for rest at an end, as noise hides the shorter; what trims it over the speed of noise there."""
 
 SHORTEST_PIECE = 5
 """Rows before and after a gap; fewer are a stray row at an end."""
@@ -277,11 +280,36 @@ def stop(subject: Subject) -> Remark | None:
 
 
 def rest(subject: Subject) -> Remark | None:
-    """Standing still before the start."""
-    if subject.recipe.still or not subject.moves or not (rows := rest_before(subject.clean)):
+    """Standing still before the start, and after an end that is as sudden."""
+    if subject.recipe.still or not subject.moves:
         return None
-    said = f"stands still for {subject.lasting(rows)} before it starts, learnt as rest there; still= trims it."
-    return Remark("rest", said)
+    stamps, states = subject.stamps, subject.clean
+    interval = 0.0 if stamps is None else float(np.median(np.diff(stamps)))
+    known = 0.0 < interval <= SHORTEST_STOP_S / STOP_ROWS
+    lengths = [round(share * SHORTEST_STOP_S / interval) for share in LONGER] if known else [max(20, len(states) // 10)]
+    first = max(rest_at_start(states, rows, len(states)) for rows in lengths)
+    last = max(
+        rest_at_start(states[::-1], rows, lengths[0]) for rows in lengths
+    )  # who comes to a goal slows down for longer
+    ends = (first, "before it starts"), (last, "at its end")
+    said = " and ".join(f"{subject.lasting(rows)} {where}" for rows, where in ends if rows)
+    cure = _trimmed_by(subject, interval, first, last) if said else ""
+    return Remark("rest", f"stands still for {said}, learnt as rest there; {cure}.") if said else None
+
+
+def _trimmed_by(subject: Subject, interval: float, first: int, last: int) -> str:
+    """The ``still=`` that trims so many rows at both ends, and what tells them from movement."""
+    from scipy.signal import savgol_filter  # takes half a second to import
+
+    moving, recipe = subject.actions, subject.recipe
+    if not moving.size:
+        span = max(int(recipe.window_s / (interval or np.inf)) | 1, recipe.order + 2 - recipe.order % 2)
+        moving = savgol_filter(subject.clean, span, recipe.order, deriv=1, delta=interval or 1.0, axis=0)
+    speeds = np.linalg.norm(moving, axis=1)
+    noise = np.append(speeds[: first // 2], speeds[len(speeds) - last // 2 :]).max()
+    apart = 2.0 * STANDING * noise < np.median(speeds[first : len(speeds) - last])
+    more = "" if apart else ", and movement as slow as that; with a longer window_s= noise is slower"
+    return f"still={float(f'{STANDING * noise:.2g}'):g} trims it{more}"
 
 
 def at_rest(subject: Subject) -> Remark | None:
