@@ -9,6 +9,7 @@ array([1.  , 0.5 , 0.25])
 from . import obstacles
 from .certificate import certify
 from .guided import STORED, Guided
+from .potential import Potential
 from .rollouts import rollout
 
-__all__ = ["STORED", "Guided", "certify", "obstacles", "rollout"]
+__all__ = ["STORED", "Guided", "Potential", "certify", "obstacles", "rollout"]
