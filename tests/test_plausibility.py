@@ -294,6 +294,16 @@ def test_standing_still_before_the_start_is_told_in_seconds_with_what_trims_it(n
     assert not survey(begun_late(2.0, noise), replace(recipe, still=0.02)).notes
 
 
+@pytest.mark.parametrize("window", [0.25, 4.0])
+def test_rest_up_to_the_other_end_or_in_a_window_longer_than_all_is_no_error(window):
+    rng, rest = np.random.default_rng(0), np.zeros((60, 2))
+    for then in (np.cumsum(rng.uniform(0.5, 1.0, (60, 2)), axis=0), rest + 1.0, rest):
+        states = np.vstack([rest, then]) + 1e-4 * rng.standard_normal((120, 2))
+        recording = uc.Recording(("x", "y"), states, np.arange(120) * 0.02, "w")
+        notes = survey(recording, uc.Recipe(("x", "y"), differentiate="savgol", window_s=window)).notes
+        assert ("rest" in [one.code for one in notes]) == (then is not rest)
+
+
 def halted(values, row, rows):
     """The same movement with a stop of so many rows, slowing down and setting off within five each."""
     slow = 0.5 + 0.5 * np.cos(np.linspace(0, np.pi, 5))

@@ -291,6 +291,8 @@ def rest(subject: Subject) -> Remark | None:
     last = max(
         rest_at_start(states[::-1], rows, lengths[0]) for rows in lengths
     )  # who comes to a goal slows down for longer
+    if first + last >= len(states):
+        return None
     ends = (first, "before it starts"), (last, "at its end")
     said = " and ".join(f"{subject.lasting(rows)} {where}" for rows, where in ends if rows)
     cure = _trimmed_by(subject, interval, first, last) if said else ""
@@ -304,6 +306,7 @@ def _trimmed_by(subject: Subject, interval: float, first: int, last: int) -> str
     moving, recipe = subject.actions, subject.recipe
     if not moving.size:
         span = max(int(recipe.window_s / (interval or np.inf)) | 1, recipe.order + 2 - recipe.order % 2)
+        span = min(span, len(subject.clean) - 1 | 1)  # odd
         moving = savgol_filter(subject.clean, span, recipe.order, deriv=1, delta=interval or 1.0, axis=0)
     speeds = np.linalg.norm(moving, axis=1)
     noise = np.append(speeds[: first // 2], speeds[len(speeds) - last // 2 :]).max()
