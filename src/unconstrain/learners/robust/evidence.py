@@ -92,27 +92,31 @@ def shown(samples: Samples, policy: Array, variance: float, free: Array, by_segm
     unit, parts = _residual(samples, policy, noise, time), parts_of(samples)
     seen = _seen(samples, parts, noise, time)
     consistent, as_free, free = [], [], _of_free_demonstrations(samples, free)
-    held, moved, sure = _held(samples)
-    held &= by_segments
+    held, moved, sure = _held(samples, by_segments)
     missed = _missed(samples[held], policy[held], moved[held], noise)
     for part in counted_off(range(int(parts.max()) + 1), "evidence: part"):
         rows = parts == part
         some, turned = samples[rows], np.where(held[rows], 0.0, 1.0)
         weighted, plain = (some.moments(some.actions, turned * by) for by in ((some.actions**2).sum(axis=1), 1.0))
         own = (1.0 / unit) * inconsistency(corrected(weighted, plain, noise))
-        throughout = samples[rows & held].constrained(sure[rows & held]) if held[rows].any() else 0.0 * own
-        consistent.append(own + (1.0 / missed) * throughout)
+        if held[rows].any():
+            own = own + (1.0 / missed) * samples[rows & held].constrained(sure[rows & held])
+        consistent.append(own)
         as_free.append(_as_free(some, free[rows] / (max(variance, noise) * time), noise, seen))
     error = EIGENVALUE_STANDARD_ERRORS * noise * np.sqrt(2.0 * time / np.maximum(samples.sizes, 1.0)) / unit
     return Evidence(consistent, np.stack(as_free), seen, error)
 
 
-def _held(samples: Samples) -> tuple[NDArray[np.bool_], Array, Array]:
+def _held(samples: Samples, by_segments: bool) -> tuple[NDArray[np.bool_], Array, Array]:
     """Which samples are of demonstrations that were held all the time, (N,), where these moved, and what they show.
 
     Both are (N, d, d). Noise of variance σ² turns N̂ by a mean square of ``t = σ² Σ 1 / λ`` over the eigenvalues of
     ``Σ u uᵀ``: along what was held it seems to show as much, and ``N̂ − t (I − N̂)`` shows nothing there on average.
+    None are of a policy that was not learnt by segments.
     """
+    if not by_segments:
+        nowhere = np.zeros((len(samples), samples.actions.shape[1], samples.actions.shape[1]))
+        return np.zeros(len(samples), dtype=bool), nowhere, nowhere
     noise = beyond_misfit(noise_of_each(samples.actions, samples.groups, most_noise(samples), samples.noise), samples)
     held, moved = held_throughout(samples.actions, samples.groups, noise)
     sure, d = moved.copy(), samples.actions.shape[1]

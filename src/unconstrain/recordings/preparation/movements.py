@@ -460,11 +460,11 @@ class _Moving(NamedTuple):
 
 def _velocities(piece: _Piece, recipe: Recipe, samples: int) -> _Moving:
     times, positions = piece.times, piece.states
+    if recipe.differentiate == "kalman":
+        return _Moving(*kalman_velocities(times, positions))
     interval, white = float(np.mean(np.diff(times))), white_noise(positions)
     if recipe.differentiate == "central":
         return _Moving(np.asarray(np.gradient(positions, times, axis=0, edge_order=2)), white * np.sqrt(0.5) / interval)
-    if recipe.differentiate == "kalman":
-        return _Moving(*kalman_velocities(times, positions))
     from scipy.signal import savgol_coeffs, savgol_filter  # takes half a second to import
 
     gain = np.linalg.norm(savgol_coeffs(samples, recipe.order, deriv=1, delta=interval))

@@ -288,9 +288,8 @@ def rest(subject: Subject) -> Remark | None:
     known = 0.0 < interval <= SHORTEST_STOP_S / STOP_ROWS
     lengths = [round(share * SHORTEST_STOP_S / interval) for share in LONGER] if known else [max(20, len(states) // 10)]
     first = max(rest_at_start(states, rows, len(states)) for rows in lengths)
-    last = max(
-        rest_at_start(states[::-1], rows, lengths[0]) for rows in lengths
-    )  # who comes to a goal slows down for longer
+    # Who comes to a goal slows down for longer than the shortest stop.
+    last = max(rest_at_start(states[::-1], rows, lengths[0]) for rows in lengths)
     if first + last >= len(states):
         return None
     ends = (first, "before it starts"), (last, "at its end")
