@@ -325,11 +325,25 @@ def same_recording(rng):
     return Fault(*recorded(tables, dt), "same-recording", which, None)
 
 
+def not_velocities(rng):
+    tables, dt = movements(rng, count=int(rng.integers(4, 9)))
+    actions, n = velocities(tables, dt), tables[0].shape[1]
+    way = int(rng.integers(3))
+    order, factors = np.arange(n), np.ones(n)
+    if way == 0:
+        order[[0, 1]] = [1, 0]
+    elif way == 1:
+        factors *= rng.choice([1000.0, 100.0, 0.001, 180 / np.pi])
+    else:
+        factors[rng.integers(n)] = rng.choice([-1.0, 10.0, 0.01])
+    return Fault(*recorded(tables, dt, [action[:, order] * factors for action in actions]), "not-velocities", 0, None)
+
+
 FAULTS = (
     nothing, nothing_with_actions, angle_wrap, quaternion_flip, rotation_vector_flip, seam, glitch, clock_unit,
     clock_gap, targets, mixed_units, unit_differs, pause, backwards, at_rest, all_zero, few_demonstrations, row_order,
     other_topic, clock_differs, columns_differ, clock_untold, stale, missing, refused,
-    angle_unused, same_recording,
+    angle_unused, same_recording, not_velocities,
 )  # fmt: skip
 
 

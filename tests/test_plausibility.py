@@ -575,13 +575,112 @@ def test_states_to_come_are_seen_and_said_unless_they_are_said_to_be_velocities(
     np.testing.assert_array_equal(kept.actions, TARGETS.values[:, 2:])
 
 
-def test_velocities_in_any_unit_and_changes_stay_as_they_are():
-    speed = np.gradient(TRACK, 0.02, axis=0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        for factor in (1e-3, 0.02, 1.0, 60.0, 1e3):
-            [demonstration] = prepare(commanded(factor * speed), COMMANDED)
-            np.testing.assert_array_equal(demonstration.actions, factor * speed)
+@pytest.mark.parametrize(("factor", "told"), [(1e-3, True), (0.02, False), (1.0, False), (3.0, False), (60.0, True)])
+def test_velocities_in_another_unit_are_said_and_all_stay_as_they_are(factor, told):
+    speed = np.gradient(TRACK, 0.02, axis=0)  # 0.02 times it is the change to the next sample
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        [demonstration] = prepare(commanded(factor * speed), COMMANDED)
+        prepare(commanded(factor * speed), replace(COMMANDED, action_is="velocity"))
+    np.testing.assert_array_equal(demonstration.actions, factor * speed)
+    assert [one.message.code for one in said] == ["not-velocities"] * told
+    assert not told or f"all actions are {factor:g} times the change of the states" in str(said[0].message)
+
+
+def swirls(way=lambda states, velocities: velocities, count=6):
+    """Movements that turn as they come to rest, each from its place, with actions of some kind beside."""
+    turn, every = np.array([[-1.0, -2.0, 0.0], [2.0, -1.0, 0.0], [0.0, 0.0, -0.5]]), []
+    for number in range(count):
+        at, rows = np.random.default_rng(number).uniform(0.1, 0.2, 3), []
+        for _ in range(120):
+            rows.append(at)
+            at = at + 0.02 * turn @ at
+        states = np.array(rows)
+        table = np.hstack([states, way(states, states @ turn.T)])
+        every.append(recording(table, 0.02 * np.arange(120), ("x", "y", "z", "vx", "vy", "vz")))
+    return [replace(one, name=f"d{number}") for number, one in enumerate(every)]
+
+
+@pytest.mark.parametrize(
+    ("way", "told"),
+    [
+        (lambda _, v: 1000.0 * v, "all actions are 1000 times the change of the states in the same time: take the vel"),
+        (lambda _, v: v * [1, 1, 57.2958], "'vz' is 57.3 times the change of 'z' in"),
+        (lambda _, v: v * [1, 1, -1], "'vz' is -1 times the change of 'z' in"),
+        (
+            lambda _, v: v[:, [1, 0, 2]],
+            "'vx' is the change of 'y', 'vy' is the change of 'x' in the same time: in the ",
+        ),
+        (lambda _, v: v + 0.01 * np.random.default_rng(0).standard_normal(v.shape), None),
+        (lambda _, v: np.gradient(v, 0.02, axis=0), None),  # accelerations
+        (lambda x, _: -4.0 * x, None),  # forces of a spring
+        (lambda _, v: 5.0 * v, None),  # commands of some gain
+        (lambda _, v: v * [1, 4, 0.2], None),
+        (lambda _, v: v[:, [1, 0, 2]] * [-1, 1, 1], None),  # what pushes to the side
+        (lambda x, v: 3.0 * v - 2.0 * x, None),
+    ],
+)
+def test_actions_that_go_with_the_states_by_a_unit_an_order_or_a_sign_are_told_and_others_are_not(way, told):
+    recordings = swirls(way)
+    found = [[one for one in each.warnings if one.code == "not-velocities"] for each in survey_set(recordings)]
+    assert [len(one) for one in found] == [told is not None] * 6
+    assert told is None or told in found[0][0].message
+    assert not any(codes(recordings, uc.Recipe(("x", "y", "z"), differentiate="savgol")))
+
+
+@pytest.mark.parametrize(("factor", "told"), [(1.0, False), (1000.0, True)])
+def test_columns_that_never_move_say_nothing_of_the_others(factor, told):
+    recordings = swirls(lambda _, v: factor * v)
+    flat = [replace(one, values=one.values * [1, 1, 0, 1, 1, 0] + [0, 0, 5, 0, 0, 0]) for one in recordings]
+    assert all(("not-velocities" in each) == told for each in codes(flat))
+
+
+def test_without_times_the_order_of_columns_is_told_and_no_unit():
+    def timeless(factor, *order):
+        return [replace(one, times=None) for one in swirls(lambda _, v: factor * v[:, order])]
+
+    assert not any(codes(timeless(1000.0, 0, 1, 2)))
+    [said] = survey_set(timeless(7.0, 1, 0, 2))[0].warnings
+    assert "in the order of the states they are actions=('vy', 'vx', 'vz')" in said.message
+
+
+@needs_data
+def test_actions_beside_real_movements_are_what_they_are():
+    for path in sorted((DATA / "lasa_handwriting").glob("*.mat"))[::3]:
+        strokes = loadmat(path, simplify_cells=True)["demos"]
+        for actions, factor in (("vel", 1.0), ("acc", 1.0), ("pos", 1.0), ("vel", 3.0), ("vel", 1000.0)):
+            tables = [np.vstack([one["pos"], factor * one[actions]]).T for one in strokes]
+            columns = ("x", "y", "ax", "ay")
+            recordings = [
+                uc.Recording(columns, table, np.asarray(one["t"], float), f"{number}")
+                for number, (table, one) in enumerate(zip(tables, strokes, strict=True))
+            ]
+            said = {code for each in codes(recordings, uc.Recipe(("x", "y"), ("ax", "ay"))) for code in each}
+            assert ("not-velocities" in said) == (factor == 1000.0), (path.stem, actions, factor)
+
+
+def tenfold(recordings, which=2, factor=10.0):
+    return [
+        replace(one, values=one.values * factor) if number == which else one for number, one in enumerate(recordings)
+    ]
+
+
+def test_one_demonstration_that_is_ten_times_larger_than_each_other_is_in_another_unit():
+    recordings = [replace(one, values=one.values[:, :3], columns=("x", "y", "z")) for one in swirls()]
+    recipe = uc.Recipe(("x", "y", "z"), differentiate="savgol")
+    for factor in (10.0, 0.1):
+        found = survey_set(tenfold(recordings, factor=factor), recipe)
+        [said] = [one.message for one in found[2].warnings if one.code == "unit-differs"]
+        assert said.startswith(f"is 10 times {'larger' if factor > 1 else 'smaller'} than 'd0', 'd1', 'd3', 'd4' and 1")
+        assert not any("unit-differs" in each for each in codes(tenfold(recordings, factor=factor**0.477), recipe))
+    assert not any("unit-differs" in each for each in codes(tenfold(recordings[:4]), recipe))  # of so few it may be so
+
+
+@needs_data
+def test_no_real_movement_is_in_another_unit_than_others_of_its_kind():
+    for recordings in list(of_one_kind())[::4]:
+        recipe = uc.Recipe(recordings[0].columns, differentiate="savgol")
+        assert not any("unit-differs" in each for each in codes(recordings, recipe)), recordings[0].name
 
 
 def test_files_are_learnt_from_as_their_first_recording_shows(tmp_path):

@@ -116,8 +116,8 @@ def say_surveys(surveys: Sequence[Any], needed: str, then: str) -> None:
         [
             found.name,
             str(found.samples) if found.left is None else f"{found.left} of {found.samples}",
-            number(found.duration_s, "{:.2f} s"),
-            number(found.rate_hz, "{:.1f} Hz"),
+            number(found.duration_s, "{:.2f} s" + doubted),
+            number(found.rate_hz, "{:.1f} Hz" + doubted),
             number(found.jitter, "{:.1%}"),
             "; ".join(f"{gap.length:.2f} s at {gap.start:.2f} s" for gap in found.gaps[:3])
             + (f" and {len(found.gaps) - 3} more" if len(found.gaps) > 3 else "")
@@ -126,6 +126,7 @@ def say_surveys(surveys: Sequence[Any], needed: str, then: str) -> None:
             number(found.zero_actions, "{}"),
         ]
         for found in surveys
+        for doubted in ["?" * bool({"clock-unit", "clock-differs"} & {one.code for one in found.warnings})]
     ]
     samples = "samples" if surveys[0].left is None else "left by --still"
     print_table(["demonstration", samples, "length", "rate", "jitter", "gaps", "missing", "zero actions"], rows)
@@ -212,6 +213,8 @@ def as_noted(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.
     if rest := told.get(TITLES, {}).get("rest"):
         said = f"Where {listed([*rest], 4)} stood still at an end: rest is learnt there; --still trims it."
         verdict = verdict._replace(doubt=f"{verdict.doubt} {said}".lstrip())
+    if "not-velocities" in told.get(CODES, ()):
+        return uc.evaluation.verdicts.of_units_apart(verdict, "actions are not the velocities of the states")
     return uc.evaluation.verdicts.of_units_apart(verdict) if OTHER_UNITS & {*told.get(CODES, ())} else verdict
 
 
@@ -254,6 +257,10 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
     click.echo(f"Share of the motion explained, where slow samples count less, as in the verdict: {seen}{rest}")
     for note in solution.notes:
         click.echo(note)
+    of, to = len(stream.recipe.directions), len(stream.recipe.actions or stream.recipe.directions)
+    if of not in (to, 2 * to):
+        said = f"Note: {counted(to, 'action')} for {counted(of, 'state')}: no velocities, which 'rollout' and a ROS 2 "
+        click.echo(f"{said}node need; for these, name others with --state and --action.", err=True)
     if verbose and solution.belief is not None:
         rows = sorted((one.risk, name) for name, one in solution.candidates.items())
         told = [[name, f"{risk:.4g}", uc.evaluation.diagnosis.in_words(name)] for risk, name in rows]

@@ -189,10 +189,10 @@ def of_unit(found: Verdict, times: float) -> Verdict:
     return Verdict(Mark.BAD, said, doubt=found.doubt, next="Convert them to the unit of the policy.")
 
 
-def of_units_apart(found: Verdict) -> Verdict:
-    """Add to a verdict that recordings were not all in one unit."""
-    then = "Convert the recordings that the notes name, or leave them out, and begin again."
-    return doubted(found, "recordings are not all in one unit, as the notes say")._replace(next=then)
+def of_units_apart(found: Verdict, said: str = "recordings are not all in one unit") -> Verdict:
+    """Add to a verdict that recordings were not all in one unit, or what else is said of units."""
+    then = "Do what the notes say, or leave out the recordings that they name, and begin again."
+    return doubted(found, f"{said}, as the notes say")._replace(next=then)
 
 
 def of_glitches(found: Verdict, names: str) -> Verdict:

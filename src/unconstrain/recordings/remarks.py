@@ -18,6 +18,7 @@ WARNINGS = (
     "stale",
     "missing",
     "targets-as-velocities",
+    "not-velocities",
     "mixed-units",
     "unit-differs",
     "columns-differ",

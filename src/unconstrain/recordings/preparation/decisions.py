@@ -19,7 +19,7 @@ DEGREES = re.compile(r"\s*(deg|degs|degrees?|[°º])\s*((/|per |\*|·)?\s*s(ec|e
 """How people write degrees, and degrees a second."""
 
 JOINT = re.compile(
-    r"(.*[._/ ])?(q|qpos|theta|joints?|shoulder|elbow|wrist|hip|knee|ankle)"
+    r"(.*[._/ ])?(q|j(?=[._ ]?\d)|qpos|theta|joints?|shoulder|elbow|wrist|hip|knee|ankle)"
     r"([._ ]?(left|right|[lr]|pan|lift|roll|pitch|yaw|flex|flexion|rotation|angle|joint|pos|position|\d+|\[\d+\]))*",
     re.IGNORECASE,
 )

@@ -42,7 +42,7 @@ PLACES = re.compile(
 )
 """An axis of such a thing is a position."""
 
-JOINTS = re.compile(r"(^|[._/ ])(actual_)?(q|qpos|joints?|joint_?(pos|positions?|angles?)|positions?|tcp_pose|pos)$")
+JOINTS = re.compile(r"(^|[._/ ])(actual_)?(q|j|qpos|joints?|joint_?(pos|positions?|angles?)|positions?|tcp_pose|pos)$")
 """Numbered columns of such a name are positions."""
 
 _NUMBERED = re.compile(r"(.*?)[_. \[]?(\d+)\]?")

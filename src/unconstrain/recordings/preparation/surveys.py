@@ -110,8 +110,9 @@ def survey_set(recordings: Iterable[Recording], recipe: Recipe | None = None) ->
 def _with(each: Survey, added: tuple[Remark, ...]) -> Survey:
     notes = tuple(remark for remark in added if not remark.warns)
     told = [remark for remark in added if remark.warns]
-    known = "clock-differs" in [remark.code for remark in told]  # which tells more of a clock
-    own = [remark for remark in each.warnings if remark.code != "clock-unit" or not known]
+    more = {"clock-differs": "clock-unit", "not-velocities": "reversed"}  # what each tells more of
+    known = [more.get(remark.code) for remark in told]
+    own = [remark for remark in each.warnings if remark.code not in known]
     return replace(each, warnings=once([*own, *told]), notes=each.notes + notes)
 
 

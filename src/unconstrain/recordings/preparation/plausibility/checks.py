@@ -136,7 +136,8 @@ def irregular(subject: Subject) -> Remark | None:
     typical = float(np.median(intervals)) if recipe.differentiate == "savgol" and intervals.size else 0.0
     steady = intervals[intervals <= (recipe.max_gap_s or GAP_INTERVALS * typical)]
     asked = recipe.rate is not None and abs(recipe.rate * typical - 1.0) <= IRREGULAR
-    if typical <= 0.0 or asked or (intervals < 0.0).any() or not is_irregular(steady, typical):
+    unknown = not typical or not SLOWEST < 1.0 / typical < FASTEST  # a clock in another unit, whose steps are rounded
+    if unknown or asked or (intervals < 0.0).any() or not is_irregular(steady, typical):
         return None
     said = f"time stamps are irregular, so it is resampled to its median rate of {1 / typical:.4g} Hz."
     return Remark("irregular", said)
@@ -172,7 +173,8 @@ def reversed_in_time(subject: Subject) -> Remark | None:
     if stamps is not None and len(stamps) >= LEAST_ROWS and (np.diff(stamps) < 0).all() and not subject.recipe.sort:
         return Remark("reversed", "the time stamps count down; put the rows in order with sort=True.")
     if subject.moves and are_backwards(subject.clean, subject.actions):
-        return Remark("reversed", "moves against its own actions; leave it out with leave_out=, or turn it round.")
+        said = "moves against its own actions; leave it out with leave_out=, or turn it round; where all do, take the "
+        return Remark("reversed", f"{said}velocity of the states, differentiate=, or turn the sign of the actions.")
     return None
 
 
@@ -318,7 +320,7 @@ def at_rest(subject: Subject) -> Remark | None:
     """States that change no more than noise does, all the time."""
     if not subject.moves or subject.topic is not None or not _rests(subject):
         return None
-    return Remark("at-rest", "does not move: what changes is noise. Leave it out with leave_out=.")
+    return Remark("at-rest", "moves hardly more than its noise, if at all; leave it out with leave_out=.")
 
 
 def _rests(subject: Subject) -> bool:

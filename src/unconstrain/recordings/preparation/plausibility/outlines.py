@@ -13,7 +13,8 @@ class Outline(NamedTuple):
 
     ``extent`` and ``size`` (n,) of its states, which of them are ``noisy`` (n,), and some ``places`` with the ``steps``
     made there (k, n); its ``title``, and the seconds between samples, NaN where not known. Of its ``turning`` columns,
-    angles and orientations, several numbers stand for one place.
+    angles and orientations, several numbers stand for one place. ``made`` (k, d) is what columns of ``actions`` make of
+    each step if they are velocities, per sample where the time is not known; empty where they are said not to be.
     """
 
     title: str
@@ -25,6 +26,8 @@ class Outline(NamedTuple):
     places: Array
     steps: Array
     turning: frozenset[str] = frozenset()
+    actions: tuple[str, ...] = ()
+    made: Array = np.zeros((0, 0))
 
     @property
     def push(self) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from ....base.arrays import Array
 from ....base.display import listed, percent
 from ...remarks import Remark
 from ...signals.stillness import is_noise, noise_share
+from .actions import actions_differ
 from .checks import FASTEST, SLOWEST
 from .directions import turned_round
 from .exchanged import exchanged
@@ -35,7 +36,7 @@ are in other units."""
 
 TENFOLD, ABOUT = 10.0, 1.5
 """So are several that are in the middle larger or smaller by the first factor, to within the second, and by half
-of it in all columns; of one alone that may be chance."""
+of it in all columns; and one alone that is so by half of it beside each of more than :data:`FEWEST` others."""
 
 MOST_NAMED = 4
 """Others that are named in a remark."""
@@ -62,10 +63,12 @@ def outline(subject: Subject) -> Outline | None:
     states, recipe = subject.clean, subject.recipe
     span = max(1, len(states) // POINTS)
     at = np.arange(0, len(states) - span, span)
-    intervals = np.diff(np.empty(0) if subject.stamps is None else subject.stamps)
+    intervals = np.diff(np.arange(len(states)) if subject.stamps is None else subject.stamps)
+    acts = subject.actions if recipe.action_is == "auto" else subject.actions[:, :0]
+    made = np.cumsum((acts[1:] + acts[:-1]) / 2 * intervals[:, None], axis=0)
     return Outline(
         subject.recording.title,
-        float(np.median(intervals)) if intervals.size else np.nan,
+        np.nan if subject.stamps is None else float(np.median(intervals)),
         recipe.states or (),
         np.ptp(states, axis=0),
         np.maximum(states.max(axis=0), -states.min(axis=0)),
@@ -73,6 +76,8 @@ def outline(subject: Subject) -> Outline | None:
         (states[at] + states[at + span]) / 2,
         np.zeros((0, states.shape[1])) if is_noise(states) else states[at + span] - states[at],
         frozenset({*recipe.angles, *map(subject.name, subject.wraps)}.union(*recipe.quaternions)),
+        recipe.actions or (),
+        made[at + span - 1] - np.where(at[:, None] > 0, made[at - 1], 0.0),
     )
 
 
@@ -87,7 +92,8 @@ def compare(outlines: Sequence[Outline | None]) -> list[tuple[Remark, ...]]:
         units = unit_differs(several)
         columns = columns_differ(several, {place for place, _ in units})
         against = reversed_among_others(several, {place for place, _ in (*units, *columns)})
-        each = (*clock_differs(several), *units, *smaller_than_others(several), *columns, *against, *same(several))
+        each = [*clock_differs(several), *actions_differ(several), *units, *smaller_than_others(several)]
+        each += [*columns, *against, *same(several)]
         for place, remark in each:
             remarks[known[place][0]].append(remark)
     return [tuple(each) for each in remarks]
@@ -183,10 +189,16 @@ def unit_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
     if len(outlines) < 2:
         return []
     few, most = _two_groups(outlines)
-    logs = np.array([_beside(outlines[place], [outlines[other] for other in most]) for place in few])
-    if not _are_of_a_unit(logs):
+    others = [outlines[place] for place in most]
+    logs = np.array([_beside(outlines[place], others) for place in few])
+    are = _are_of_a_unit(logs)
+    if not are and (len(few) > 1 or len(most) <= FEWEST or np.isnan(logs).all()):
         return []
     factor, size = float(np.exp(np.nanmedian(np.abs(logs)))), "larger" if np.nanmedian(logs) > 0 else "smaller"
+    if not are:
+        nearest, factor = _beside(outlines[few[0]], others, np.max if size == "larger" else np.min), TENFOLD
+        if not _are_of_a_unit(nearest[None], TENFOLD / 2, TENFOLD / 2):
+            return []
     named = [listed([outlines[place].title for place in places], MOST_NAMED) for places in (few, most)]
     than = f"{factor:.3g} times {size} than {named[1]}, as in another unit"
     if len(few) == len(most):
@@ -208,9 +220,9 @@ def _two_groups(outlines: Sequence[Outline]) -> list[list[int]]:
     return sorted([sorted(order[at:].tolist()), sorted(order[:at].tolist())], key=len)
 
 
-def _beside(one: Outline, others: Sequence[Outline]) -> Array:
+def _beside(one: Outline, others: Sequence[Outline], middle: Callable[..., Array] = np.median) -> Array:
     """Logarithms (n,) of extent or size over those of others, the smaller, 0 if they disagree, NaN where all rest."""
-    usual = [np.median([getattr(other, name) for other in others], axis=0) for name in ("extent", "size")]
+    usual = [middle([getattr(other, name) for other in others], axis=0) for name in ("extent", "size")]
     known = (one.extent > 0) & (usual[0] > 0)
     tables = zip((one.extent, one.size), usual, strict=True)
     extents, sizes = (np.log(np.divide(own, its, out=np.ones_like(own), where=known)) for own, its in tables)
@@ -218,14 +230,14 @@ def _beside(one: Outline, others: Sequence[Outline]) -> Array:
     return np.where(known, np.where(extents * sizes > 0, smaller, 0.0), np.nan)
 
 
-def _are_of_a_unit(logs: Array) -> bool:
+def _are_of_a_unit(logs: Array, other: float = OTHER_UNIT, all_by: float = LEAST) -> bool:
     """Whether some demonstrations, beside others (K, n), are of another size as by a unit."""
     if np.isnan(logs).all(axis=1).any() or not (np.nanmin(logs) > 0 or np.nanmax(logs) < 0):
         return False
     middle, least = np.nanmedian(np.abs(logs), axis=1), np.nanmin(np.abs(logs))
     if len(logs) > 1 and abs(np.median(middle) - np.log(TENFOLD)) < np.log(ABOUT) and least > np.log(TENFOLD / 2):
         return True
-    return bool(middle.min() > np.log(OTHER_UNIT) and least > np.log(LEAST))
+    return bool(middle.min() > np.log(other) and least > np.log(all_by))
 
 
 def smaller_than_others(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
