@@ -31,7 +31,7 @@ _NEXT_ONNX = "Run it on a recorded state, and compare with 'policy.predict'."
 _NEXT_ROS2 = "colcon build, then colcon test; let it run with the robot held still first."
 
 _UNIT = " Units: messages are in metres or radians, and 'scale' in {}/config makes them the policy's: 1.0 as written, "
-_UNIT += "1000.0 for millimetres."
+_UNIT += "1000.0 for millimetres, 100.0 for centimetres, 57.29578 for degrees."
 
 TARGETS = {
     ".c": Target("C source", "export_c", ("name", "single", "notes"), _NEXT_C),
@@ -69,10 +69,11 @@ def export(
     check_outputs((output, header, ros2), (policy,), force)
     learnt, notes = fitted_policy(policy), uc.storage.load_notes(policy)
     notes["units"] = uc.Recipe.from_dict(notes.get("recipe", {})).units(notes.get("units", {}))  # as recorded, if old
-    written, then = {}, _NEXT_ROS2
+    written, then = dict[str, str](), _NEXT_ROS2
     if ros2 is not None:
-        learnt.export_ros2(ros2, name, messages=messages, notes=notes)
-        written["ROS 2 package"] = ros2
+        taken = learnt.export_ros2(ros2, name, messages=messages, notes=notes)
+        written |= {"ROS 2 package": ros2, "messages": taken}
+        written["messages"] += " (--messages pose for a pose)" * (taken == "joints" and not as_json)
     if output is not None:
         target, options = TARGETS[kind], {"name": name, "single": single, "notes": notes}
         getattr(learnt, target.method)(output, **{option: options[option] for option in target.takes})
@@ -91,7 +92,7 @@ def _judged(learnt: Any, notes: dict[str, Any], ros2: str | None) -> uc.evaluati
     """Of a policy that goes to a robot, also in which unit where nobody has said it."""
     judged, units = verdict_of(learnt, notes), notes.get("units", {})
     of_states = {units.get(name) for name in uc.Recipe.from_dict(notes.get("recipe", {})).states or ("",)}
-    unit = "" if ros2 is None or of_states in ({"mm"}, {"m"}, {"rad"}) else _UNIT.format(ros2)
+    unit = "" if ros2 is None or of_states in ({"mm"}, {"cm"}, {"m"}, {"deg"}, {"rad"}) else _UNIT.format(ros2)
     far = "States far from all data, where its support is near 0."
     return judged._replace(doubt=f"{far}{unit} {judged.doubt}".rstrip())
 

@@ -96,8 +96,8 @@ class Exportable:
         messages: Messages | None = None,
         scaler: Scaler | None = None,
         notes: Mapping[str, Any] | None = None,
-    ) -> None:
-        """Write a ROS 2 package with a node around the C source, and a loop in Python.
+    ) -> Messages:
+        """Write a ROS 2 package with a node around the C source, and a loop in Python; return which messages it takes.
 
         Other parameters and errors are as in :meth:`export_c`; the name is by default that of the folder.
 
@@ -113,7 +113,7 @@ class Exportable:
             Also if actions are not velocities of the states, or states are orientations, or not the three of a pose.
         """
         form = self.closed_form(scaler)
-        export_ros2(form, self._after(scaler), folder, name, self.describe(form, notes), messages)
+        return export_ros2(form, self._after(scaler), folder, name, self.describe(form, notes), messages)
 
     def _after(self, scaler: Scaler | None) -> Callable[[ArrayLike], Array]:
         return self if scaler is None else lambda states: self(scaler.transform(np.asarray(states)))

@@ -50,14 +50,14 @@ def export_ros2(
     name: str | None,
     described: Description,
     messages: Messages | None = None,
-) -> None:
+) -> Messages:
     """Write a package with a node that takes each state to a velocity, in place of a folder that is there.
 
     Node and loop limit the speed, stop where the support of the data ends, and stop when no state comes.
     """
     package = c_name(Path(os.path.realpath(folder)).name if name is None else name).lower()
     coordinates = [bare(name)[-1:].lower() for name in described.states] == ["x", "y", "z"]
-    kind = messages or ("pose" if coordinates else "joints")
+    kind: Messages = messages or ("pose" if coordinates else "joints")
     _check(form, kind, described)
     fill = _words(package, form, described, kind)
     fill |= {"limit": repr(max(1e-9, speed_limit(form, policy, described)))} | _plane(form, fill)
@@ -73,12 +73,13 @@ def export_ros2(
             (root / place).parent.mkdir(parents=True, exist_ok=True)
             (root / place).write_text(text)
         put_folder(root, folder)
+    return kind
 
 
 def _words(package: str, form: ClosedForm, described: Description, kind: Messages) -> dict[str, str]:
     received, sent = _MESSAGES[kind]
     used = sorted({each.split("/")[0] for each in (received, sent)})
-    millimetres = bool(described.units) and all(described.units.get(column) == "mm" for column in described.states)
+    units = {described.units.get(column, "") for column in described.states}
     joints = ", ".join(map(json.dumps, described.states))
     return {
         "name": package,
@@ -96,7 +97,7 @@ def _words(package: str, form: ClosedForm, described: Description, kind: Message
         "about": "\n".join(f"- {line}" for line in described.comment()),
         "n": str(form.columns),
         "d": str(form.sizes[1]),
-        "scale": "1000.0" if millimetres else "1.0",
+        "scale": {"mm": "1000.0", "cm": "100.0", "deg": "57.29578"}.get("".join(units), "1.0"),
     }
 
 
