@@ -446,3 +446,172 @@ def test_rest_that_noise_makes_as_fast_as_movement_is_told_so(tmp_path, noise, t
     path = write(tmp_path / "r.csv", "t,x,y,z", rounds(0.6, 0.7, noise))
     said = text(call("inspect", path, "--state", "x,y,z", "--differentiate"))
     assert re.search(rf"learnt as rest there; {told}", said)
+
+
+# Units, columns and signs of actions, and of joints
+
+
+def moving(tmp_path, way=lambda u: u, count=4, names="x,y,vx,vy", of=range(4)):
+    """Strokes with velocities, in some of them changed; files."""
+    files = []
+    for k in range(count):
+        rows = stroke(k, 60)
+        velocities = np.gradient(rows[:, 1:], 0.05, axis=0)
+        table = np.hstack([rows, way(velocities) if k in of else velocities])
+        files.append(write(tmp_path / f"m{k}.csv", f"t,{names}", table))
+    return files
+
+
+@pytest.mark.parametrize(
+    ("way", "told", "then"),
+    [
+        (lambda u: 1000 * u, "all actions are 1000 times the change of the states in the same time", "--by savgol"),
+        (lambda u: u / 100, "all actions are 0.01 times the change of the states in the same time", "--by savgol"),
+        (lambda u: u * [1, 1000], "'vy' is 1000 times the change of 'y' in the same time", "--by savgol"),
+        (lambda u: u[:, ::-1], "'vx' is the change of 'y', 'vy' is the change of 'x'", "--action vy,vx"),
+    ],
+)
+def test_velocities_of_another_unit_or_column_are_told_with_the_command_that_takes_others(tmp_path, way, told, then):
+    files = moving(tmp_path, way)
+    said = text(call("inspect", *files))
+    assert "4 of 4 demonstrations not as it should be: not-velocities." in said
+    assert told in said
+    assert f" {then} -o policy.npz" in said
+    shown = call("fit", *files, *LINEAR, "-o", tmp_path / "p.npz")
+    assert shown.out[0] in "!✖"
+    assert "actions are not the velocities of the states, as the notes say" in text(shown)
+    cured = text(call("fit", *files, *then.split(), *LINEAR, "-o", tmp_path / "q.npz"))
+    assert "not-velocities" not in cured
+    assert "as the notes say" not in cured
+    assert "not-velocities" not in text(call("inspect", *files, "--action-is", "velocity"))
+
+
+@pytest.mark.parametrize("way", [lambda u: u, lambda u: 3 * u, lambda u: np.gradient(u, 0.05, axis=0)])
+def test_velocities_commands_and_accelerations_are_taken_as_they_are(tmp_path, way):
+    files = moving(tmp_path, way)
+    assert "not-velocities" not in text(call("inspect", *files))
+    assert "as the notes say" not in text(call("fit", *files, *LINEAR, "-o", tmp_path / "p.npz"))
+
+
+@pytest.mark.parametrize(("of", "every"), [(range(4), True), ([1], False)])
+def test_where_every_stroke_moves_against_its_actions_the_states_are_differentiated(tmp_path, of, every):
+    said = text(call("inspect", *moving(tmp_path, lambda u: -u, of=of)))
+    assert "reversed: 'm" in said
+    assert "where all do, take the velocity of the states, --by, or turn the sign" in said
+    assert (" --by savgol -o policy.npz" in said) == every
+
+
+def joints(tmp_path, turn, names="j1,j2,j3,j4", count=3):
+    time, rng, files = 0.02 * np.arange(100), np.random.default_rng(0), []
+    for k in range(count):
+        end = rng.uniform(-1, 1, 4) * turn
+        table = np.column_stack([time, end * np.exp(-time)[:, None] * rng.uniform(0.9, 1.1, 4)])
+        files.append(write(tmp_path / f"{names[0]}{k}.csv", f"t,{names}", table))
+    return files
+
+
+def test_numbered_joints_are_states_and_told_where_they_look_like_degrees(tmp_path):
+    said = text(call("inspect", *joints(tmp_path, 120.0)))
+    assert "looks like degrees, and are taken for radians; if they are degrees, say --degrees j1,j2,j3,j4." in said
+    assert "--degrees j1,j2,j3,j4 -o policy.npz" in said
+    assert "degrees" not in text(call("inspect", *joints(tmp_path, 1.2)))
+
+
+def test_of_a_numbered_family_all_columns_are_proposed(tmp_path):
+    said = text(call("inspect", *joints(tmp_path, 1.0, "force,a1,a2,a3")))
+    assert "--state a1,a2,a3 --differentiate" in said
+    assert "--state a,b,c --differentiate" in text(call("inspect", *joints(tmp_path, 1.0, "a,b,c,d")))
+
+
+@pytest.mark.parametrize(("typed", "meant"), [("j1-j3", "j1..j3"), ("j1 j2 j3", "j1,j2,j3"), ("j1;j2", "j1,j2")])
+def test_how_several_columns_are_written_is_told(tmp_path, typed, meant):
+    [file] = joints(tmp_path, 1.0, count=1)
+    assert f"Write {meant}." in refused("fit", file, "--state", typed, "--differentiate", "-o", tmp_path / "p.npz")
+    assert "Write" not in refused("fit", file, "--state", "j1-j9", "--differentiate", "-o", tmp_path / "p.npz")
+    assert "or j1..j7" in text(call("fit", "--help"))
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("[mm]", "1000.0"), ("[cm]", "100.0"), ("[deg]", "57.29578"), ("", "1.0")])
+def test_a_ros_2_package_tells_its_messages_and_the_scale_of_its_unit(tmp_path, unit, scale):
+    names = [f"{name} {unit}".strip() for name in "abc"]
+    options = ("--state", ",".join(names), "--by", "savgol", "--degrees", "none", *LINEAR)
+    files = joints(tmp_path, 1.0, ",".join([*names, "w"]))
+    run("fit", *files, *options, "-o", tmp_path / "p.npz")
+    said = text(call("export", tmp_path / "p.npz", "--ros2", tmp_path / "node"))
+    assert "messages: joints (--messages pose for a pose)" in said
+    assert ("100.0 for centimetres, 57.29578 for degrees" in said) == (not unit)
+    assert f"scale: {scale} " in (tmp_path / "node" / "config" / "node.yaml").read_text()
+    told = json.loads(run("export", tmp_path / "p.npz", "--ros2", tmp_path / "n", "--messages", "pose", "--json"))
+    assert told["messages"] == "pose"
+
+
+def test_one_file_in_millimetres_among_others_in_centimetres_is_named_and_did_move(tmp_path):
+    files = [write(tmp_path / f"s{k}.csv", "t,x,y", stroke(k) * [1, 0.1, 0.1]) for k in range(6)]
+    ring = np.linspace(0, 6, 40)
+    turned = np.column_stack([0.05 * np.arange(40), 15.0 * np.cos(ring), 15.0 * np.sin(ring)])
+    large = write(tmp_path / "large.csv", "t,x,y", turned * [1, 10, 10])
+    said = text(call("inspect", *files, large))
+    assert "unit-differs: 'large', column 'x': is 10 times larger than 's0', 's1'" in said
+    assert "--leave-out large -o policy.npz" in said
+    assert "unit-differs" not in text(call("inspect", *files, write(tmp_path / "own.csv", "t,x,y", turned)))
+    run("fit", *files, "--model", "cubic", "--learner", "direct", "-o", tmp_path / "p.npz")
+    shown = text(call("score", tmp_path / "p.npz", large))
+    assert "learnt far from most of these states: another task, or other units?" in shown
+    assert "hardly moved" not in shown
+
+
+def test_what_moves_hardly_more_than_its_noise_is_not_said_to_stand_still(tmp_path):
+    rows = stroke(0)
+    rows[:, 1:] = 100.0 + np.random.default_rng(0).standard_normal((40, 2)) + np.linspace(0, 1, 40)[:, None]
+    said = text(call("inspect", write(tmp_path / "still.csv", "t,x,y", rows), *READ))
+    assert "at-rest: 'still': moves hardly more than its noise, if at all; leave it out with --leave-out." in said
+
+
+def test_fewer_actions_than_states_are_noted_by_fit(tmp_path):
+    files = moving(tmp_path)
+    some = ("--state", "x,y", "--action", "vx", *LINEAR, "-o", tmp_path / "p.npz")
+    less = "Note: 1 action for 3 states: no velocities, which 'rollout' and a ROS 2 node need"
+    assert less in text(call("fit", *files, *some, "--force", "--state", "x,y,vy"))
+    assert "no velocities" not in text(call("fit", *files, *some, "--force"))  # such as accelerations of half of them
+    assert "no velocities" not in text(call("fit", *files, *some, "--force", "--action", "vx,vy"))
+
+
+def test_stamps_in_milliseconds_are_marked_and_their_rounding_is_no_other_fault(tmp_path):
+    for k in range(3):
+        rows = stroke(k)
+        rows[:, 0] = np.round(np.arange(40) * 1000 / 60.0)
+        write(tmp_path / f"s{k}.csv", "t,x,y", rows)
+    said = run("inspect", tmp_path, *READ)
+    assert "clock-unit" in said
+    assert re.search(r"s0 +40 +650\.00 s\? +0\.1 Hz\? ", said)
+    assert "irregular" not in said
+    said = run("inspect", tmp_path, *READ, "--time-unit", "ms")
+    assert re.search(r"s0 +40 +0\.65 s +58\.8 Hz ", said)
+
+
+# What is to be written
+
+
+def test_an_output_that_is_there_and_a_file_that_is_not_are_told_together(tmp_path):
+    [file] = moving(tmp_path, count=1)
+    there = write(tmp_path / "p.npz", "", [])
+    said = refused("fit", file, tmp_path / "lost.csv", "-o", there)
+    assert (
+        said
+        == f"{there}: is there; give another name, or --force to replace it. And {tmp_path}/lost.csv: no such file."
+    )
+    assert refused("fit", file, "-o", there).endswith("or --force to replace it.")
+
+
+@pytest.mark.parametrize("name", ["q.npz.gz", "q.gz"])
+def test_a_name_with_two_suffixes_is_corrected_to_one(tmp_path, name):
+    [file] = moving(tmp_path, count=1)
+    assert refused("fit", file, "-o", tmp_path / name).endswith(f"name it {tmp_path}/q.npz.")
+
+
+@pytest.mark.parametrize("name", ["p.pkl", "p.PICKLE", "p.joblib"])
+def test_nothing_is_saved_under_the_name_of_a_pickle(tmp_path, name):
+    policy = uc.ParametricPolicy(uc.Affine(), "direct").fit([[0.0], [1.0]], [[0.0], [2.0]])
+    with pytest.raises(uc.UnconstrainError, match=r"nothing here writes pickles, .*; name it \.npz"):
+        uc.save(policy, tmp_path / name)
+    assert not (tmp_path / name).exists()

@@ -121,8 +121,8 @@ def save(
     Raises
     ------
     ModelFileError
-        If part of the policy is of a class that is not known here, or the
-        place cannot be written to.
+        If part of the policy is of a class that is not known here, the file is called as a pickle, or the place cannot
+        be written to.
     InvalidDataError
         If what was learnt is not finite.
 
@@ -133,6 +133,8 @@ def save(
     >>> uc.storage.load_notes("policy.npz")
     {'of': 'Monday'}
     """
+    if Path(path).suffix.lower() in files.PICKLES:
+        raise ModelFileError(f"{path}: nothing here writes pickles, which run code when opened; name it .npz.")
     for learnt in ("solution_", "choice_"):
         if hasattr(policy, learnt):
             getattr(policy, learnt).checked()

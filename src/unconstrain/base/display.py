@@ -96,10 +96,13 @@ def listed(names: Sequence[str], most: int = 30) -> str:
     return ", ".join(names[:most]) + more
 
 
-def meant(asked: Iterable[str], known: Iterable[str]) -> str:
+def meant(asked: Sequence[str], known: Iterable[str]) -> str:
     """A question after what somebody may have meant by names that are none of the known; empty where none is near."""
     plain = {name.casefold(): name for name in reversed(list(known))}
     close = (get_close_matches(name.casefold(), plain, n=2, cutoff=0.7) for name in asked)
+    for mark, apart in (("..", r"\s*[-–:]\s*"), (",", r"[\s;]+")):
+        if several := [parts for name in asked if {*(parts := re.split(apart, name))} <= {*known} and parts[1:]]:
+            return f" Write {mark.join(several[0])}."
     near = dict.fromkeys(plain[found] for each in close for found in each)
     return f" Did you mean {' or '.join(map(repr, near))}?" if near else ""
 

@@ -17,6 +17,7 @@ from .errors import UnconstrainError, WriteError
 
 PACKINGS = (".gz", ".bz2", ".xz")
 """Suffixes of files that are packed."""
+PICKLES = (".pkl", ".pickle", ".joblib")
 
 _LOCKS = importlib.import_module("fcntl") if os.name == "posix" else None
 _UNNAMED = getattr(os, "O_TMPFILE", 0) if Path("/proc/self/fd").is_dir() else 0

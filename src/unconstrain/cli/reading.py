@@ -22,7 +22,7 @@ from ..base.files import stem
 from .progress import Progress
 
 MOST_GUESSED = 3
-"""Columns, at most, that are proposed as states where their names say nothing."""
+"""Columns, at most, that are proposed as states where their names say nothing, not even by numbers."""
 
 
 def names(text: str) -> tuple[str, ...]:
@@ -58,7 +58,9 @@ def of_words(name: str, words: str, told: str, default: str | None = None) -> Ca
 
 CURES = (
     click.option("--angle", type=names, help="State columns that are angles, such as roll,yaw."),
-    click.option("--degrees", type=names, help="Columns in degrees, by default as their units or jumps say; or none."),
+    click.option(
+        "--degrees", type=names, help="Columns in degrees; by default if a unit, or jumps of --angle, say it."
+    ),
     click.option(
         "--quaternion",
         "quaternions",
@@ -102,7 +104,7 @@ CURES = (
 
 READING = (
     click.argument("files", nargs=-1, required=True, metavar="FILE..."),
-    click.option("--state", type=names, help="Columns that make the state, such as x,y,z."),
+    click.option("--state", type=names, help="Columns that make the state, such as x,y,z or j1..j7."),
     click.option("--action", type=names, help="Columns that make the action, such as vx,vy,vz."),
     click.option("--differentiate", is_flag=True, help="Take the velocity of the state as the action."),
     of_words("--by", "savgol kalman central", "How to differentiate, savgol by default; implies --differentiate."),
@@ -301,7 +303,10 @@ def likely_states(columns: Sequence[str]) -> tuple[str, ...]:
     for axes in ("xyz", "xy"):
         if axes in ends:
             return tuple(columns[ends.index(axes) :][: len(axes)])
-    return tuple(columns[:MOST_GUESSED])
+    heads = [bare(name).rstrip("0123456789") for name in columns]
+    numbered = next((head for head in heads if heads.count(head) > 1 and head not in ("", "column")), None)
+    family = tuple(name for name, head in zip(columns, heads, strict=True) if head == numbered)
+    return family or tuple(columns[:MOST_GUESSED])
 
 
 def typed(*without: str) -> list[str]:

@@ -52,7 +52,7 @@ def score(
     states = uc.stack(demonstrations).states
     held = held_of(plane, constraint, recipe, states, learnt.n_outputs_, "one for each action")
     if 2 * (support_of(learnt, states) < uc.models.SUPPORTED).sum() > len(states):
-        click.echo(f"Note: {policy}: learnt far from most of these states: are they of another task?", err=True)
+        click.echo(f"Note: {policy}: learnt far from most of these states: another task, or other units?", err=True)
     with shown("scoring"):
         short = [one.name for one in demonstrations if len(one) < LEAST]
         demonstrations, still = _moved(moving, _long_enough(demonstrations))
@@ -109,6 +109,7 @@ def _moved(moving: Any, demonstrations: list[uc.Demonstration]) -> tuple[list[uc
     """Those that move, or all where none does; and the names of the others, which have no score."""
     poor = [one for one in demonstrations if explained(moving, [one]) < -1]
     few = uc.evaluation.verdicts.SMALL**2
+    poor = [one for one in poor if support_of(innermost(moving), one.states).mean() > uc.models.SUPPORTED]
     rest = [one.name for one in poor if (one.actions**2).sum() < few * (moving(one.states) ** 2).sum()]
     if rest:
         click.echo(f"Note: {listed(rest, 4)} hardly moved, beside what the policy does there: no score.", err=True)

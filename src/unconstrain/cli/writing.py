@@ -9,9 +9,8 @@ from pathlib import Path
 import click
 
 from ..base.errors import SettingError
-from ..base.files import check
+from ..base.files import PICKLES, check
 
-PICKLES = (".pkl", ".pickle", ".joblib")
 NEEDED: dict[str, tuple[str, tuple[str, ...]]] = {
     ".html": ("viz", ("jinja2", "matplotlib")),
     ".onnx": ("onnx", ("onnx",)),
@@ -53,7 +52,8 @@ def check_outputs(outputs: Iterable[str | None], inputs: Iterable[str | Path | N
         if not path.is_dir():
             check(path)
         if path.exists() and not force:
-            raise SettingError(f"{path}: is there; give another name, or --force to replace it.")
+            lost = "".join(f" And {one}: no such file." for one in read if not one.exists())
+            raise SettingError(f"{path}: is there; give another name, or --force to replace it.{lost}")
         _check_extra(path)
         before.append(path)
 
@@ -70,7 +70,8 @@ def _check_extra(path: Path) -> None:
 def check_name(output: str) -> None:
     """Refuse to write an archive of arrays under a name that says something else."""
     if Path(output).suffix.lower() not in ("", ".npz"):
-        raise SettingError(f"{output}: what is learnt is written as .npz; name it {Path(output).with_suffix('.npz')}.")
+        better = Path(output.removesuffix(Path(output).suffix)).with_suffix(".npz")
+        raise SettingError(f"{output}: what is learnt is written as .npz; name it {better}.")
 
 
 def _overlap(output: Path, read: Path) -> bool:
