@@ -72,8 +72,8 @@ def export(
     written, then = dict[str, str](), _NEXT_ROS2
     if ros2 is not None:
         taken = learnt.export_ros2(ros2, name, messages=messages, notes=notes)
-        written |= {"ROS 2 package": ros2, "messages": taken}
-        written["messages"] += " (--messages pose for a pose)" * (taken == "joints" and not as_json)
+        other = " (--messages pose for a pose)" * (taken == "joints" and messages is None and not as_json)
+        written |= {"messages": f"{taken}{other}", "ROS 2 package": ros2}
     if output is not None:
         target, options = TARGETS[kind], {"name": name, "single": single, "notes": notes}
         getattr(learnt, target.method)(output, **{option: options[option] for option in target.takes})
