@@ -71,8 +71,10 @@ from .constants import (
     COMPARED_STATES,
     FAR_MORE_CONSISTENT,
     LEAST_DEMONSTRATIONS,
+    LEAST_HIDDEN,
     LEAST_MISFIT,
     MORE_CONSISTENT,
+    MOST_HIDDEN,
     MOST_VARIANCE,
     MOST_VARIANCE_TO_LOSS,
     NEGLIGIBLE_LOSS,
@@ -244,15 +246,23 @@ class Comparison:
         centred = refits - refits.mean(axis=1, keepdims=True)
         bias = np.zeros(len(own))
         for k, j in combinations(range(len(own)), 2):
-            shown = [one for one, by in ((k, j), (j, k)) if self._may_show(by, one)]
+            shown = [(one, by) for one, by in ((k, j), (j, k)) if self._may_show(by, one)]
             if shown:
                 apart, variance = float(((own[k] - own[j]) ** 2).sum()), _jackknife(centred[k] - centred[j])
-                if apart > variance:
-                    bias[shown] = np.maximum(bias[shown], apart - SHARE_OF_JACKKNIFE * variance)
+                for one, by in shown if apart > variance else ():
+                    bias[one] = max(bias[one], self._shown(by, one, apart - SHARE_OF_JACKKNIFE * variance))
         return bias
 
+    def shows(self, one: str, other: str) -> bool:
+        """Whether a candidate has less bias than another and shows it, beyond their own variances."""
+        names = [each.name for each in self._candidates]
+        by, of, own = names.index(one), names.index(other), self._predictions[0]
+        found = self._shown(by, of, float(((own[by] - own[of]) ** 2).sum())) if self._may_show(by, of) else 0.0
+        less_biased = self._candidates[by].softness < self._candidates[of].softness
+        return less_biased and found > self._variance[by] + self._variance[of]
+
     def _may_show(self, one: int, other: int) -> bool:
-        """Whether the first has less bias than the second, or as little as any, is stable, and not refuted by it.
+        """Whether the first has less bias than the second, or as little as any, and is stable.
 
         Or is more consistent by a tenth, however soft both are. Whoever knows more of the constraints than the second
         was compared before, see :attr:`as_consistent`.
@@ -264,7 +274,18 @@ class Comparison:
         less_biased = mine < its or mine == its <= 0.0
         most = MOST_VARIANCE * self._samples.energy if more_consistent and less_biased else MOST_VARIANCE_TO_LOSS * loss
         more_consistent &= its >= 0.0 and loss > MORE_CONSISTENT * self._losses[one].sum()
-        return bool((less_biased or more_consistent) and self._variance[one] < most and not self._refuted[one, other])
+        return bool((less_biased or more_consistent) and self._variance[one] < most)
+
+    def _shown(self, one: int, other: int, apart: float) -> float:
+        """What the first shows of the second's bias, of so large a squared distance: the rest may be its own error.
+
+        Each is wrong by a multiple of what it misses more along the motion than the other.
+        """
+        mine, its = self._candidates[one].softness, self._candidates[other].softness
+        missed, of_other = self._losses[one].sum(), self._losses[other].sum()
+        if mine < its or mine == its <= 0.0:
+            return max(apart - MOST_HIDDEN * (missed - of_other), 0.0) if self._refuted[one, other] else apart
+        return min(apart, LEAST_HIDDEN * (of_other - missed))
 
     @cached_property
     def _refuted(self) -> NDArray[np.bool_]:
