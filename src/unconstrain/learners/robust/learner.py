@@ -320,8 +320,8 @@ class Robust(_Maximising):
         likely, mixture = self._maximised(samples, training, corrected)
         if 1.0 - mixture[-1] > LEAST_INFORMATIVE and not hides_sphere(likely.variance, samples):
             free = samples.counts * free_probability(samples, samples.predict(likely.weights), likely.variance, mixture)
-            held = held_throughout(*each)[0]
-            learnt.append(replace(likely, softness=np.inf) if 2.0 * (free @ held) > free.sum() else likely)
+            unshown = 2.0 * float(free @ held_throughout(*each)[0]) > free.sum()
+            learnt.append(replace(likely, softness=np.inf) if unshown else likely)
         least = min(most, corrected.variance)
         found = Comparison(learnt, np.minimum(noise, least), samples)
         if self.jacobian is None:
@@ -358,7 +358,8 @@ class Robust(_Maximising):
             views[name] = held_out_together(training.samples.counted)
             if _trivial(views[name]):
                 break
-            best[name] = replace(Robust().compared(views[name], training).best, name=name)
+            one = Robust().compared(views[name], training).best
+            best[name] = replace(one, name=name, softness=np.inf if one.softness >= 1.0 else 0.0)
             found = _compared(best, views)
             if name == usual:
                 best = {one: best[one] for one in (*_simplest(found, list(best)), name)}

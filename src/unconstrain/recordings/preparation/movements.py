@@ -432,7 +432,7 @@ def _long_enough(pieces: list[_Piece], needed: int, name: str) -> tuple[list[_Pi
 
 
 def _split(piece: _Piece, recipe: Recipe) -> list[_Piece]:
-    """Cut at gaps, at seams and at both ends of pauses, as the recipe says, but for pauses and rest before the start."""
+    """Cut at gaps, at seams and around pauses, as the recipe says; without pauses and rest before the start."""
     cuts = set((np.flatnonzero(np.diff(piece.times) > _longest(piece.times, recipe.max_gap_s)) + 1).tolist())
     if recipe.seams == "cut":
         cuts |= set(seams(piece.states))
