@@ -359,7 +359,8 @@ class Robust(_Maximising):
             if _trivial(views[name]):
                 break
             one = Robust().compared(views[name], training).best
-            best[name] = replace(one, name=name, softness=np.inf if one.softness >= 1.0 else 0.0)
+            soft = np.inf if one.softness >= 1.0 else 0.0
+            best[name] = replace(one, name=name, softness=soft, by_segments=False)
             found = _compared(best, views)
             if name == usual:
                 best = {one: best[one] for one in (*_simplest(found, list(best)), name)}
