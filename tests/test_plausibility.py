@@ -284,12 +284,19 @@ def begun_late(seconds, noise=2e-4, rate=50.0):
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3])
-def test_standing_still_before_the_start_is_told_in_seconds_with_what_trims_it(noise):
-    recipe = uc.Recipe(("x", "y"), differentiate="savgol")
-    [told] = [one for one in survey(begun_late(2.0, noise), recipe).notes if one.code == "rest"]
-    found = re.match(r"stands still for \d+ of 250 rows \((\S+) s\) before it starts, learnt as rest", told.message)
-    assert 1.9 < float(found[1]) < 2.5
-    assert "still=" in told.message
+def test_standing_still_before_the_start_is_left_out_and_told_in_seconds(noise):
+    recipe, recording = uc.Recipe(("x", "y"), differentiate="savgol"), begun_late(2.0, noise)
+    kept = replace(recipe, pauses="keep")
+    for some, done in ((recipe, r"left out \(pauses='keep'\)\."), (kept, "learnt as rest there; still=")):
+        [told] = [one for one in survey(recording, some).notes if one.code == "rest"]
+        found = re.match(rf"stands still for \d+ of 250 rows \((\S+) s\) before it starts, {done}", told.message)
+        assert 1.9 < float(found[1]) < 2.5
+    with pytest.warns(PreparationWarning, match="left out"):
+        begun = uc.prepare([recording], recipe)[0].times[0]
+    assert begun == pytest.approx(float(found[1]), abs=0.03)  # the stamps stay
+    with pytest.warns(PreparationWarning, match="learnt as rest there"):
+        assert uc.prepare([recording], kept)[0].times[0] == 0.0
+    assert uc.prepare([begun_late(0.0, noise)], recipe)[0].times[0] == 0.0
     assert not survey(begun_late(0.0, noise), recipe).notes
     assert not survey(begun_late(2.0, noise), replace(recipe, still=0.02)).notes
 

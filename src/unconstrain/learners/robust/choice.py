@@ -17,8 +17,9 @@ exactly, so differences aside from the action that are less than the least
 misfit do not count. Where N̂ is one line, û is along it, also of samples at
 rest. Where each of few demonstrations is needed, policies by segments are
 judged by :mod:`.agreement`. variance_k is the jackknife's, from the policies
-learnt without each fold. bias_k compares the candidate with others of less
-bias, j, as Goldenshluger and Lepski do (*Annals of Statistics* 39(3), 2011):
+learnt without each fold, and half of it where they are learnt by segments.
+bias_k compares the candidate with others of less bias, j, as Goldenshluger and
+Lepski do (*Annals of Statistics* 39(3), 2011):
 
     bias_k = max_j E ‖π̃_k − π̃_j‖² − half the variance of π̃_k − π̃_j
 
@@ -29,19 +30,20 @@ Softened hybrids (eq. 6 with ``E_i + s E_2``) have the less bias the smaller
 their softness s; s is infinite for direct regression, and that of their prior
 for learners that minimise another error of consistency beside a prior of the
 standard risk: zero if it has the information of one sample altogether. The
-likelihood takes samples for free that are near to the policy. If every
-demonstration was held all the time, nothing shows that they were, and it is
-as soft as direct regression; otherwise its softness is zero. Whoever knows the
-Jacobian of the constraints has less bias than all, and a softness of −1. A
-candidate j that is less consistent than k where held out, along the actions,
-shows no bias of k: consistency is what it was learnt by, so it fits chance.
-Nor does one whose own variance is many times the motion: where nothing was
-constrained, hard hybrids follow rounding. One whose variance is many times
-what k misses along the actions shows k's bias only if it is the more
-consistent. One that is more consistent by a tenth, beyond chance, shows k's
-bias whatever their softness: held-out motion has said that it is nearer to the
-policy. Whoever knows the Jacobian is a candidate only if it is as
-consistent as the best of the others, and is compared no more.
+likelihood takes samples for free that are near to the policy. If most of these
+were held in the same way all the time, as far as can be seen, nothing shows
+that they were free, and it is as soft as direct regression; otherwise its
+softness is zero. Whoever knows the Jacobian of the constraints has less bias
+than all, and a softness of −1; it is a candidate only if it is as consistent
+as the best of the others, and is compared no more.
+
+Nobody shows k's bias whose own variance is many times the motion: where nothing
+was constrained, hard hybrids follow rounding. One whose variance is many times
+what k misses along the actions shows it only if it is the more consistent. One
+that is less consistent than k where held out may be wrong itself, by up to a
+hundred times what it misses more: it shows what is beyond that, and nothing if
+it is far less consistent. And one that is more consistent by a tenth shows up
+to ten times what k misses more, however soft both are.
 
 Residuals have the variance ``‖π‖² (σ² / ‖u‖² + κ²)`` under any constraint:
 noise of variance σ² turns the direction of a slow action, and people vary by
@@ -71,8 +73,10 @@ from .constants import (
     COMPARED_STATES,
     FAR_MORE_CONSISTENT,
     LEAST_DEMONSTRATIONS,
+    LEAST_HIDDEN,
     LEAST_MISFIT,
     MORE_CONSISTENT,
+    MOST_HIDDEN,
     MOST_VARIANCE,
     MOST_VARIANCE_TO_LOSS,
     NEGLIGIBLE_LOSS,
@@ -131,7 +135,7 @@ class Comparison:
         best = int(self.risks.argmin())
         if self._candidates[best].softness <= 0.0:
             return self._candidates[best]
-        near = np.flatnonzero(self.risks <= self.risks[best] + TIED * _gaps(self._losses)[1][:, best])
+        near = np.flatnonzero(self.risks <= self.risks[best] + TIED * self._gaps[1][:, best])
         return max((self._candidates[k] for k in near.tolist()), key=lambda one: one.softness)
 
     @property
@@ -148,8 +152,16 @@ class Comparison:
     def refutes(self, one: str, other: str) -> bool:
         """Whether a candidate is far more consistent than another where held out, and beyond chance."""
         names = [each.name for each in self._candidates]
-        at, (gap, error), loss = (names.index(other), names.index(one)), _gaps(self._losses), self._losses.sum(axis=1)
-        return bool(gap[at] > REFUTED * error[at] and loss[at[0]] > FAR_MORE_CONSISTENT * loss[at[1]])
+        return self._far_less_consistent(names.index(other), names.index(one))
+
+    def shows(self, one: str, other: str) -> bool:
+        """Whether a candidate has less bias than another and shows it, beyond their own variances."""
+        names = [each.name for each in self._candidates]
+        by, of, own = names.index(one), names.index(other), self._predictions[0]
+        if self._candidates[by].softness >= self._candidates[of].softness or not self._may_show(by, of):
+            return False
+        found = self._shown(by, of, float(((own[by] - own[of]) ** 2).sum()))
+        return found > float(self._variance[by] + self._variance[of])
 
     @cached_property
     def risks(self) -> Array:
@@ -171,6 +183,11 @@ class Comparison:
         aside[:, held] = np.vecdot(off, off) - expected - self._along[:, held]
         along, aside = (each @ self._reliable / self._reliable.sum() for each in (self._along, aside))
         return along, aside
+
+    @cached_property
+    def _gaps(self) -> tuple[Array, Array]:
+        """By how much each candidate's loss is above each other's, and its standard error, paired; each (K, K)."""
+        return _gaps(self._losses)
 
     @cached_property
     def _losses(self) -> Array:
@@ -232,10 +249,11 @@ class Comparison:
 
     @cached_property
     def _variance(self) -> Array:
-        """Jackknife variance of what motion does not show, shape (K,)."""
+        """Variance of what motion does not show, shape (K,), by the jackknife: a share of it for those by segments."""
         found = [_jackknife(refits - own) for own, refits in zip(*self._predictions, strict=True)]
-        known = zip(self._candidates, found, strict=True)
-        return np.array([own if one.spread is None else one.spread for one, own in known])
+        share = [SHARE_OF_JACKKNIFE if one.by_segments else 1.0 for one in self._candidates]
+        known = zip(self._candidates, share, found, strict=True)
+        return np.array([part * own if one.spread is None else one.spread for one, part, own in known])
 
     @cached_property
     def _bias(self) -> Array:
@@ -244,15 +262,15 @@ class Comparison:
         centred = refits - refits.mean(axis=1, keepdims=True)
         bias = np.zeros(len(own))
         for k, j in combinations(range(len(own)), 2):
-            shown = [one for one, by in ((k, j), (j, k)) if self._may_show(by, one)]
+            shown = [(one, by) for one, by in ((k, j), (j, k)) if self._may_show(by, one)]
             if shown:
                 apart, variance = float(((own[k] - own[j]) ** 2).sum()), _jackknife(centred[k] - centred[j])
-                if apart > variance:
-                    bias[shown] = np.maximum(bias[shown], apart - SHARE_OF_JACKKNIFE * variance)
+                for one, by in shown if apart > variance else ():
+                    bias[one] = max(bias[one], self._shown(by, one, apart - SHARE_OF_JACKKNIFE * variance))
         return bias
 
     def _may_show(self, one: int, other: int) -> bool:
-        """Whether the first has less bias than the second, or as little as any, is stable, and not refuted by it.
+        """Whether the first has less bias than the second, or as little as any, and is stable.
 
         Or is more consistent by a tenth, however soft both are. Whoever knows more of the constraints than the second
         was compared before, see :attr:`as_consistent`.
@@ -261,10 +279,28 @@ class Comparison:
         if mine < 0.0 <= its:
             return True
         more_consistent, loss = self._refuted[other, one], self._losses[other].sum()
-        less_biased = mine < its or mine == its <= 0.0
+        less_biased = mine <= its
         most = MOST_VARIANCE * self._samples.energy if more_consistent and less_biased else MOST_VARIANCE_TO_LOSS * loss
         more_consistent &= its >= 0.0 and loss > MORE_CONSISTENT * self._losses[one].sum()
-        return bool((less_biased or more_consistent) and self._variance[one] < most and not self._refuted[one, other])
+        return bool((less_biased or more_consistent) and self._variance[one] < most)
+
+    def _shown(self, one: int, other: int, apart: float) -> float:
+        """What the first shows of the second's bias, of so large a squared distance: the rest may be its own error.
+
+        Each is wrong by a multiple of what it misses more along the motion than the other.
+        """
+        gap, error = (each[one, other] for each in self._gaps)
+        if self._candidates[one].softness > self._candidates[other].softness:
+            return min(apart, -LEAST_HIDDEN * gap)
+        if self._far_less_consistent(one, other):
+            return 0.0
+        chance = BEYOND_CHANCE * error if self._candidates[one].by_segments else 0.0
+        return max(apart - MOST_HIDDEN * max(gap - chance, 0.0), 0.0) if self._refuted[one, other] else apart
+
+    def _far_less_consistent(self, one: int, other: int) -> bool:
+        """Whether the first candidate misses far more than the second where held out, and beyond chance."""
+        gap, error = (each[one, other] for each in self._gaps)
+        return bool(gap > REFUTED * error and self._losses[one].sum() > FAR_MORE_CONSISTENT * self._losses[other].sum())
 
     @cached_property
     def _refuted(self) -> NDArray[np.bool_]:

@@ -28,7 +28,7 @@ from .consistent import by_segments, noise_corrected
 from .constants import LEAST_EXPLAINED, LEAST_INFORMATIVE, LEAST_MISFIT, LONG
 from .held_out import held_out_together
 from .kinematics import Jacobian, with_jacobian
-from .likelihood import maximise
+from .likelihood import free_probability, maximise
 from .noise import beyond_misfit, hides_sphere, most_noise, noise_of_each
 from .posterior import Posterior
 from .segments import found_segments, held_throughout, projections_of
@@ -319,7 +319,9 @@ class Robust(_Maximising):
             learnt.append(by_segments(samples, projections))
         likely, mixture = self._maximised(samples, training, corrected)
         if 1.0 - mixture[-1] > LEAST_INFORMATIVE and not hides_sphere(likely.variance, samples):
-            learnt.append(replace(likely, softness=np.inf) if held_throughout(*each)[0].all() else likely)
+            free = samples.counts * free_probability(samples, samples.predict(likely.weights), likely.variance, mixture)
+            unshown = 2.0 * float(free @ held_throughout(*each)[0]) > free.sum()
+            learnt.append(replace(likely, softness=np.inf) if unshown else likely)
         least = min(most, corrected.variance)
         found = Comparison(learnt, np.minimum(noise, least), samples)
         if self.jacobian is None:
@@ -356,7 +358,9 @@ class Robust(_Maximising):
             views[name] = held_out_together(training.samples.counted)
             if _trivial(views[name]):
                 break
-            best[name] = replace(Robust().compared(views[name], training).best, name=name, softness=0.0)
+            one = Robust().compared(views[name], training).best
+            soft = np.inf if one.softness >= 1.0 else 0.0
+            best[name] = replace(one, name=name, softness=soft, by_segments=False)
             found = _compared(best, views)
             if name == usual:
                 best = {one: best[one] for one in (*_simplest(found, list(best)), name)}
@@ -370,10 +374,11 @@ class Robust(_Maximising):
 
 
 def _simplest(found: Comparison, names: Sequence[str]) -> list[str]:
-    """Of models that refute the last: the first that none of the others refutes, if any."""
+    """Of models that refute the last, or show its bias: the first that none of the others refutes, if any."""
     kept: list[str] = []
     for one in names[:-1]:
-        if found.refutes(one, names[-1]) and (not kept or found.refutes(one, kept[0])):
+        better = found.refutes(one, names[-1]) or found.shows(one, names[-1])
+        if better and (not kept or found.refutes(one, kept[0])):
             kept = [one]
     return kept
 

@@ -26,6 +26,12 @@ SOON = 2
 SHORTEST = 10
 """Samples that a pause has at least."""
 
+SHORTEST_STOP_S, STOP_ROWS = 0.3, 6
+"""A stop takes so many seconds, and rows, at least: who turns a corner is slow for a shorter time."""
+
+LONGER = (1.0, 1.5, 2.0)
+"""Multiples of that, for rest at an end, as noise hides the shorter."""
+
 LOUD, RISE, FINEST = 0.25, 0.7, 0.02
 """A stop is seen where noise is below the first share of usual movement, and begins and ends at the second share, near
 it. Noise counts as the third share at least.
@@ -91,7 +97,24 @@ def stops(values: Array, shortest: int) -> list[tuple[int, int]]:
     return _left(found, values, LEFT * np.ptp(values, axis=0))
 
 
-def rest_at_start(values: Array, shortest: int, soon: int) -> int:
+def rest_at_ends(values: Array, interval: float = 0.0) -> tuple[int, int]:
+    """Rows (T, n) at the start and at the end in which nothing moves, where movement starts, or ends, as suddenly.
+
+    Parameters
+    ----------
+    values : ndarray, shape (T, n)
+    interval : float
+        Seconds between rows; 0 where it is not known.
+    """
+    known = 0.0 < interval <= SHORTEST_STOP_S / STOP_ROWS
+    lengths = [round(share * SHORTEST_STOP_S / interval) for share in LONGER] if known else [max(20, len(values) // 10)]
+    first = max(_rest_at_start(values, rows, len(values)) for rows in lengths)
+    # Who comes to a goal slows down for longer than the shortest stop.
+    last = max(_rest_at_start(values[::-1], rows, lengths[0]) for rows in lengths)
+    return (first, last) if first + last < len(values) else (0, 0)
+
+
+def _rest_at_start(values: Array, shortest: int, soon: int) -> int:
     """Rows (T, n) at the start, so many or more, in which nothing moves, if soon after, too, all does; 0 of others."""
     moved, runs, _ = _slow_runs(values, shortest, 0.9)  # many slow down all the way
     stop = next((last for first, last in runs if first == 0 and last < len(values)), 0)

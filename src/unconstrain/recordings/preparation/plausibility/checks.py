@@ -12,7 +12,7 @@ from ....base.display import listed
 from ...readers.clocks import UNITS, usual
 from ...remarks import Remark
 from ...signals.orientations import TURNS, wraps
-from ...signals.stillness import is_noise, noise_share, rest_at_start, stops
+from ...signals.stillness import SHORTEST_STOP_S, STOP_ROWS, is_noise, noise_share, rest_at_ends, stops
 from ..meaning import are_backwards, are_targets
 from .subject import FLIPS, GAP_INTERVALS, LEAST_ROWS, Subject
 
@@ -25,11 +25,8 @@ SHORTEST_GAP_S = 0.1
 IRREGULAR = 0.01
 """Intervals that differ from the median by more than this share are no uniform sampling."""
 
-SHORTEST_STOP_S, STOP_ROWS = 0.3, 6
-"""A stop takes so many seconds, and rows, at least: who turns a corner is slow for a shorter time."""
-
-LONGER, STANDING = (1.0, 1.5, 2.0), 1.5
-"""Multiples of that, for rest at an end, as noise hides the shorter; what trims it over the speed of noise there."""
+STANDING = 1.5
+"""What trims rest over the speed of noise there."""
 
 SHORTEST_PIECE = 5
 """Rows before and after a gap; fewer are a stray row at an end."""
@@ -285,19 +282,14 @@ def rest(subject: Subject) -> Remark | None:
     """Standing still before the start, and after an end that is as sudden."""
     if subject.recipe.still or not subject.moves:
         return None
-    stamps, states = subject.stamps, subject.clean
-    interval = 0.0 if stamps is None else float(np.median(np.diff(stamps)))
-    known = 0.0 < interval <= SHORTEST_STOP_S / STOP_ROWS
-    lengths = [round(share * SHORTEST_STOP_S / interval) for share in LONGER] if known else [max(20, len(states) // 10)]
-    first = max(rest_at_start(states, rows, len(states)) for rows in lengths)
-    # Who comes to a goal slows down for longer than the shortest stop.
-    last = max(rest_at_start(states[::-1], rows, lengths[0]) for rows in lengths)
-    if first + last >= len(states):
-        return None
-    ends = (first, "before it starts"), (last, "at its end")
-    said = " and ".join(f"{subject.lasting(rows)} {where}" for rows, where in ends if rows)
-    cure = _trimmed_by(subject, interval, first, last) if said else ""
-    return Remark("rest", f"stands still for {said}, learnt as rest there; {cure}.") if said else None
+    interval = 0.0 if subject.stamps is None else float(np.median(np.diff(subject.stamps)))
+    first, last = rest_at_ends(subject.clean, interval)
+    dropped = subject.recipe.pauses == "drop"
+    kept = last or (first and not dropped)
+    learnt = f"learnt as rest there; {_trimmed_by(subject, interval, first, last)}" if kept else ""
+    ends = (first, "before it starts", "left out (pauses='keep')" if dropped else learnt), (last, "at its end", learnt)
+    said = " and ".join(f"{subject.lasting(rows)} {where}, {done}" for rows, where, done in ends if rows)
+    return Remark("rest", f"stands still for {said}.", cured=not kept) if said else None
 
 
 def _trimmed_by(subject: Subject, interval: float, first: int, last: int) -> str:
