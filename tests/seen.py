@@ -40,6 +40,12 @@ return [...document.querySelectorAll(`svg:not([aria-hidden]):not([aria-label]), 
   table:not(:has(caption)), button:empty, html:not([lang])`)].map(one => one.outerHTML.slice(0, 80));
 """
 
+CUT_OFF = """
+return [...document.querySelectorAll(".wide")].filter(one => one.scrollWidth > one.clientWidth)
+  .map(one => [one.scrollWidth, one.clientWidth, one.innerText.slice(0, 80)]);
+"""
+"""Tables of which some columns have to be scrolled to."""
+
 
 QUIETLY = (
     "headless",
@@ -82,6 +88,7 @@ def opened(browser, page, folder):
     assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []
     assert browser.execute_script("return performance.getEntriesByType('resource').map(one => one.name)") == []
     assert browser.execute_script(UNNAMED) == []
+    assert browser.execute_script(CUT_OFF) == []
     for graph in graphs:
         assert graph["label"], graph
         assert graph["drawn"] >= 10, graph

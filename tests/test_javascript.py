@@ -1,6 +1,7 @@
 """What runs in a page says and learns the same as Python; run in Chromium."""
 
 import json
+from dataclasses import replace
 from importlib import resources
 
 import numpy as np
@@ -9,8 +10,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import unconstrain as uc
 from conftest import POLICIES
-from samples import draw
+from samples import draw, samples_of
 from unconstrain.base.errors import SettingError
+from unconstrain.learners.robust.softened import softened
 
 DATA = draw(noise=0.02)
 
@@ -94,7 +96,7 @@ const folds = demonstrations.map((one) => one.moments), hybrid = learning.hybrid
 window.found = {
   direct: Array.from(learning.direct(learning.total(folds))),
   hybrid: Array.from(hybrid.weights),
-  segments: Array.from(learning.segments(demonstrations)),
+  segments: Array.from(learning.segments(demonstrations).weights),
   thresholds: thresholds.map((each) => Array.from(hybrid.path.at(hybrid.path.split(each)))),
 };
 """
@@ -130,3 +132,44 @@ def test_learning_in_the_page_gives_the_weights_of_python(browser, tmp_path, sce
     for weights, policy in pairs:
         wanted = policy.solution_.weights[0].T.ravel()
         assert_allclose(weights, wanted, rtol=1e-6, atol=1e-6 * np.abs(wanted).max(), err_msg=str(policy.learner))
+
+
+COMPARE = """
+const features = learning.kernels(centres, variance);
+for (const one of demonstrations) one.moments = learning.gather(features, one.states, one.actions);
+const { ways, taken } = learning.compared(demonstrations);
+window.found = { taken: taken.name, missed: Object.fromEntries(ways.map((one) => [one.name, one.missed])) };
+"""
+
+
+def on_rails(alike):
+    """Six demonstrations, each on a rail of its own, or on rails that turn at every sample."""
+    data = draw(seed=4, samples=240, noise=0.02)
+    if not alike:
+        return data
+    angles = np.linspace(0.2, 2.9, 6)[data.groups]
+    rails = np.column_stack([np.cos(angles), np.sin(angles)])
+    noise = 0.02 * np.random.default_rng(5).standard_normal(data.actions.shape)
+    return data._replace(actions=np.vecdot(data.policy, rails)[:, None] * rails + noise)
+
+
+@pytest.mark.parametrize("alike", [True, False], ids=["a rail each", "rails that turn"])
+def test_the_page_compares_ways_to_learn_by_what_python_says_they_miss(browser, tmp_path, alike):
+    data, kernels = on_rails(alike), uc.NormalisedRBF.grid(-1, 1, 4, width=1.0)
+    parts = [data.groups == group for group in range(6)]
+    demonstrations = [{"states": data.states[p].tolist(), "actions": data.actions[p].tolist()} for p in parts]
+    settings = {"centres": kernels.centres.tolist(), "variance": kernels.variance}
+    found = in_page(browser, tmp_path, LEARNING + COMPARE, demonstrations=demonstrations, **settings)
+    samples = samples_of(data, features=kernels(data.states))
+    samples = replace(samples, memberships=np.ones_like(samples.memberships))
+    candidates = [*softened(samples), uc.Segments("groups").candidate(samples, None)[0]]
+    sizes = np.linalg.norm(data.actions, axis=1)
+    missed = {
+        one.name: ((sizes - np.vecdot(data.actions, one.held_out) / sizes) ** 2).sum() / (sizes**2).sum()
+        for one in candidates
+    }
+    assert list(found["missed"])[:2] == ["direct", "softened hybrid, 1"]
+    assert len(found["missed"]) == 6
+    assert_allclose(list(found["missed"].values()), [missed[name] for name in found["missed"]], rtol=1e-6)
+    assert found["taken"] == min(found["missed"], key=found["missed"].get)
+    assert (found["taken"] == "segments") == alike  # what a rail that turns does is not told by the whole stroke

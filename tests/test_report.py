@@ -239,6 +239,13 @@ class TestPages:
         assert "58.3 ± 9.6" in page  # direct, random constraint, nUPE × 10⁻²
         assert "0.373 ± 1.1" in page
 
+    @pytest.mark.parametrize("name", ["table1", "figure5"])
+    def test_medians_stand_beside_means(self, results, pages, name):
+        row = results(name).rows[0]
+        assert row["nupe_median"] != row["nupe_mean"]
+        for metric in ("nupe", "ncpe"):
+            assert html.number(100 * row[f"{metric}_median"]) in pages(name)
+
     def test_arrows_that_were_cut_are_confessed(self, results):
         result = results("figure4")
         wild = {**result.details["none"]["fields"], "inconsistency": 1e6 * result.details["policy"] + 1e6}

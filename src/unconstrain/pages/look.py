@@ -112,6 +112,7 @@ def look_page(
         "policy": described,
         "planes": (planes := diagnosis.planes_of(demos))[: len(planes) == 1].tolist(),
         "verdict": "" if verdict is None else f"{verdict.mark.value} {verdict.said}",
+        "rest": [] if verdict is None else verdict.rest(),
     }
     runs = policy is not None and described is not None and not described["trouble"]
     script = policy.javascript() if policy is not None and runs else "null"
