@@ -10,8 +10,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import unconstrain as uc
 from conftest import POLICIES
-from samples import draw, samples_of
+from samples import Samples, draw, samples_of, spiral
 from unconstrain.base.errors import SettingError
+from unconstrain.learners.robust.segments import projections_of
 from unconstrain.learners.robust.softened import softened
 
 DATA = draw(noise=0.02)
@@ -143,14 +144,13 @@ window.found = { taken: taken.name, missed: Object.fromEntries(ways.map((one) =>
 
 
 def on_rails(alike):
-    """Six demonstrations, each on a rail of its own, or on rails that turn at every sample."""
-    data = draw(seed=4, samples=240, noise=0.02)
-    if not alike:
-        return data
-    angles = np.linspace(0.2, 2.9, 6)[data.groups]
-    rails = np.column_stack([np.cos(angles), np.sin(angles)])
-    noise = 0.02 * np.random.default_rng(5).standard_normal(data.actions.shape)
-    return data._replace(actions=np.vecdot(data.policy, rails)[:, None] * rails + noise)
+    """Six smooth demonstrations, each on a rail of its own, or on one that turns on the way."""
+    groups, times = np.repeat(range(6), 40), np.tile(np.linspace(0, 5, 40), 6)
+    states = (0.3 + 0.12 * groups[:, None]) * np.column_stack([np.cos(times + groups), np.sin(times + groups)])
+    angles = np.linspace(0.2, 2.9, 6)[groups] + (0.0 if alike else times)
+    rails, wanted = np.column_stack([np.cos(angles), np.sin(angles)]), spiral(states)
+    noise = 0.02 * np.random.default_rng(5).standard_normal(states.shape)
+    return Samples(states, np.vecdot(wanted, rails)[:, None] * rails + noise, groups, wanted, np.empty(0))
 
 
 @pytest.mark.parametrize("alike", [True, False], ids=["a rail each", "rails that turn"])
@@ -163,13 +163,20 @@ def test_the_page_compares_ways_to_learn_by_what_python_says_they_miss(browser, 
     samples = samples_of(data, features=kernels(data.states))
     samples = replace(samples, memberships=np.ones_like(samples.memberships))
     candidates = [*softened(samples), uc.Segments("groups").candidate(samples, None)[0]]
-    sizes = np.linalg.norm(data.actions, axis=1)
+    seen = projections_of(data.actions, data.groups, np.full(240, 0.02**2))
+    if not alike:
+        seen = (
+            data.actions[:, :, None] * data.actions[:, None, :] / np.vecdot(data.actions, data.actions)[:, None, None]
+        )
+    energy = (data.actions**2).sum()
     missed = {
-        one.name: ((sizes - np.vecdot(data.actions, one.held_out) / sizes) ** 2).sum() / (sizes**2).sum()
-        for one in candidates
+        one.name: (np.einsum("nab,nb->na", seen, data.actions - one.held_out) ** 2).sum() / energy for one in candidates
     }
-    assert list(found["missed"])[:2] == ["direct", "softened hybrid, 1"]
-    assert len(found["missed"]) == 6
+    assert found["missed"].keys() == {
+        "direct",
+        *(f"softened hybrid, {s}" for s in ("1", "0.1", "0.01", "0.001")),
+        "segments",
+    }
     assert_allclose(list(found["missed"].values()), [missed[name] for name in found["missed"]], rtol=1e-6)
     assert found["taken"] == min(found["missed"], key=found["missed"].get)
-    assert (found["taken"] == "segments") == alike  # what a rail that turns does is not told by the whole stroke
+    assert (found["taken"] == "segments") == alike  # a rail that turns is none of the whole stroke

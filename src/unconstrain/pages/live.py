@@ -20,11 +20,8 @@ from ..models import SUPPORTED
 from ..recordings import Demonstration
 from .scene import LIGHT, PATCH, Scene, rgb_of, step_of
 
-STEPS, FRAME_S = 400, 1 / 30
-"""Of a movement; seconds that each is shown."""
-
-DASH = 6
-"""Steps of a dash, and of the gap after it."""
+STEPS, FRAME_S, DASH = 400, 1 / 30, 6
+"""Of a movement; seconds that each is shown; how many are a dash, and the gap after it."""
 
 INK, GREY = (29, 33, 38), (150, 155, 162)
 

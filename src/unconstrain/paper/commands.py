@@ -40,9 +40,9 @@ TITLES = {
 """Short enough for a terminal."""
 
 
-def written(experiment: str, out: str) -> list[Path]:
+def written(experiment: str, out: str) -> list[str]:
     """What an experiment writes into a folder, as far as it is there already."""
-    return [path for suffix in ("json", "html") if (path := Path(out) / f"{experiment}.{suffix}").exists()]
+    return [str(path) for end in ("json", "html") if (path := Path(out) / f"{experiment}.{end}").exists()]
 
 
 def reproduce(

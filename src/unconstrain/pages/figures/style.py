@@ -54,10 +54,7 @@ RULE = "#e3e6ea"
 THEMED = {INK: "var(--ink)", COLOURS["truth"]: "var(--ink)", RULE: "var(--rule)", "#ffffff": "var(--paper)"}
 """Colours that the page decides, by its variables: they are others in the dark."""
 
-_KEY = "key:"
-MOST_NAMED = 12
-"""Bars of one key that are named one by one to those who cannot see them."""
-
+_KEY, _MOST_BARS = "key:", 12  # of one key, told one by one to those who cannot see them
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -145,14 +142,7 @@ def svg(made: Any, width: int, alternative: str) -> str:
 
 
 def described(made: Any, names: Mapping[str, str] = LABELS) -> str:
-    """What a picture shows, in words: titles, axes, how far each of its lines reaches, how high its bars are.
-
-    Parameters
-    ----------
-    made : matplotlib.figure.Figure
-    names : mapping of str to str
-        What keys are called here.
-    """
+    """What a picture shows, in words: titles, axes, how far lines and shades reach, bars; keys by their names."""
     return " ".join(_described(axes, names) for axes in made.axes if axes.get_label() != "<colorbar>")
 
 
@@ -165,8 +155,7 @@ def _described(axes: Any, names: Mapping[str, str]) -> str:
             upwards = line.get_data_3d()[2] if in_space else line.get_ydata()
             lines.setdefault(line.get_gid().removeprefix(_KEY), []).append(np.asarray(upwards, float))
     said = [f"{names.get(key, key)} {_reach(np.concatenate(values))}" for key, values in lines.items()]
-    shaded = [one for one in axes.collections if one.colorbar]
-    said += [f"{one.colorbar.ax.get_ylabel()} {_reach(one.get_array())}" for one in shaded]
+    said += [f"{one.colorbar.ax.get_ylabel()} {_reach(one.get_array())}" for one in axes.collections if one.colorbar]
     plotted = f"{axes.get_zlabel()} over {x} and {y}" if in_space else f"{y} over {x}" if x and y else x or y
     parts = [": ".join(filter(None, (title, plotted))), *_bars(axes, names), ", ".join(said)]
     return f"{'; '.join(filter(None, parts))}."
@@ -179,7 +168,7 @@ def _bars(axes: Any, names: Mapping[str, str]) -> Iterator[str]:
         tall = np.array([bar.get_height() for bar in axes.patches if bar.get_gid() == key])
         each = [f"{group} {height:.3g}" for group, height in zip(groups, tall, strict=True)]
         name = str(key).removeprefix(_KEY)
-        yield f"{names.get(name, name)} {', '.join(each) if len(each) <= MOST_NAMED else _reach(tall)}"
+        yield f"{names.get(name, name)} {', '.join(each) if len(each) <= _MOST_BARS else _reach(tall)}"
 
 
 def _reach(values: Array) -> str:

@@ -444,9 +444,7 @@ const learning = (() => {
    * beside it, times 1 / n, by iteration; times P / n where the error on held-out folds is then clearly less.
    */
   function segments(demonstrations, folds = demonstrations.map((one) => [one])) {
-    const { energy, weight } = total(demonstrations.map((one) => one.moments));
-    const most = Math.min(noise(demonstrations.map((one) => one.actions), demonstrations[0].moments.d), energy / weight);
-    const parts = folds.map((fold) => constrained(fold, most));
+    const most = mostNoise(demonstrations), parts = folds.map((fold) => constrained(fold, most));
     const every = parts.reduce(plus), { size } = every.error;
     const tried = [1, size].map((worth) => {
       const { w, softness } = balanced(every, worth);
@@ -464,9 +462,8 @@ const learning = (() => {
   /**
    * The default learner in short: of several ways to learn, the one that misses least of held-out motion.
    *
-   * Ways are regression, the minimum of E_i + s E_2 for some softnesses s, and segments. Missed is the squared distance of
-   * held-out actions from the policy projected onto them, as a share of their squares. Robust() has more ways, and adds
-   * what this does not show: variance and bias across the actions.
+   * Ways are regression, the minimum of E_i + s E_2 for some softnesses s, and segments. Missed is what held-out motion
+   * shows, as a share of its squares. Robust() has more ways, and adds what that does not show: variance and bias.
    */
   function compared(demonstrations, folds = demonstrations.map((one) => [one])) {
     const parts = folds.map((fold) => total(fold.map((one) => one.moments))), whole = total(parts);
@@ -478,29 +475,50 @@ const learning = (() => {
     }));
     ways.unshift(way("direct", direct));
     ways.push({ name: "segments", ...segments(demonstrations, folds) });
+    const most = mostNoise(demonstrations), told = folds.map((fold) => fold.map((one) => shownBy(one, most)).reduce(added));
     for (const one of ways)
-      one.missed = parts.reduce((sum, held, f) => sum + value(consistency(held), one.refits[f]), 0) / whole.energy;
+      one.missed = told.reduce((sum, error, f) => sum + value(error, one.refits[f]), 0) / whole.energy;
     return { ways, taken: ways.reduce((best, one) => (one.missed < best.missed ? one : best)) };
   }
 
-  /** Constrained error and standard risk of some demonstrations; a short one has the noise of all. */
+  /** Variance of the noise on the actions of any demonstration, at most. */
+  function mostNoise(demonstrations) {
+    const { d, energy, weight } = total(demonstrations.map((one) => one.moments));
+    return Math.min(noise(demonstrations.map((one) => one.actions), d), energy / weight);
+  }
+
+  /** Directions in which a demonstration moved; a short one has the noise of all. */
+  function movedAlong({ actions, moments: { d } }, most) {
+    return projection(actions, actions.length < LEAST_DIFFERENCES ? most : noise([actions], d));
+  }
+
+  /** What a demonstration shows to be missed: where it moved, if in some directions alone; else along each action. */
+  function shownBy(one, most) {
+    const { p, d } = one.moments, size = p * d, found = movedAlong(one, most);
+    const rank = found.filter((_, i) => i % (d + 1) === 0).reduce((sum, each) => sum + each, 0);
+    if (rank < 0.5 || rank > d - 0.5) return consistency(one.moments);
+    const error = { hessian: new Float64Array(size * size), linear: new Float64Array(size), constant: 0, size };
+    addConstrained(error, one.moments, one.actions, found);
+    return error;
+  }
+
+  /** Constrained error and standard risk of some demonstrations. */
   function constrained(some, most) {
     const { p, d, gram, cross, energy, weight } = total(some.map((one) => one.moments)), size = p * d;
     const error = { hessian: new Float64Array(size * size), linear: new Float64Array(size), constant: 0, size };
-    for (const { actions, moments: sums } of some) {
-      const variance = actions.length < LEAST_DIFFERENCES ? most : noise([actions], d);
-      addConstrained(error, sums, actions, projection(actions, variance));
-    }
+    for (const one of some) addConstrained(error, one.moments, one.actions, movedAlong(one, most));
     const risk = { hessian: forEveryAction(gram, p, p, d), linear: cross, constant: energy, size };
     return { error, risk, weight };
   }
 
+  /** The sum of two quadratics. */
+  function added(a, b) {
+    const hessian = combined(a.hessian, b.hessian), linear = combined(a.linear, b.linear);
+    return { hessian, linear, constant: a.constant + b.constant, size: a.size };
+  }
+
   function plus(one, other) {
-    const sum = (a, b) => ({
-      hessian: combined(a.hessian, b.hessian), linear: combined(a.linear, b.linear),
-      constant: a.constant + b.constant, size: a.size,
-    });
-    return { error: sum(one.error, other.error), risk: sum(one.risk, other.risk), weight: one.weight + other.weight };
+    return { error: added(one.error, other.error), risk: added(one.risk, other.risk), weight: one.weight + other.weight };
   }
 
   /** The least of the error plus the softness times the risk. */

@@ -205,7 +205,7 @@
       `${percent(errors.hybrid)}, the default learner ${percent(errors.robust)}.`;
   }
 
-  /** Which way to learn was taken, and the best of each other kind, with what each misses of held-out arrows. */
+  /** Which way to learn was taken, and the best of each other kind, with what each misses of held-out strokes. */
   function sayWays({ ways, taken }) {
     const kind = ({ name }) => name.match(/^\w+/)[0], others = ways.filter((one) => kind(one) !== kind(taken));
     const best = [...new Set(others.map(kind))].map((each) =>
