@@ -93,8 +93,8 @@ def test_what_is_learnt_of_the_example_is_what_python_learns(plate):
 def test_the_default_learner_says_which_way_it_took_and_what_others_miss(plate):
     ways = plate.execute_script("return plate.learnt.compared.ways.map((one) => [one.name, one.missed]);")
     missed, said = dict(ways), plate.find_element("id", "taken").text
-    assert said.startswith("Takes rail by rail (")
-    assert re.search(r"not regression \([\d.]+\s%\) or softened hybrid \([\d.]+\s%\)\.$", said)
+    assert said.startswith(": rail by rail (")
+    assert re.search(r"not regression \([\d.]+\s%\) or softened hybrid \([\d.]+\s%\)$", said)
     assert missed["segments"] == min(missed.values())
     plate.find_element("id", "clear").click()
     assert plate.find_element("id", "taken").text == ""

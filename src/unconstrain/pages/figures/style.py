@@ -164,10 +164,9 @@ def _described(axes: Any, names: Mapping[str, str]) -> str:
 def _bars(axes: Any, names: Mapping[str, str]) -> Iterator[str]:
     """The bars of each key with their groups; of many, how far they reach."""
     groups = [one.get_text().replace("\n", " ") for one in axes.get_xticklabels()]
-    for key in dict.fromkeys(bar.get_gid() for bar in axes.patches):
-        tall = np.array([bar.get_height() for bar in axes.patches if bar.get_gid() == key])
+    for name in dict.fromkeys(str(bar.get_gid()).removeprefix(_KEY) for bar in axes.patches):
+        tall = np.array([bar.get_height() for bar in axes.patches if bar.get_gid() == f"{_KEY}{name}"])
         each = [f"{group} {height:.3g}" for group, height in zip(groups, tall, strict=True)]
-        name = str(key).removeprefix(_KEY)
         yield f"{names.get(name, name)} {', '.join(each) if len(each) <= _MOST_BARS else _reach(tall)}"
 
 

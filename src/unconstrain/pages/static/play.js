@@ -211,7 +211,7 @@
     const best = [...new Set(others.map(kind))].map((each) =>
       others.filter((one) => kind(one) === each).reduce((least, one) => (one.missed < least.missed ? one : least)));
     const [first, ...rest] = [taken, ...best].map((one) => `${WAYS[kind(one)]} (${percent(one.missed)})`);
-    return `Takes ${first}, not ${rest.join(" or ")}.`;
+    return `: ${first}, not ${rest.join(" or ")}`;
   }
 
   const draw = drawing.perFrame(() => {
