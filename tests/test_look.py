@@ -207,6 +207,7 @@ def test_commands_and_pages_say_the_same_share_of_the_same_files(browser, tmp_pa
     for page in opened(browser, tmp_path / "look.html"):
         said = text(page, "policy-says").replace(" %", "%")
     shares = [re.search(r"(\d+)% of the time", one) for one in (rolled, said)]
+    assert "where it is thin, fewer than 3 tell the policy" in said
     assert 5 < int(shares[0][1]) < 95
     assert abs(int(shares[0][1]) - int(shares[1][1])) <= 2
 
