@@ -41,10 +41,11 @@ return [...document.querySelectorAll(`svg:not([aria-hidden]):not([aria-label]), 
 """
 
 CUT_OFF = """
-return innerWidth < 1000 ? [] : [...document.querySelectorAll(".wide")].filter(one => one.scrollWidth > one.clientWidth)
+const tables = innerWidth < 1000 ? [] : [...document.querySelectorAll(".wide")].filter(one => !one.closest("details"));
+return tables.filter(one => one.scrollWidth > one.clientWidth)
   .map(one => [one.scrollWidth, one.clientWidth, one.innerText.slice(0, 80)]);
 """
-"""Tables of which some columns have to be scrolled to, though the screen is wide."""
+"""Tables of which some columns have to be scrolled to, though the screen is wide and nothing folds them away."""
 
 
 QUIETLY = (
