@@ -20,7 +20,7 @@ help: ## show this list
 
 demo: $(USER_STAMP) ## learn a wiping movement end to end and write a report to look at
 	@scripts/install-system graphics || echo "make demo: going on; the arm will be drawn as lines." >&2
-	@$(BIN)/unconstrain demo --out $(DEMO_DIR)
+	@$(BIN)/unconstrain demo --out $(DEMO_DIR) --force
 	@echo "The report is in $(CURDIR)/$(DEMO_DIR); open its .html file in a browser."
 
 test: $(DEV_STAMP) ## run all tests, in parallel; COVERAGE=1 says what they leave out

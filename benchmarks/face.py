@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import ctypes
 import json
+import re
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -75,6 +77,7 @@ def play(driver: Any, folder: Path) -> Iterator[Row]:
     page = folder / "play.html"
     ran("play", "-o", page)
     driver.get(page.as_uri())
+    yield row("JavaScript against Python, fit: weights, relative to the largest", fitted(driver), "", 1e-6)
     canvas = driver.find_element("id", "plate")
     driver.execute_script("performance.clearMeasures('refit');")
     for radius in (0.4, 0.6, 0.8):
@@ -84,6 +87,22 @@ def play(driver: Any, folder: Path) -> Iterator[Row]:
     yield row("play: samples of a stroke", float(np.median(samples)), "")
     yield row("play: three learners learn anew", float(np.median(refits)), "ms", 100.0, 16.0)
     yield row("play: severe messages in the console", severe(driver), "", 0, 0)
+
+
+def fitted(driver: Any) -> float:
+    """By how much the page's weights are off Python's, of three learners of its example, relative to the largest."""
+    strokes = driver.execute_script("return plate.strokes.map((one) => [one.states, one.actions]);")
+    weights = "const { weights: { direct, hybrid }, compared: { ways } } = plate.learnt;"
+    learnt = f"{weights} return [direct, hybrid, ways[ways.length - 1].weights].map((one) => Array.from(one));"
+    states, actions = (np.concatenate([np.array(one[part]) for one in strokes]) for part in range(2))
+    groups, off = np.repeat(np.arange(len(strokes)), [len(one[0]) for one in strokes]), []
+    for found, learner in zip(
+        driver.execute_script(learnt), (uc.Direct(), uc.Hybrid(), uc.Segments("groups")), strict=True
+    ):
+        policy = uc.ParametricPolicy(uc.NormalisedRBF.grid(-1, 1, 5, width=0.8), learner, validation=uc.Folds(4))
+        expected = policy.fit(states, actions, groups=groups).solution_.weights[0].T.ravel()
+        off.append(np.abs(found - expected).max() / np.abs(expected).max())
+    return float(max(off))
 
 
 def circle(driver: Any, canvas: Any, radius: float) -> None:
@@ -97,22 +116,31 @@ def circle(driver: Any, canvas: Any, radius: float) -> None:
 
 
 def reports(driver: Any, folder: Path) -> Iterator[Row]:
-    """The pages of ``fit``, ``diagnose`` and ``constraint`` about the recordings of the example."""
+    """The pages of ``fit``, ``diagnose`` and ``constraint`` about the recordings of the example, and of the paper's."""
     ran("example", folder / "wiping")
     strokes, policy = folder / "wiping", folder / "policy.npz"
     asked: dict[str, Sequence[object]] = {
         "fit": ("fit", strokes, "-o", policy, "--report", folder / "fit.html"),
         "diagnose": ("diagnose", strokes, "--report", folder / "diagnose.html"),
         "constraint": ("constraint", strokes, "-o", folder / "held.npz", "--report", folder / "constraint.html"),
+        "washing": ("demo", "--out", folder),
+        "table1": ("reproduce", "table1", "--trials", 4, "--workers", 1, "--out", folder),
+        "figure4": ("reproduce", "figure4", "--workers", 1, "--out", folder),
+        "figure5": ("reproduce", "figure5", "--trials", 2, "--workers", 1, "--out", folder),
     }
-    faults = {"severe messages in the console": 0, "texts of too little contrast": 0, "pictures without text": 0}
+    faults: Counter[str] = Counter()
     for name, arguments in asked.items():
         ran(*arguments)
         page = folder / f"{name}.html"
         yield row(f"page of {name}", page.stat().st_size / 1e3, "kB", 1000, 300)
         driver.get(page.as_uri())
-        faults["pictures without text"] += len(driver.execute_script(seen.UNNAMED))
-        faults["texts of too little contrast"] += len(seen.unreadable(driver))
+        labels = [graph["label"] for graph in driver.execute_script(seen.GRAPHS)]
+        faults["things without a name"] += len(driver.execute_script(seen.UNNAMED))
+        faults["pictures whose text has no number"] += sum(not re.search(r"\d", label) for label in labels)
+        faults["tables with columns out of sight"] += len(driver.execute_script(seen.CUT_OFF))
+        for scheme in ("light", "dark"):
+            with seen.coloured(driver, scheme):
+                faults[f"texts of too little contrast, {scheme}"] += len(seen.unreadable(driver))
         faults["severe messages in the console"] += severe(driver)
     yield from (row(f"pages of reports: {name}", count, "", 0, 0) for name, count in faults.items())
 

@@ -38,4 +38,5 @@ for name, one, colour in (("as learnt", policy, "#d55e00"), ("guided", safe, "#0
     axes.plot(*path.T, color=colour, label=name)
 axes.legend(loc="upper right")
 axes.set(aspect="equal", xlim=(-2.5, 2.5), ylim=(-2.5, 2.5), xlabel="x (m)", ylabel="y (m)")
+axes.set_title("A cycle as learnt, which leaves the data, and guided")
 plt.show()

@@ -37,6 +37,7 @@ for stone in stones:
     axes.fill(*around.T, color="0.75")
 axes.axhspan(-1.3, -1.0, color="0.75")
 axes.set(aspect="equal", xlim=(0, 4.4), ylim=(-1.3, 2.0), xlabel="x (m)", ylabel="y (m)")
+axes.set_title("Fifteen movements around two stones and along a wall")
 plt.show()
 
 # %%
@@ -59,6 +60,8 @@ for tilt, color in ((-0.9, "#0072b2"), (-0.3, GREEN), (0.3, "#d55e00")):
     starts = [2.0, 0.0, 0.0] + np.linspace(-0.45, 0.45, 6)[:, None] * across
     for run in uc.rollout(lambda x: -x, starts, 400, 0.02, plane, obstacles=[ball]):
         axes.plot(*run.states.T, color=color, linewidth=1.5)
-axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
+axes.set(
+    aspect="equal", xlabel="x (m)", ylabel="y (m)", zlabel="z (m)", title="Movements on three planes, around a ball"
+)
 axes.view_init(elev=35, azim=-60)
 plt.show()

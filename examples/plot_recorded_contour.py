@@ -30,5 +30,5 @@ axes.plot(*recorded.states.T, color="0.7", linewidth=2)
 some = recorded.states[::6]
 across = np.linalg.eigh(constraint.projection(some))[1][:, :, 0]
 axes.quiver(*some.T, *across.T, length=0.05, pivot="middle", arrow_length_ratio=0, color="#009e73")
-axes.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
+axes.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)", title="A recorded contour, and what held it")
 plt.show()

@@ -23,10 +23,12 @@ tilts = list(dict.fromkeys(bout.tilt for bout in bouts))
 figure = plt.figure(figsize=(6, 5), layout="constrained")
 axes = figure.add_subplot(projection="3d")
 for number, tilt in enumerate(tilts):
-    for bout in bouts:
-        if bout.tilt == tilt:
-            axes.plot(*bout.demonstration.states.T, color=f"C{number}", linewidth=0.8)
-axes.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)", title="; ".join(tilts))
+    recorded = [bout.demonstration.states for bout in bouts if bout.tilt == tilt]
+    for states in recorded:
+        axes.plot(*states.T, color=f"C{number}", linewidth=0.8, label=tilt if states is recorded[0] else None)
+axes.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)", title="Wiping a car rim at four tilts")
+axes.locator_params(nbins=4)
+axes.legend(frameon=False)
 plt.show()
 
 # %%
@@ -50,6 +52,6 @@ figure, axes = plt.subplots(figsize=(6, 3.5), layout="constrained")
 for shift, (name, values) in zip((-0.2, 0.2), errors.items(), strict=True):
     axes.bar(np.arange(len(tilts)) + shift, values, 0.38, label=name)
 axes.set_xticks(range(len(tilts)), tilts)
-axes.set(ylabel="nCPE on the tilt left out")
+axes.set(ylabel="nCPE on the tilt left out", title="Error on the tilt left out")
 axes.legend(frameon=False)
 plt.show()

@@ -41,5 +41,6 @@ right.semilogy(np.arange(len(solution.scores[0])), solution.scores[0], color="#0
 right.set(xlabel="directions left to the distance", ylabel="held-out score")
 left.axvline(solution.determined[0] + 0.5, color="black", linewidth=0.8)
 right.axvline(solution.directions - solution.determined[0], color="black", linewidth=0.8)
+figure.suptitle("Which directions of the weights are determined")
 plt.show()
 print(f"{solution.determined[0]} of {solution.directions} directions are determined by consistency")

@@ -37,6 +37,7 @@ for name, demo in demos.items():
 axes.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)", xlim=(-0.2, 0.2), ylim=(-0.2, 0.2), zlim=(-0.1, 0.1))
 axes.set_box_aspect((2, 2, 1), zoom=1.2)
 axes.locator_params(nbins=5)
+axes.set_title("Strokes on seven plates, two of them held out")
 plt.show()
 
 # %%
@@ -105,4 +106,5 @@ for method, policy in policies.items():
     panel.plot(*(movement.states @ in_plate).T, color=COLOURS[method], label=LABELS[method])
 panel.set(aspect="equal", xlim=(-0.3, 0.3), ylim=(-0.3, 0.3), xlabel="along the plate (m)", ylabel="across it (m)")
 panel.legend(frameon=False, loc="upper right")
+panel.set_title("Six seconds on the plate that was held out")
 plt.show()

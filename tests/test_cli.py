@@ -29,7 +29,7 @@ from unconstrain import cli, storage
 from unconstrain.base.display import percent
 from unconstrain.base.errors import MissingExtraError
 from unconstrain.cli import fitting, rolling
-from unconstrain.paper import experiments
+from unconstrain.paper import commands, experiments
 from unconstrain.paper import pages as report
 from unconstrain.paper.experiments import table1, washing
 from unconstrain.paper.pages import washing_arm
@@ -1164,6 +1164,24 @@ def test_reproduce_writes_numbers_and_a_page(table1_of_two):
     assert found["settings"]["seed"] == 0
     assert len(found["rows"]) == 8
     assert "<html" in (out / "table1.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("kept", [".json", ".html"])
+@pytest.mark.parametrize(
+    ("command", "name"), [(("reproduce", "table1", "--trials", 1), "table1"), (("demo",), "washing")]
+)
+def test_results_that_are_there_are_replaced_only_with_force(tmp_path, monkeypatch, command, name, kept):
+    began = []
+    for one in ("reproduce", "demo"):
+        monkeypatch.setattr(commands, one, lambda *_, **__: began.append(1))
+    taken = tmp_path / f"{name}{kept}"
+    call(*command, "--out", tmp_path)
+    taken.write_text("mine")
+    said = refused(*command, "--out", tmp_path)
+    assert said == f"{taken}: is there; give another name, or --force to replace it."
+    assert len(began) == 1
+    assert call(*command, "--out", tmp_path, "--force").code == 0
+    assert len(began) == 2
 
 
 def test_reproduce_prints_a_table_for_80_columns(table1_of_two):

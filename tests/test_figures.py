@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from seen import contrast
 from unconstrain.base.errors import MissingExtraError
-from unconstrain.pages import figures
+from unconstrain.pages import figures, html
 from unconstrain.pages.figures.compact import compact
 from unconstrain.pages.figures.planes import arrow_lines, broken, clipped
 from unconstrain.pages.figures.style import INK, MARKERS, RULE, described, power, readable, svg
@@ -182,6 +182,24 @@ class TestAsText:
         said = "nUPE: error over angle (rad); direct from 1 to 3, inconsistency from 1 to 3, hybrid from 1 to 3."
         assert described(self.drawn()[0]) == said
         assert f'role="img" aria-label="{said}"' in self.drawn()[1]
+
+    def test_names_in_the_key_are_those_in_the_words_and_space_has_three_axes(self):
+        states = np.column_stack([np.arange(3.0), np.arange(3.0), [0.5, 0.1, 0.2]])
+        made = figures.movements([("training", states)], labels=("x [m]", "y [m]", "z [m]"))
+        assert described(made) == "z [m] over x [m] and y [m]; training data from 0.1 to 0.5."
+        page = html.picture("it", [made], "", labels={"training": "strokes"})
+        assert 'aria-label="z [m] over x [m] and y [m]; strokes from 0.1 to 0.5."' in page
+
+    def test_bars_are_told_one_by_one_and_many_by_how_far_they_reach(self):
+        few = figures.bars(["a", "b"], {"direct": [0.5, 0.25], "hybrid": [0.1, 0.2]}, title="", label="nCPE")
+        assert described(few) == "nCPE; direct a 0.5, b 0.25; hybrid a 0.1, b 0.2."
+        many = figures.bars([*"abcdefghijklmnop"], {"direct": np.linspace(0.1, 1.6, 16)}, title="", label="nCPE")
+        assert described(many) == "nCPE; direct from 0.1 to 1.6."
+
+    def test_shades_are_told_with_what_they_mean(self):
+        points, values = np.random.default_rng(0).uniform(size=(9, 2)), np.linspace(0.0, 0.4, 9)
+        made = figures.known_map(points, values, points[:1], labels=("x", "y"), scale="spread")
+        assert "; spread from 0 to 0.4" in described(made)
 
     def test_the_same_picture_is_the_same_text(self):
         assert self.drawn()[1] == self.drawn()[1]

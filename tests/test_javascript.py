@@ -1,6 +1,7 @@
 """What runs in a page says and learns the same as Python; run in Chromium."""
 
 import json
+from dataclasses import replace
 from importlib import resources
 
 import numpy as np
@@ -9,8 +10,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import unconstrain as uc
 from conftest import POLICIES
-from samples import draw
+from samples import Samples, draw, samples_of, spiral
 from unconstrain.base.errors import SettingError
+from unconstrain.learners.robust.segments import projections_of
+from unconstrain.learners.robust.softened import softened
 
 DATA = draw(noise=0.02)
 
@@ -94,7 +97,7 @@ const folds = demonstrations.map((one) => one.moments), hybrid = learning.hybrid
 window.found = {
   direct: Array.from(learning.direct(learning.total(folds))),
   hybrid: Array.from(hybrid.weights),
-  segments: Array.from(learning.segments(demonstrations)),
+  segments: Array.from(learning.segments(demonstrations).weights),
   thresholds: thresholds.map((each) => Array.from(hybrid.path.at(hybrid.path.split(each)))),
 };
 """
@@ -130,3 +133,50 @@ def test_learning_in_the_page_gives_the_weights_of_python(browser, tmp_path, sce
     for weights, policy in pairs:
         wanted = policy.solution_.weights[0].T.ravel()
         assert_allclose(weights, wanted, rtol=1e-6, atol=1e-6 * np.abs(wanted).max(), err_msg=str(policy.learner))
+
+
+COMPARE = """
+const features = learning.kernels(centres, variance);
+for (const one of demonstrations) one.moments = learning.gather(features, one.states, one.actions);
+const { ways, taken } = learning.compared(demonstrations);
+window.found = { taken: taken.name, missed: Object.fromEntries(ways.map((one) => [one.name, one.missed])) };
+"""
+
+
+def on_rails(alike):
+    """Six smooth demonstrations, each on a rail of its own, or on one that turns on the way."""
+    groups, times = np.repeat(range(6), 40), np.tile(np.linspace(0, 5, 40), 6)
+    states = (0.3 + 0.12 * groups[:, None]) * np.column_stack([np.cos(times + groups), np.sin(times + groups)])
+    angles = np.linspace(0.2, 2.9, 6)[groups] + (0.0 if alike else times)
+    rails, wanted = np.column_stack([np.cos(angles), np.sin(angles)]), spiral(states)
+    noise = 0.02 * np.random.default_rng(5).standard_normal(states.shape)
+    return Samples(states, np.vecdot(wanted, rails)[:, None] * rails + noise, groups, wanted, np.empty(0))
+
+
+@pytest.mark.parametrize("alike", [True, False], ids=["a rail each", "rails that turn"])
+def test_the_page_compares_ways_to_learn_by_what_python_says_they_miss(browser, tmp_path, alike):
+    data, kernels = on_rails(alike), uc.NormalisedRBF.grid(-1, 1, 4, width=1.0)
+    parts = [data.groups == group for group in range(6)]
+    demonstrations = [{"states": data.states[p].tolist(), "actions": data.actions[p].tolist()} for p in parts]
+    settings = {"centres": kernels.centres.tolist(), "variance": kernels.variance}
+    found = in_page(browser, tmp_path, LEARNING + COMPARE, demonstrations=demonstrations, **settings)
+    samples = samples_of(data, features=kernels(data.states))
+    samples = replace(samples, memberships=np.ones_like(samples.memberships))
+    candidates = [*softened(samples), uc.Segments("groups").candidate(samples, None)[0]]
+    seen = projections_of(data.actions, data.groups, np.full(240, 0.02**2))
+    if not alike:
+        seen = (
+            data.actions[:, :, None] * data.actions[:, None, :] / np.vecdot(data.actions, data.actions)[:, None, None]
+        )
+    energy = (data.actions**2).sum()
+    missed = {
+        one.name: (np.einsum("nab,nb->na", seen, data.actions - one.held_out) ** 2).sum() / energy for one in candidates
+    }
+    assert found["missed"].keys() == {
+        "direct",
+        *(f"softened hybrid, {s}" for s in ("1", "0.1", "0.01", "0.001")),
+        "segments",
+    }
+    assert_allclose(list(found["missed"].values()), [missed[name] for name in found["missed"]], rtol=1e-6)
+    assert found["taken"] == min(found["missed"], key=found["missed"].get)
+    assert (found["taken"] == "segments") == alike  # a rail that turns is none of the whole stroke

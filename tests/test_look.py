@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from selenium.webdriver import ActionChains, Keys
 
 import unconstrain as uc
-from seen import on_a_phone, unnamed_canvases, width_of
+from seen import coloured, on_a_phone, unnamed_canvases, width_of
 from test_cli import call, refused, run, write
 from test_one_model import FEATURES, of_one_model
 from unconstrain.pages.look import look_page, marks_of
@@ -107,6 +107,10 @@ def test_the_first_lines_say_what_is_there_and_what_is_odd(folder, page):
     assert verdict.startswith("! ")
     assert said.startswith(verdict.removesuffix(" What looks odd is listed below."))
     assert "constraint: of wipe_0, and drawn there alone" in said
+    rest = page.execute_script("return [...document.getElementById('rest').children].map((one) => one.textContent)")
+    assert rest[::2] == [name for name in ("Trust", "Do not trust", "Next") if f"{name}: " in said]
+    assert all(f"{name}: {one}" in said for name, one in zip(rest[:-2:2], rest[1:-2:2], strict=True))
+    assert rest[-1].startswith("Leave out what should not be learnt from")  # the page is open by now
     near = page.execute_script("return shown.patches.map((one) => one.at)")
     drawn = np.loadtxt(folder / "wipe_0.csv", delimiter=",", skiprows=1)[:, 1:]
     assert np.abs(np.array(near)[:, None] - drawn).max(axis=2).min(axis=1).max() < 0.02
@@ -203,6 +207,7 @@ def test_commands_and_pages_say_the_same_share_of_the_same_files(browser, tmp_pa
     for page in opened(browser, tmp_path / "look.html"):
         said = text(page, "policy-says").replace(" %", "%")
     shares = [re.search(r"(\d+)% of the time", one) for one in (rolled, said)]
+    assert "where it is thin, fewer than 3 tell the policy" in said
     assert 5 < int(shares[0][1]) < 95
     assert abs(int(shares[0][1]) - int(shares[1][1])) <= 2
 
@@ -220,11 +225,25 @@ def test_the_start_is_dragged_and_the_scene_is_turned(page):
     assert_allclose(page.execute_script("return look.project(look.roll.start)"), np.add(ring, [40, -25]), atol=1.5)
     page.execute_script("look.roll.start = [9, 9, 9]; window.dispatchEvent(new Event('resize'));")
     page.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]));")
-    assert "No demonstration passes near for 100 % of the time, first at 0 s, where it is dashed" in text(
+    assert "No demonstration passes near for 100 % of the time, first at 0 s, where it is grey and dashed" in text(
         page, "policy-says"
     )
+    assert text(page, "policy-says").startswith("The thick line: ")  # black by day, white by night
     canvas.send_keys(Keys.ARROW_LEFT)
     assert page.execute_script("return look.view.yaw") != yaw
+
+
+def test_a_dozen_demonstrations_have_a_colour_each_by_day_and_by_night(browser, tmp_path):
+    times = 0.1 * np.arange(20)
+    for index in range(12):
+        table = np.column_stack([times, np.cos(times + index), np.sin(times)])
+        np.savetxt(tmp_path / f"{index}.csv", table, delimiter=",", header="t,x,y", comments="")
+    run("look", *tmp_path.glob("*.csv"), "--differentiate", "-o", tmp_path / "look.html")
+    for scheme in ("light", "dark"):
+        with coloured(browser, scheme):
+            for shown in opened(browser, tmp_path / "look.html"):
+                fills = shown.execute_script("return look.demos.map((one) => one.swatch.style.fill)")
+                assert len(set(fills)) == 12
 
 
 def test_every_colour_and_time_can_be_shown(page):

@@ -1,5 +1,7 @@
 """The page to play with: what it shows at first, what strokes do, by hand and by key; in Chromium."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -41,7 +43,7 @@ def strokes(browser):
 def misses(browser):
     """The number of each learner, as a share."""
     script = (
-        "return ['direct', 'hybrid', 'segments'].map((name) => document.getElementById(`${name}-number`).textContent);"
+        "return ['direct', 'hybrid', 'robust'].map((name) => document.getElementById(`${name}-number`).textContent);"
     )
     return [
         float(text.removeprefix("misses ").rstrip("\N{NO-BREAK SPACE} %")) / 100
@@ -66,18 +68,18 @@ def draw_circle(browser, radius):
 
 
 def test_the_first_picture_tells_the_story(plate):
-    direct, hybrid, segments = misses(plate)
+    direct, hybrid, robust = misses(plate)
     assert direct > 0.25
     assert hybrid < 0.15 * direct
-    assert segments < 0.3 * hybrid
+    assert robust < 0.3 * hybrid
     assert plate.find_element("id", "verdict").text.startswith(f"Regression misses {100 * direct:.0f}")
 
 
 def test_what_is_learnt_of_the_example_is_what_python_learns(plate):
     states, actions, wanted, groups = strokes(plate)
     learnt = plate.execute_script("return Object.entries(plate.learnt.weights).map(([k, w]) => [k, Array.from(w)]);")
-    learners = {"direct": uc.Direct(), "segments": uc.Segments("groups"), "hybrid": uc.Hybrid()}
-    shown = dict(zip(("direct", "hybrid", "segments"), misses(plate), strict=True))
+    learners = {"direct": uc.Direct(), "robust": uc.Segments("groups"), "hybrid": uc.Hybrid()}
+    shown = dict(zip(("direct", "hybrid", "robust"), misses(plate), strict=True))
     for name, weights in learnt:
         features = uc.NormalisedRBF.grid(-1, 1, SIDE, width=WIDTH)
         policy = uc.ParametricPolicy(features, learners[name], validation=uc.Folds(4))
@@ -86,6 +88,27 @@ def test_what_is_learnt_of_the_example_is_what_python_learns(plate):
         assert_allclose(weights, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max(), err_msg=name)
         error = ((policy(states) - wanted) ** 2).sum(axis=1).mean() / wanted.var(axis=0).sum()
         assert_allclose(shown[name], error, rtol=0.1)
+
+
+def test_the_default_learner_says_which_way_it_took_and_what_others_miss(plate):
+    ways = plate.execute_script("return plate.learnt.compared.ways.map((one) => [one.name, one.missed]);")
+    missed, said = dict(ways), plate.find_element("id", "taken").text
+    assert said.startswith(": rail by rail (")
+    assert re.search(r"not regression \([\d.]+\s%\) or softened hybrid \([\d.]+\s%\)$", said)
+    assert missed["segments"] == min(missed.values())
+    plate.find_element("id", "clear").click()
+    assert plate.find_element("id", "taken").text == ""
+
+
+def test_the_first_click_after_drawing_by_keys_is_not_lost(plate):
+    canvas, clear = plate.find_element("id", "plate"), plate.find_element("id", "clear")
+    where = clear.rect["y"]
+    canvas.send_keys(Keys.SPACE, *[Keys.ARROW_RIGHT] * 8, Keys.SPACE)
+    assert plate.find_element("id", "hint").is_displayed()
+    assert clear.rect["y"] == where
+    clear.click()
+    assert plate.execute_script("return plate.strokes.length") == 0
+    assert not plate.find_element("id", "hint").is_displayed()
 
 
 def test_a_rail_lets_through_what_runs_along_it(plate):
@@ -132,8 +155,8 @@ def test_keys_draw_as_a_hand_does(plate):
 
 def test_with_one_rail_nobody_can_tell(plate):
     set_to(plate, "range", 0)
-    direct, hybrid, segments = misses(plate)
-    assert min(hybrid, segments) > 0.7 * direct
+    direct, hybrid, robust = misses(plate)
+    assert min(hybrid, robust) > 0.7 * direct
     assert plate.find_element("id", "verdict").text.startswith("Nobody can tell yet")
 
 

@@ -462,5 +462,5 @@ def test_without_the_other_benchmark_the_command_for_it_is_given(tmp_path):
 def test_a_result_of_another_version_is_no_failure(tmp_path):
     (tmp_path / "regimes.json").write_text('{"name": "regimes", "rows": []}')
     assert commands._beside("recorded", tmp_path) == [
-        f"regimes: {tmp_path / 'regimes.json'} is of another version; reproduce it again"
+        f"regimes: {tmp_path / 'regimes.json'} is of another version; reproduce it again with --force"
     ]

@@ -239,6 +239,14 @@ class TestPages:
         assert "58.3 ± 9.6" in page  # direct, random constraint, nUPE × 10⁻²
         assert "0.373 ± 1.1" in page
 
+    @pytest.mark.parametrize("name", ["table1", "figure5"])
+    def test_medians_stand_beside_means(self, results, pages, name):
+        rows = [row | {"nupe_median": 0.0777, "ncpe_median": 0.0888} for row in results(name).rows]
+        page = report.page(replace(results(name), rows=rows))
+        for median in ("7.77", "8.88"):
+            assert page.count(median) == len(rows)
+            assert median not in pages(name)
+
     def test_arrows_that_were_cut_are_confessed(self, results):
         result = results("figure4")
         wild = {**result.details["none"]["fields"], "inconsistency": 1e6 * result.details["policy"] + 1e6}

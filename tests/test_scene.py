@@ -23,7 +23,7 @@ from test_cli import environment, refused, run
 from test_constraint_command import ROBOT, write
 from test_look import wipes
 from unconstrain.pages import live
-from unconstrain.pages.scene import BEYOND, Scene
+from unconstrain.pages.scene import BEYOND, Movement, Scene
 
 READING = ("--state", "x,y,z", "--differentiate")
 JOINTS = ("--state", "a,b", "--differentiate")
@@ -162,6 +162,20 @@ def test_live_keeps_to_a_plane_and_to_a_start(scene, server):
     shown._begin.value = "2: wipe 1"
     shown._begin_anew(None)
     assert_allclose(shown._follow()[0], scene.demonstrations[1].states[0], atol=1e-6)
+
+
+def test_far_from_all_data_the_movement_is_grey_and_dashed(scene, server, monkeypatch):
+    track = uc.Demonstration(np.linspace(0, 1, 41)[:, None] * np.ones(3), np.ones((41, 3)), 0.1 * np.arange(41))
+    near = np.where(np.arange(41) < 20, 1.0, 0.0)
+    monkeypatch.setattr(Scene, "follow", lambda *_: Movement(track, near))
+    shown, drawn = live.Live(server, scene, None), {}
+    monkeypatch.setattr(shown, "_lines", lambda name, points, colours, _: drawn.update({name: (points, colours)}))
+    shown._follow()
+    points, colours = drawn["/movement"]
+    grey, rows = (colours[:, 0] == live.GREY).all(axis=1), np.rint(40 * points[:, 0, 0])
+    assert_allclose(rows[~grey], np.arange(20))
+    assert set(rows[grey]) < set(range(20, 40))
+    assert 0.4 <= len(rows[grey]) / 20 <= 0.6
 
 
 def test_the_joints_of_a_robot_are_those_of_the_states(folder, server):

@@ -308,14 +308,16 @@ def _reported(
     "--workers", type=int, default=-1, help="Processes; -1 is one for each core. The numbers do not depend on it."
 )
 @click.option("--out", type=click.Path(file_okay=False), default="results", help="Folder for NAME.json and NAME.html.")
+@option_for_force
 @option_for_json
-def reproduce(experiment: str, out: str, **settings: Any) -> None:
+def reproduce(experiment: str, out: str, force: bool, **settings: Any) -> None:
     """Run one of the paper's experiments, beside its printed values.
 
     An interrupted run continues where it stopped.
     """
     from ..paper import commands
 
+    check_outputs(commands.written(experiment, out), (), force)
     commands.reproduce(experiment, out, print_table, shown, **settings)
 
 
@@ -325,14 +327,16 @@ def reproduce(experiment: str, out: str, **settings: Any) -> None:
 @click.option("--plate", type=numbers, help="TILT_X,TILT_Y of a further plate to wipe, degrees.")
 @click.option("--seed", type=click.IntRange(0), default=0, help="Seed of the simulation.")
 @click.option("--out", type=click.Path(file_okay=False), default="demo", help="Folder for the report.")
+@option_for_force
 @option_for_json
-def demo(out: str, **settings: Any) -> None:
+def demo(out: str, force: bool, **settings: Any) -> None:
     """Wash a car: learn on some surfaces, test on others.
 
     Writes a report (HTML).
     """
     from ..paper import commands
 
+    check_outputs(commands.written("washing", out), (), force)
     commands.demo(out, print_table, shown, **settings)
 
 

@@ -151,7 +151,7 @@ def _freedom(found: Diagnosis) -> html.Markup:
         shown=len(shown),
         every=len(found.movements),
     )
-    return html.picture("free", [picture], caption)
+    return html.picture("free", [picture], caption, labels={"hybrid": "demonstrations"})
 
 
 def _chosen(found: Diagnosis) -> html.Markup:

@@ -148,7 +148,8 @@ def _movements(policy: Policy | Guided, demos: list[Demonstration], names: Seque
             keys=("hybrid", "training"),
             labels={"hybrid": "learnt policy", "training": "demonstrations"},
         )
-    return html.picture("movements", [_drawn([("training", one) for one in tracks], names)], _which(n, names))
+    drawn = _drawn([("training", one) for one in tracks], names)
+    return html.picture("movements", [drawn], _which(n, names), labels={"training": "demonstrations"})
 
 
 def _which(n: int, names: Sequence[str]) -> str:

@@ -147,8 +147,8 @@ def picture(
         Width below which panels go below each other, pixels.
     """
     width = least + WIDER if len(panels) > 1 else ALONE
-    drawn = [svg(panel, width, described(panel)) for panel in panels]
     named, coloured = LABELS | (labels or {}), COLOURS | (colours or {})
+    drawn = [svg(panel, width, described(panel, named)) for panel in panels]
     shown = [_key(key, named.get(key, key), coloured.get(key, PALETTE[0])) for key in keys]
     return _part("picture", name, drawn, caption, shown, least)
 

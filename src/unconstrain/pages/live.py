@@ -20,8 +20,8 @@ from ..models import SUPPORTED
 from ..recordings import Demonstration
 from .scene import LIGHT, PATCH, Scene, rgb_of, step_of
 
-STEPS, FRAME_S = 400, 1 / 30
-"""Of a movement; seconds that each is shown."""
+STEPS, FRAME_S, DASH = 400, 1 / 30, 6
+"""Of a movement; seconds that each is shown; how many are a dash, and the gap after it."""
 
 INK, GREY = (29, 33, 38), (150, 155, 162)
 
@@ -117,7 +117,7 @@ class Live:
         return self._named[self._begin.value]
 
     def _follow(self) -> Array:
-        """Roll out anew, and draw it: grey where it is far from all data; returns the states."""
+        """Roll out anew, and draw it, grey and dashed where it is far from all data; returns the states."""
         demo, plane = self._demo(), Plane(self._normal()) if self._held.value else None
         start = np.array(self._grip.position) if self._grip.visible else demo.states[0]
         try:
@@ -127,7 +127,8 @@ class Live:
             return start[None]
         self._says.content = "" if near is None else verdicts.of_support(near, track.times).said
         far = np.zeros(len(track), bool) if near is None else near < SUPPORTED
-        self._draw("/movement", self._scene.places(track.states), np.where(far[:, None], GREY, INK), 0.008)
+        kept = ~far[:-1] | (np.arange(len(far) - 1) // DASH % 2 == 0)
+        self._draw("/movement", self._scene.places(track.states), np.where(far[:, None], GREY, INK), 0.008, kept)
         return track.states
 
     def _normal(self) -> Array:
@@ -147,8 +148,8 @@ class Live:
             pieces = patches.pieces(self._scene, PATCH * self._extent)
             self._lines("/constraint", pieces, np.full((len(pieces), 2, 3), rgb_of(LIGHT[0])), 0.002)
 
-    def _draw(self, name: str, places: Array, colours: Array, thick: float) -> None:
-        points, shades = (np.stack([each[:-1], each[1:]], axis=1) for each in (places, colours))
+    def _draw(self, name: str, places: Array, colours: Array, thick: float, kept: Any = slice(None)) -> None:
+        points, shades = (np.stack([each[:-1], each[1:]], axis=1)[kept] for each in (places, colours))
         self._lines(name, points, shades, thick)
 
     def _lines(self, name: str, points: Array, colours: Array, thick: float) -> None:

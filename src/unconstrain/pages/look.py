@@ -43,6 +43,8 @@ PAUSE = 5.0
 MOST_NUMBERS = 50_000
 """Of the covariances of a policy's weights; of more the page does not say where recordings tell the policy."""
 
+_NEXT = "Leave out what should not be learnt from, and copy the command that learns from the rest."
+
 
 class Mark(NamedTuple):
     """What is seen on the time line, ``start`` and ``length`` in seconds from its begin, and told unless empty."""
@@ -112,6 +114,7 @@ def look_page(
         "policy": described,
         "planes": (planes := diagnosis.planes_of(demos))[: len(planes) == 1].tolist(),
         "verdict": "" if verdict is None else f"{verdict.mark.value} {verdict.said}",
+        "rest": [] if verdict is None else verdict._replace(next=_NEXT if command[0] else "").rest(),
     }
     runs = policy is not None and described is not None and not described["trouble"]
     script = policy.javascript() if policy is not None and runs else "null"

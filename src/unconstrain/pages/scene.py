@@ -28,7 +28,8 @@ PATCH = 0.04
 BEYOND = 0.25
 """How far a movement is followed beyond the data, as a share of the extent of the states."""
 
-LIGHT = ("#0072b2", "#c2570c", "#007d5f", "#a3508a", "#8a6d00", "#3a4cc0", "#b3261e", "#4d7a1e")
+LIGHT: tuple[str, ...] = ("#0072b2", "#c2570c", "#007d5f", "#a3508a", "#8a6d00", "#3a4cc0", "#b3261e", "#4d7a1e")
+LIGHT += ("#7a4f33", "#0b8a9e", "#d6339a", "#4a4f57")
 """Colours of demonstrations in turn, as on the page."""
 
 

@@ -40,6 +40,11 @@ TITLES = {
 """Short enough for a terminal."""
 
 
+def written(experiment: str, out: str) -> list[str]:
+    """What an experiment writes into a folder, as far as it is there already."""
+    return [str(path) for end in ("json", "html") if (path := Path(out) / f"{experiment}.{end}").exists()]
+
+
 def reproduce(
     experiment: str,
     out: str,
@@ -95,7 +100,7 @@ def _beside(experiment: str, folder: Path) -> list[str]:
         result = Result.from_json(json.loads(path.read_text(encoding="utf-8")), module.Settings)
         return [f"{other}, {line}" for line in module.headlines(result)]
     except (KeyError, TypeError, ValueError):
-        return [f"{other}: {path} is of another version; reproduce it again"]
+        return [f"{other}: {path} is of another version; reproduce it again with --force"]
 
 
 def demo(

@@ -3,7 +3,7 @@
 import io
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from html import escape
 from importlib import resources
@@ -54,7 +54,7 @@ RULE = "#e3e6ea"
 THEMED = {INK: "var(--ink)", COLOURS["truth"]: "var(--ink)", RULE: "var(--rule)", "#ffffff": "var(--paper)"}
 """Colours that the page decides, by its variables: they are others in the dark."""
 
-_KEY = "key:"
+_KEY, _MOST_BARS = "key:", 12  # of one key, told one by one to those who cannot see them
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -141,22 +141,33 @@ def svg(made: Any, width: int, alternative: str) -> str:
     return f"<svg {opening}>{compact(text[text.index('>') + 1 :])}"
 
 
-def described(made: Any) -> str:
-    """What a picture shows, in words: titles, axes, and how far each of its lines reaches."""
-    return " ".join(_described(axes) for axes in made.axes if axes.get_label() != "<colorbar>")
+def described(made: Any, names: Mapping[str, str] = LABELS) -> str:
+    """What a picture shows, in words: titles, axes, how far lines and shades reach, bars; keys by their names."""
+    return " ".join(_described(axes, names) for axes in made.axes if axes.get_label() != "<colorbar>")
 
 
-def _described(axes: Any) -> str:
+def _described(axes: Any, names: Mapping[str, str]) -> str:
     title, x, y = axes.get_title(loc="left"), axes.get_xlabel(), axes.get_ylabel()
-    flat = axes.name != "3d"
+    in_space = axes.name == "3d"
     lines: dict[str, list[Array]] = {}
-    for line in axes.lines if flat else ():
+    for line in axes.lines:
         if str(line.get_gid()).startswith(_KEY):
-            lines.setdefault(line.get_gid().removeprefix(_KEY), []).append(np.asarray(line.get_ydata(), float))
-    said = [f"{LABELS.get(key, key)} {_reach(np.concatenate(values))}" for key, values in lines.items()]
-    plotted = f"{y} over {x}" if x and y else x or y
-    head = ": ".join(filter(None, (title, plotted))) or "Movements in three dimensions"
-    return f"{head}{'; ' if said else ''}{', '.join(said)}."
+            upwards = line.get_data_3d()[2] if in_space else line.get_ydata()
+            lines.setdefault(line.get_gid().removeprefix(_KEY), []).append(np.asarray(upwards, float))
+    said = [f"{names.get(key, key)} {_reach(np.concatenate(values))}" for key, values in lines.items()]
+    said += [f"{one.colorbar.ax.get_ylabel()} {_reach(one.get_array())}" for one in axes.collections if one.colorbar]
+    plotted = f"{axes.get_zlabel()} over {x} and {y}" if in_space else f"{y} over {x}" if x and y else x or y
+    parts = [": ".join(filter(None, (title, plotted))), *_bars(axes, names), ", ".join(said)]
+    return f"{'; '.join(filter(None, parts))}."
+
+
+def _bars(axes: Any, names: Mapping[str, str]) -> Iterator[str]:
+    """The bars of each key with their groups; of many, how far they reach."""
+    groups = [one.get_text().replace("\n", " ") for one in axes.get_xticklabels()]
+    for name in dict.fromkeys(str(bar.get_gid()).removeprefix(_KEY) for bar in axes.patches):
+        tall = np.array([bar.get_height() for bar in axes.patches if bar.get_gid() == f"{_KEY}{name}"])
+        each = [f"{group} {height:.3g}" for group, height in zip(groups, tall, strict=True)]
+        yield f"{names.get(name, name)} {', '.join(each) if len(each) <= _MOST_BARS else _reach(tall)}"
 
 
 def _reach(values: Array) -> str:

@@ -4,8 +4,10 @@
 
   const of = (id) => document.getElementById(id);
   const made = (tag, properties = {}) => Object.assign(document.createElement(tag), properties);
-  const HUES = { light: ["#0072b2", "#c2570c", "#007d5f", "#a3508a", "#8a6d00", "#3a4cc0", "#b3261e", "#4d7a1e"],
-    dark: ["#56b4e9", "#f0a35e", "#3ecf9f", "#e29bc9", "#e3cf57", "#8f9bff", "#ff8a7a", "#a3d36b"] };
+  const HUES = { light: ["#0072b2", "#c2570c", "#007d5f", "#a3508a", "#8a6d00", "#3a4cc0", "#b3261e", "#4d7a1e", "#7a4f33",
+    "#0b8a9e", "#d6339a", "#4a4f57"],
+    dark: ["#56b4e9", "#f0a35e", "#3ecf9f", "#e29bc9", "#e3cf57", "#8f9bff", "#ff8a7a", "#a3d36b", "#c49a78",
+    "#4fd6e0", "#ff7ac6", "#c3c8cf"] };
   const RAMPS = { light: ["#b98900", "#6c9430", "#1a8f70", "#1c7a92", "#31559b", "#481f70"],
     dark: ["#4a51a8", "#3b80b8", "#2fa8a0", "#5ec66f", "#b4da45", "#fde725"] };
   const NEAR_DATA = 1e-3; // support below which the policy is far from all data
@@ -142,7 +144,7 @@
     const every = demos.flatMap((demo) => Array.from(demo[name]).filter((_, i) => i % 5 === 0)).sort((a, b) => a - b);
     return every[Math.floor(0.98 * (every.length - 1))] || 1;
   }
-  const hue = (demo) => HUES[theme()][demo.index % 8];
+  const hue = (demo) => HUES[theme()][demo.index % HUES.light.length];
   const top = usual("speed");
   const speedSays = shown.units[0] && new Set(shown.units).size === 1 ? `speed, ${shown.units[0]}/s` : "speed";
   const COLOURS = {
@@ -405,10 +407,10 @@
     const points = roll.track.map((state, i) =>
       project(axes.map((which) => (which < count ? state[which] : roll.times[i]))));
     const kinds = roll.track.map((_, i) => (isAway(i) ? 0 : isOpen(i) ? 1 : 2));
-    for (const [kind, colour] of ["ink", "soft", "ink"].entries()) {
+    for (const [kind, colour] of ["soft", "ink", "ink"].entries()) {
       context.strokeStyle = drawing.colour(colour);
-      context.lineWidth = [1.6, 2.8, 2.8][kind];
-      context.setLineDash(kind ? [] : [3, 4]);
+      context.lineWidth = [2.8, 1.2, 2.8][kind];
+      context.setLineDash(kind ? [] : [5, 6]);
       context.beginPath();
       for (let i = 1; i < points.length; i++) {
         if (kinds[i] !== kind) continue;
@@ -458,7 +460,7 @@
   const isOpen = (i) => roll.untold !== null && roll.untold[i] > untold.small && !isAway(i);
 
   function sayPolicy() {
-    of("policy-says").textContent = `The black line: where it goes from the ring, which can be dragged. ${howKnown()}`;
+    of("policy-says").textContent = `The thick line: where it goes from the ring, which can be dragged. ${howKnown()}`;
   }
 
   /** The same as the verdict of `unconstrain rollout`. */
@@ -470,12 +472,12 @@
       return first < 0 ? "" : `${percent(share)} of the time, first at ${number(roll.times[first])} s`;
     };
     const away = part(isAway), open = part(isOpen);
-    const said = away && `No demonstration passes near for ${away}, where it is dashed: extrapolated.`;
+    const said = away && `No demonstration passes near for ${away}, where it is grey and dashed: extrapolated.`;
     if (!untold) return said || "All of it is near the data; whether recordings tell the policy there is not known here.";
     if (!open) return said || "All of it is near the data, and recordings tell the policy.";
     const every = roll.untold.filter((_, i) => isOpen(i)).sort((one, other) => one - other);
     const off = every[Math.floor(every.length / 2)];
-    return `${said ? `${said} Near some, ` : "Near demonstrations, but "}${open}, where it is grey, fewer than 3 tell the ` +
+    return `${said ? `${said} Near some, ` : "Near demonstrations, but "}${open}, where it is thin, fewer than 3 tell the ` +
       `policy in every direction: there it may be off by ${off < 1 ? `about ${percent(off)} of` : "as much as"} its typical action.`;
   }
 
@@ -546,6 +548,8 @@
     const warnings = demos.flatMap((demo) => demo.marks.map((mark) => ({ demo, mark })));
     const odd = warnings.filter(({ mark }) => mark.code !== "gap" && mark.code !== "pause");
     of("verdict").textContent = shown.verdict + (odd.length ? " What looks odd is listed below." : "");
+    of("rest").append(...shown.rest.flatMap((pair) =>
+      pair.map((textContent, i) => made(i ? "dd" : "dt", { textContent }))));
     of("verdict").className = /^[!✖]/.test(shown.verdict) ? "verdict warn" : "verdict";
     const whole = number(demos.reduce((sum, demo) => sum + lengthOf(demo), 0));
     of("summary").textContent = `${several(demos.length, "demonstration")}, ${several(shown.samples, "sample")}, ` +

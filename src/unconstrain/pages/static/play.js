@@ -10,8 +10,9 @@
   const MOST_STROKES = 40;
   const GOLDEN = (Math.sqrt(5) - 1) / 2;
   const ARROWS = Array.from({ length: 121 }, (_, i) => [-0.95 + 0.19 * Math.floor(i / 11), -0.95 + 0.19 * (i % 11)]);
-  const NAMES = ["direct", "hybrid", "segments"];
-  const WORDS = { direct: "Ordinary regression", hybrid: "the hybrid", segments: "rail by rail" };
+  const NAMES = ["direct", "hybrid", "robust"];
+  const WORDS = { direct: "Ordinary regression", hybrid: "the hybrid", robust: "the default learner" };
+  const WAYS = { direct: "regression", softened: "softened hybrid", segments: "rail by rail" };
 
   const features = learning.kernels(learning.grid(-1, 1, SIDE), ((2 * WIDTH) / (SIDE - 1)) ** 2);
   const strokes = []; // { states, wanted, chance, moments }
@@ -118,7 +119,8 @@
       const folds = filled.map((part) => learning.total(part.map((one) => one.moments)));
       const whole = learning.total(folds), hybrid = learning.hybrid(folds);
       Object.assign(learnt, { path: hybrid.path, chosen: hybrid.split });
-      learnt.weights = { direct: learning.direct(whole), segments: learning.segments(strokes, filled) };
+      learnt.compared = learning.compared(strokes, filled);
+      learnt.weights = { direct: learning.direct(whole), robust: learnt.compared.taken.weights };
       walk();
     }
     performance.measure("refit", { start: begun });
@@ -173,6 +175,7 @@
         (truth ? `; misses ${percent(errors[name])} of what was wanted.` : "."));
     }
     of("verdict").textContent = verdict(errors, truth);
+    of("taken").textContent = fitted ? sayWays(learnt.compared) : "";
     of("range-says").value = settings.range ? `± ${settings.range / 2}°` : "one rail";
     of("noise-says").value = `${settings.noise} %`;
     of("split").max = learnt.path ? learnt.path.size : 50;
@@ -184,7 +187,9 @@
     of("strokes").textContent = `${strokes.length} stroke${strokes.length === 1 ? "" : "s"}, ` +
       `${strokes.reduce((sum, one) => sum + one.states.length, 0)} samples`;
     of("undo").disabled = of("clear").disabled = !fitted;
-    of("says").textContent = pen.shown ? "Arrow keys move the pen, Space puts it down and lifts it." : !fitted ? "Empty. Draw a few strokes across each other; circles, say." :
+    of("hint").style.visibility = pen.shown ? "" : "hidden";
+    of("says").style.visibility = pen.shown ? "hidden" : "";
+    of("says").textContent = !fitted ? "Empty. Draw a few strokes across each other; circles, say." :
       strokes.length >= MOST_STROKES ? "The plate is full." : "Stripes show how the next rail runs.";
     draw();
   }
@@ -192,12 +197,21 @@
   function verdict(errors, truth) {
     if (!strokes.length) return "Nothing is drawn yet.";
     if (!truth) return "Which of the three would you trust? Show the truth to see.";
-    const best = errors.hybrid < errors.segments ? "hybrid" : "segments";
+    const best = errors.hybrid < errors.robust ? "hybrid" : "robust";
     if (errors[best] > 0.7 * errors.direct)
       return `Nobody can tell yet: regression misses ${percent(errors.direct)}, ${WORDS[best]} ${percent(errors[best])}. ` +
         "Give the rails more range, or draw more strokes over each other.";
     return `Regression misses ${percent(errors.direct)} of what the hand wanted, the paper’s hybrid ` +
-      `${percent(errors.hybrid)}, rail by rail ${percent(errors.segments)}.`;
+      `${percent(errors.hybrid)}, the default learner ${percent(errors.robust)}.`;
+  }
+
+  /** Which way to learn was taken, and the best of each other kind, with what each misses of held-out strokes. */
+  function sayWays({ ways, taken }) {
+    const kind = ({ name }) => name.match(/^\w+/)[0], others = ways.filter((one) => kind(one) !== kind(taken));
+    const best = [...new Set(others.map(kind))].map((each) =>
+      others.filter((one) => kind(one) === each).reduce((least, one) => (one.missed < least.missed ? one : least)));
+    const [first, ...rest] = [taken, ...best].map((one) => `${WAYS[kind(one)]} (${percent(one.missed)})`);
+    return `: ${first}, not ${rest.join(" or ")}`;
   }
 
   const draw = drawing.perFrame(() => {
@@ -228,7 +242,7 @@
       }
     }
     context.globalAlpha = 1;
-    context.strokeStyle = context.fillStyle = drawing.colour("segments");
+    context.strokeStyle = context.fillStyle = drawing.colour("robust");
     context.lineWidth = 2.5;
     if (pen.points.length > 1) drawing.line(context, pen.points.map(to));
     if (pen.shown) {

@@ -99,7 +99,7 @@ def verdict(result: Result) -> uc.evaluation.verdicts.Verdict:
             "direct learning fails there": error["direct", "random"] >= FAILS * held,
         },
         "Medians and ratios between the methods.",
-        "Means of the constrained rows depend on the seed by a factor of five: look at the medians beside them.",
+        "Means of the constrained rows depend on the seed by a factor of five: compare the medians, on the page.",
     )
 
 

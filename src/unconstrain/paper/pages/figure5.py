@@ -20,7 +20,6 @@ ANGLE = "how far constraints vary, θmax (rad)"
 def page(result: Result) -> str:
     """Errors against how much the constraints vary."""
     widest = np.array(sorted({row["theta_max"] for row in result.rows}))
-    per_step, per_trajectory = (_curves(rows) for rows in (result.rows, result.tables["per_trajectory"]))
     return html.document(
         "Figure 5: from one constraint to many",
         figure5.verdict(result),
@@ -33,10 +32,10 @@ def page(result: Result) -> str:
             "data lies. <b>nUPE</b> is the error of the learnt policy where it is free, <b>nCPE</b> after the "
             "constraint has taken its share, both as a share of the policy’s variance."
         ),
-        html.section("Errors", _errors(widest, per_step)),
+        html.section("Errors", _errors(widest, _curves(result.rows))),
         html.section("The hybrid against the better of the other two", _ratio(widest, result)),
-        html.section("Numbers", _table(widest, per_step, result)),
-        html.section("Numbers with one angle for each trajectory", _table(widest, per_trajectory, result)),
+        html.section("Numbers", _table(result.rows, result)),
+        html.section("Numbers with one angle for each trajectory", _table(result.tables["per_trajectory"], result)),
         html.settings_table(result.settings),
     )
 
@@ -82,19 +81,26 @@ def _ratio(widest: Array, result: Result) -> html.Markup:
     )
 
 
-def _table(widest: Array, curves: dict[str, table1.Curves], result: Result) -> html.Markup:
+def _table(rows: list[dict[str, Any]], result: Result) -> html.Markup:
+    """Means and medians by angle: a table for each error."""
+    found = {(row["theta_max"], row["method"]): row for row in rows}
     header: list[str] = [html.markup("θ<sub>max</sub> (rad)")]
-    header += [f"{title}\n{method}" for title in TITLES.values() for method in figures.METHODS]
-    rows = [
-        [
-            html.number(angle),
-            *(
-                parts.mean_sd(curves[metric][method][0][index], curves[metric][method][1][index])
-                for metric in TITLES
-                for method in figures.METHODS
-            ),
-        ]
-        for index, angle in enumerate(widest)
-    ]
+    header += figures.METHODS
     trials = getattr(result.settings, "trials", 1)
-    return html.table(header, rows, note=f"Mean ± standard deviation over {trials} data sets, all × 10⁻².")
+    made = []
+    for metric, title in TITLES.items():
+        body = [
+            [
+                html.number(angle),
+                *(_cell(found[angle, method], metric) for method in figures.METHODS),
+            ]
+            for angle in sorted({angle for angle, _ in found})
+        ]
+        note = f"{title}: mean ± standard deviation, and below it the median, over {trials} data sets, all × 10⁻²."
+        made.append(html.table(header, body, note=note))
+    return html.markup("").join(made)
+
+
+def _cell(row: dict[str, Any], metric: str) -> str:
+    mean, sd, median = (row[f"{metric}_{what}"] for what in ("mean", "sd", "median"))
+    return f"{parts.mean_sd(mean, sd)}\n{html.number(100.0 * median)}"

@@ -48,22 +48,29 @@ def page(result: Result) -> str:
 def table(
     given: list[dict[str, Any]], trials: int, trials_of_paper: int, metrics: Sequence[str] = METRICS
 ) -> html.Markup:
-    """Ours beside the paper's, row by row."""
-    header = ["method", "data"]
-    for metric in metrics:
-        header += [f"{TITLES[metric]}\nours", "median", "paper"]
-    rows, rules = [], []
-    for index, row in enumerate(given):
-        if index and row["method"] != given[index - 1]["method"]:
-            rules.append(index)
-        cells = [parts.label(row["method"]), WORDS.get(row["constraint"], row["constraint"])]
-        for metric in metrics:
-            median = html.number(100.0 * row[f"{metric}_median"])
-            cells += [parts.mean_sd(*_pair(row, metric)), median, parts.mean_sd(*_pair(row, f"paper_{metric}"))]
-        rows.append(cells)
-    note = f"Mean ± standard deviation, and median, over {trials} data sets, all × 10⁻². The paper’s are over "
-    note += f"{trials_of_paper}."
-    return html.table(header, rows, left=2, note=note, rules=rules)
+    """Ours beside the paper's, row by row: a table for each error."""
+    note = (
+        f"{{}}: mean ± standard deviation, and median, over {trials} data sets, × 10⁻². The paper’s are over "
+        f"{trials_of_paper}."
+    )
+    rules = [at for at, row in enumerate(given) if at and row["method"] != given[at - 1]["method"]]
+    return html.markup("").join(
+        html.table(
+            ["method", "data", "ours", "median", "paper"],
+            [_cells(row, metric) for row in given],
+            left=2,
+            note=note.format(TITLES[metric]),
+            rules=rules,
+        )
+        for metric in metrics
+    )
+
+
+def _cells(row: dict[str, Any], metric: str) -> list[str]:
+    """The method, the data, and its error beside the paper's."""
+    data, median = WORDS.get(row["constraint"], row["constraint"]), html.number(100.0 * row[f"{metric}_median"])
+    paper = parts.mean_sd(*_pair(row, f"paper_{metric}"))
+    return [parts.label(row["method"]), data, parts.mean_sd(*_pair(row, metric)), median, paper]
 
 
 def trials(result: Result) -> int:

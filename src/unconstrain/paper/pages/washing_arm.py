@@ -99,20 +99,32 @@ def _tracks(wiped: list[tuple[Reproduction, Wipe]]) -> html.Markup:
     )
 
 
+MEASURES = (
+    "learnt from",
+    "turns",
+    "contact",
+    "force (N)",
+    "frequency (Hz)",
+    "demonstrated (Hz)",
+    "radius (cm)",
+    "demonstrated (cm)",
+    "drift (mm)",
+    "path error (mm)",
+    "largest torque",
+    "× real time",
+)
+
+
 def _measures(rows: list[dict[str, Any]]) -> html.Markup:
-    header = ["plate", "learnt\nfrom", "turns", "contact", "force\n(N)", "frequency\n(Hz)", "demonstrated\n(Hz)"]
-    header += ["radius\n(cm)", "demonstrated\n(cm)", "drift\n(mm)", "path error\n(mm)", "largest\ntorque"]
-    header += ["× real\ntime"]
+    """A column for each plate, so that any screen is wide enough."""
     several = len({row["trial"] for row in rows}) > 1
-    body = []
+    names, columns = [], []
     for surface in dict.fromkeys(row["surface"] for row in rows):
         of_plate = [row for row in rows if row["surface"] == surface]
         done = [row for row in of_plate if not row["failed"]]
-        name = surface + (f"\n{len(of_plate)} runs" if several else "")
-        if not done:
-            body.append([name, "yes" if of_plate[0]["seen"] else "no", *["–"] * 11])
-            continue
-        body.append([name, "yes" if of_plate[0]["seen"] else "no", *_cells(done)])
+        names.append(surface + (f"\n{len(of_plate)} runs" if several else ""))
+        cells = _cells(done) if done else ["–"] * (len(MEASURES) - 1)
+        columns.append(["yes" if of_plate[0]["seen"] else "no", *cells])
     note = (
         "Largest torque: as a share of what its joint can. Radius: rms distance from the middle. Drift: from the "
         "middle of the first turn to that of the last. Path error: rms distance from where the policy itself would "
@@ -120,7 +132,8 @@ def _measures(rows: list[dict[str, Any]]) -> html.Markup:
     )
     note += "Means over the runs, and in brackets the worst." if several else ""
     failed = [f"Not wiped: {row['failed']}" for row in rows if row["failed"]]
-    return html.table(header, body, left=2, note=html.markup("<br>").join([note, *failed]))
+    body = [list(row) for row in zip(MEASURES, *columns, strict=True)]
+    return html.table(["plate", *names], body, note=html.markup("<br>").join([note, *failed]))
 
 
 def _cells(rows: list[dict[str, Any]]) -> list[str]:

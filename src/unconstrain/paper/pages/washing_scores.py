@@ -12,14 +12,28 @@ from ..experiments.trials import Result
 Row = dict[str, Any]
 KINDS = {"plane": "normal of the plane", "tool": "axis of the tool"}
 
+ERRORS = {
+    "ncpe": "nCPE: squared error along the surface, as a share of the policy’s variance.",
+    "nupe": "nUPE: squared error where nothing holds it, as a share of the policy’s variance.",
+}
+REAL = (
+    "nCPE with the {}: squared error along the surface, as a share of the observed motion’s variance; 0 is perfect, "
+    "and 1 no better than one constant velocity. The surface’s normal is estimated in two ways that share nothing: "
+    "from the plane through the positions, and from the axis of the tool."
+)
 
 LEARNERS = (*figures.METHODS, "robust")
 """The paper's methods, and the default learner."""
 
 
 def scores(result: Result) -> html.Markup:
-    """Method by surface, and the mean over those that were held out."""
-    return _real_scores(result.rows) if "normal" in result.rows[0] else _simulated_scores(result.rows)
+    """Method by surface, and the mean over those that were held out: a table for each error or kind of normal."""
+    rows = result.rows
+    if "normal" not in rows[0]:
+        return html.markup("").join(_table(rows, what, note) for what, note in ERRORS.items())
+    kinds = dict.fromkeys(row["normal"] for row in rows)
+    of_kinds = [(KINDS[kind], [row for row in rows if row["normal"] == kind]) for kind in kinds]
+    return html.markup("").join(_table(of, "ncpe", REAL.format(normal)) for normal, of in of_kinds)
 
 
 def bars(result: Result) -> html.Markup:
@@ -39,51 +53,26 @@ def bars(result: Result) -> html.Markup:
     return html.picture("scores", panels, f"Error along each surface; lower is better.{mark}", keys=LEARNERS)
 
 
-def _simulated_scores(rows: list[Row]) -> html.Markup:
-    header = ["surface", "learnt from"]
-    header += [f"{title}\n{method}" for title in ("nCPE", "nUPE") for method in LEARNERS]
-    surfaces = list(dict.fromkeys((row["surface"], row["seen"]) for row in rows))
-    body = []
-    for surface, seen in surfaces:
-        values = [_value(rows, method, surface, what) for what in ("ncpe", "nupe") for method in LEARNERS]
-        body.append([surface, "yes" if seen else "no", *map(html.number, values)])
-    seen_count = sum(seen for _, seen in surfaces)
-    unseen = [row for row in rows if not row["seen"]]
-    body.append([html.markup("<b>mean of the unseen</b>"), "", *_means(unseen, "ncpe"), *_means(unseen, "nupe")])
-    note = html.markup(
-        "Squared errors as a share of the policy’s variance. In the last row, in brackets: relative to direct "
-        "learning. Robust is the default learner of <i>fit</i>, with nothing set for this job."
-    )
-    return html.table(header, body, left=2, note=note, rules=(seen_count, len(surfaces)))
-
-
-def _real_scores(rows: list[Row]) -> html.Markup:
-    kinds = list(dict.fromkeys(row["normal"] for row in rows))
-    header = ["held-out tilt"]
-    header += [f"{method}\n{kind} normal" for kind in kinds for method in LEARNERS]
-    surfaces = list(dict.fromkeys(row["surface"] for row in rows))
-    of_kind = {kind: [row for row in rows if row["normal"] == kind] for kind in kinds}
+def _table(rows: list[Row], what: str, note: str) -> html.Markup:
+    surfaces = dict.fromkeys((row["surface"], row["seen"]) for row in rows)
     body = [
-        [
-            surface,
-            *(html.number(_value(of_kind[kind], method, surface, "ncpe")) for kind in kinds for method in LEARNERS),
-        ]
-        for surface in surfaces
+        [surface, "yes" if seen else "no", *(html.number(_value(rows, one, surface, what)) for one in LEARNERS)]
+        for surface, seen in surfaces
     ]
-    body.append([html.markup("<b>mean</b>"), *(cell for kind in kinds for cell in _means(of_kind[kind], "ncpe"))])
-    note = html.markup(
-        "nCPE: squared error along the surface, as a share of the observed motion’s variance; 0 is perfect, and 1 "
-        "no better than one constant velocity. The surface’s normal is estimated in two ways that share "
-        "nothing: from the plane through the positions, and from the axis of the tool. In the last row, in brackets: "
-        "relative to direct learning. Robust is the default learner of <i>fit</i>, with nothing set for this job."
-    )
-    return html.table(header, body, note=note, rules=(len(surfaces),))
+    unseen = [row for row in rows if not row["seen"]]
+    body.append([html.markup("<b>mean of the unseen</b>"), "", *_means(unseen, what)])
+    said = html.markup(
+        "{} In the last row, in brackets: relative to direct learning. Robust is the default learner of <i>fit</i>, "
+        "with nothing set for this job."
+    ).format(note)
+    rules = (sum(seen for _, seen in surfaces), len(surfaces))
+    return html.table(["surface", "learnt from", *LEARNERS], body, left=2, note=said, rules=rules)
 
 
 def _means(rows: list[Row], what: str) -> list[str]:
     """Mean of each method, with its ratio to direct learning."""
     means = {method: float(np.mean([row[what] for row in rows if row["method"] == method])) for method in LEARNERS}
-    relative = html.markup("{} <b>(×{})</b>")
+    relative = html.markup("{}\n<b>(×{})</b>")
     cells = []
     for method, mean in means.items():
         ratio = mean / means["direct"] if means["direct"] > 0 else float("nan")
