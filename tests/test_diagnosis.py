@@ -16,6 +16,7 @@ from test_report import References
 from unconstrain.base.errors import InvalidDataError, SettingError
 from unconstrain.evaluation import verdicts
 from unconstrain.evaluation.diagnosis import Diagnosis, about_recordings, diagnose, sentences
+from unconstrain.evaluation.marks import WELL
 from unconstrain.pages import diagnosis, fit
 
 TURN = np.array([[-0.3, 1.0], [-1.0, -0.3]])
@@ -312,7 +313,7 @@ def test_what_fit_and_diagnose_call_told_is_told(variance, kind, seed):
         widest = uc.LocallyLinearPolicy(None, learner="direct").fit_demonstrations(demos).variance_
         assert told > 0.5 or policy.variance_ != widest, "one model is too stiff, and one or two are in narrow fields"
         assert fit.mark is not verdicts.Mark.BAD
-        assert ("across" in fit.said) == (told < verdicts.PARTLY and policy.held_out_score() >= verdicts.GOOD)
+        assert ("across" in fit.said) == (told < WELL)
         assert whole.mark is not verdicts.Mark.BAD
         hangs = "whichever two are left out: it may hang on one or two" in whole.said
         assert hangs == (told >= verdicts.PARTLY > found.states_determined)
@@ -320,7 +321,7 @@ def test_what_fit_and_diagnose_call_told_is_told(variance, kind, seed):
         assert told < 0.05 < 0.2 < missed
         assert whole.mark is verdicts.Mark.BAD
         assert fit.mark is not verdicts.Mark.GOOD
-        assert "at 100% of the recorded states no recording tells" in fit.doubt
+        assert fit.said.startswith("Recordings tell too little: at 100% of the recorded states no recording tells")
 
 
 def test_strokes_on_planes_of_their_own_are_not_called_bad_recordings(fitted):

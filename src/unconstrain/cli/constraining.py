@@ -337,7 +337,8 @@ def mechanism_of(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe, 
         unit = _length_of([recipe.units(first.units).get(name, "") for name in names])
         found = uc.constraints.identify(positions[::every], groups=groups[::every], unit=unit)
         if found.kind == "point":
-            raise InvalidDataError("positions keep to a point, which would hold every motion.")
+            least = min(demonstrations, key=lambda one: one.states.var(axis=0).sum()).name
+            raise InvalidDataError(f"positions keep to a point, which would hold every motion; {least!r} moves least.")
     except InvalidDataError as error:
         click.echo(f"Note: no mechanism is named: {error}", err=True)
         return None
