@@ -13,26 +13,14 @@ from numpy.typing import NDArray
 from ..base.arrays import Array
 from ..base.display import counted, percent
 from ..models import SUPPORTED
-from .marks import (
-    ENOUGH,
-    FAIR,
-    FAR_OFF,
-    FORBIDDEN,
-    NEARBY,
-    OTHERWISE,
-    PARTLY,
-    UNITS,
-    allowed_by,
-    doubted,
-    graded,
-    no_better,
-)
+from .marks import ENOUGH, FAIR, FAR_OFF, FORBIDDEN, NEARBY, OTHERWISE, PARTLY, UNITS, doubted, graded, no_better
 from .marks import GOOD as GOOD
 from .marks import MOSTLY as MOSTLY
 from .marks import SMALL as SMALL
 from .marks import WIDTH as WIDTH
 from .marks import Mark as Mark
 from .marks import Verdict as Verdict
+from .marks import allowed_by as allowed_by
 
 if TYPE_CHECKING:
     from ..constraints import LearntConstraint
@@ -296,9 +284,7 @@ def of_constraint(
     then = "Use it with 'unconstrain rollout --constraint' or 'score --constraint'."
     if choice.several and not others and mark is not Mark.GOOD:
         said = f"If one constraint held all: {said}"
-        then = (
-            "Learn it of each alone (--episodes, --leave-out): each may have been held in its own way, or not at all."
-        )
+        then = "Learn it of each alone (--episodes, --leave-out): each may have been held otherwise, or not at all."
     if (choice.doubts or len(ranks) > 1 or undecided) and mark is Mark.GOOD:
         mark = Mark.DOUBTFUL
     if choice.lacking:
