@@ -388,7 +388,12 @@ def test_regions_that_all_recordings_tell_are_not_doubted_for_being_shown_by_few
             True,
         ),
         (CROSSING, np.ones_like, "", False),
-        (CROSSING[1:], np.zeros_like, "'held' ended slower than 20% of a usual speed where no other moves on: whether something stopped it", False),
+        (
+            CROSSING[1:],
+            np.zeros_like,
+            "'held' ended slower than 20% of a usual speed where no other moves on: whether something stopped it",
+            False,
+        ),
         (CROSSING[1:2], np.zeros_like, "'held' ended slower than 20% of a usual speed", False),
         (TO_A_GOAL, np.zeros_like, "", False),
         (

@@ -81,6 +81,8 @@ class TestMarks:
         assert "'unconstrain diagnose' tells of several together which look held." in alike.next
         assert "by one demonstration alone" in alike.said
         assert "alone" not in little.said + little.next
+        both = verdicts.of_constraint(alone, alone, shown=True)
+        assert ["from several" in one.next for one in (known, both)] == [True, False]
 
     def test_one_constraint_for_all_is_supposed_where_much_moves_along_it(self):
         for missed, much in ((0.12, True), (0.02, False)):
@@ -88,8 +90,6 @@ class TestMarks:
             found = verdicts.of_constraint(SimpleNamespace(rank_=1, choice_=choice))
             assert found.said.startswith("If one constraint held all: 1 of 2 directions were held;") == much
             assert found.next.startswith("Learn it of each alone" if much else "Use it with 'unconstrain rollout")
-        both = verdicts.of_constraint(alone, alone, shown=True)
-        assert ["from several" in one.next for one in (known, both)] == [True, False]
 
     def test_a_bad_recording_is_not_hidden_by_many_good_ones(self):
         good, usual = verdicts.of_score(0.97, 20), {f"a_{number}": 0.98 for number in range(18)}
@@ -220,6 +220,10 @@ def test_a_check_mark_takes_states_that_recordings_tell(folder, tmp_path, told, 
 def test_what_explains_fairly_and_is_not_told_is_no_use():
     found = verdicts.of_explained(0.8, 24, 0.0, "Record more there.")
     assert (found.mark, found.next) == (Mark.BAD, "Record more there.")
+    assert (
+        verdicts.of_explained(0.1, 24, 0.0, "Record more there.").said
+        == "The policy explains 10% of held-out motion: poor."
+    )
     assert found.said.startswith("Recordings tell too little: at 100% of the recorded states")
     assert verdicts.of_explained(0.8, 24, 0.75).mark is verdicts.of_explained(0.8, 24, 1.0).mark is Mark.DOUBTFUL
     assert verdicts.of_explained(0.95, 24, 0.0).mark is Mark.DOUBTFUL

@@ -82,13 +82,14 @@ def of_explained(
     guiding takes of that, None where it is not guided: a guided policy is judged by the one in it, or worse.
     """
     across, little = "What constraints hid: no recording shows it, so no score does.", ""
+    (alone, word), (mark, _) = (graded(each, told=determined) for each in (share, share - (lost or 0.0)))
     if determined is not None and determined < MOSTLY and demonstrations >= ENOUGH:
         untold = of_untold(1 - determined)
-        little = "" if allowed_by(determined) is Mark.GOOD else f"Recordings tell too little: {untold}. "
+        if allowed_by(determined) is not Mark.GOOD and word != "poor":  # which is so for another reason
+            little = f"Recordings tell too little: {untold}. "
         across = f"Across the motion: {'as said first' if little else untold}"
         across += "." if there else "; 'unconstrain diagnose' says where."
     much = f"{percent(lost)} less" if lost and round(lost, 2) else "as much"
-    (alone, word), (mark, _) = (graded(each, told=determined) for each in (share, share - (lost or 0.0)))
     guided = "Guided" if mark is alone else "But guided"
     retold = f" {guided}, it explains {much} of the demonstrations it was fitted to; that says nothing of new starts."
     retold *= lost is not None
@@ -98,7 +99,7 @@ def of_explained(
         return Verdict(Mark.DOUBTFUL, few + retold, doubt=across, next=MORE)
     missed = f"where the policy predicts, it misses {percent(np.sqrt(max(1 - share, 0)))} of a typical action"
     advice = f"{_advice(word, learnt, mark is not alone)} {there}".rstrip()
-    if little and word != "poor":
+    if little:
         advice = there or "'unconstrain diagnose' says what to record."
     trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
     said = f"{little}The policy {_explains(share)}: {word}.{retold}"

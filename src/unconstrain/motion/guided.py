@@ -307,8 +307,7 @@ def _around(demos: Sequence[Demonstration]) -> float:
 def _rounds(demos: Sequence[Demonstration]) -> str:
     """Which demonstrations alone go round, if some do."""
     names = [one.name or str(k + 1) for k, one in enumerate(demos) if abs(turns(demos)[k]) >= _ROUND]
-    some = 0 < len(names) < len(demos)
-    return f", or learn from the {len(names)} alone that make one ({listed(names, 8)})" if some else ""
+    return f", or learn from the {len(names)} alone that make one ({listed(names, 8)})" * (0 < len(names) < len(demos))
 
 
 def _given(demos: Sequence[Demonstration]) -> str:
