@@ -4,6 +4,7 @@ import json
 import re
 import shlex
 import shutil
+import warnings
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +14,7 @@ import unconstrain as uc
 from test_cli import call, refused, run, write
 from test_formats import workbook
 from test_newcomer import LINEAR, stroke, text
+from unconstrain.pages import replays
 
 READ = ("--state", "x,y", "--by", "savgol")
 
@@ -262,6 +264,11 @@ def test_a_goal_that_few_came_near_and_still_in_motion_is_doubted(tmp_path, seco
     said = "--guided: 3 of 8 demonstrations end near it, still at 2"
     assert (said in text(ran)) == doubted
     assert ("they show no goal. Record movements to their end, or give the goal with --guided." in text(ran)) == doubted
+    recipe = uc.Recipe(states=("x", "y"), differentiate="savgol")
+    with warnings.catch_warnings(action="ignore"):
+        demos = uc.prepare(uc.read(sorted(tmp_path.glob("w*.csv"))), recipe)
+    advice = replays._guide(uc.load(tmp_path / "p.npz", uc.Guided).policy, demos)  # where a policy strays
+    assert advice == (replays.GUIDE_TO.format("") if doubted else replays.GUIDE)
 
 
 @pytest.mark.parametrize(
