@@ -136,7 +136,17 @@ def test_on_the_command_line_the_exit_code_says_it(tmp_path):
         CliRunner().invoke(main, ["certify", str(tmp_path / name)]) for name in ("guided.npz", "plain.npz", "none.npz")
     )
     assert (good.exit_code, bad.exit_code, wrong.exit_code) == (0, 1, 2)
-    assert "From every state, movements arrive: free at (0.3" in good.output
+    assert good.output.startswith("✔")
+    assert "From every state, movements arrive: free at (0.3" in " ".join(good.output.split())
+    assert "Do not trust: A constraint that moves or is not told, or an obstacle," in good.output
+    assert bad.output.startswith("✖")
+    units = " Lengths are in the unit of the states, and all rates per second."
+    assert all(units in " ".join(one.output.split()) for one in (good, bad))
+    notes = {"recipe": {"states": ["x", "y", "z"], "differentiate": "savgol"}, "units": dict.fromkeys("xyz", "mm")}
+    uc.save(uc.Guided(POLICY, demonstrations=SHOWN), tmp_path / "mm.npz", notes)
+    assert "Lengths are in mm," in " ".join(
+        CliRunner().invoke(main, ["certify", str(tmp_path / "mm.npz")]).output.split()
+    )
     assert "guaranteed" in bad.output
     assert f"Next: unconstrain export {tmp_path / 'guided.npz'} -o policy.c" in good.output
     assert "Next: unconstrain fit with --guided auto" in bad.output

@@ -1,6 +1,7 @@
 """``unconstrain constraint``, its file and its page, and the commands that take the file."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -252,7 +253,7 @@ def test_plates_of_other_tilts_have_a_constraint_each_and_a_table(tilted, tmp_pa
     assert "angle of normal to z axis" in page
 
 
-def test_one_plate_has_one_constraint_in_the_unit_of_its_file_and_of_no_other(tilted, tmp_path):
+def test_one_plate_has_one_constraint_in_the_unit_of_its_file_and_of_no_other(tilted, tmp_path, monkeypatch):
     said = run("constraint", tilted / "plate_1.csv", "-o", tmp_path / "p.npz")
     assert "Mechanism: a plane through (" in said
     assert "(± is half of a 95 % interval, 10:1 are odds)." in " ".join(said.split())
@@ -265,6 +266,9 @@ def test_one_plate_has_one_constraint_in_the_unit_of_its_file_and_of_no_other(ti
     mixed = call("constraint", tmp_path / "mixed.csv", "-o", tmp_path / "m.npz")
     assert "no mechanism is named: the columns are in mm, m, rad, expected one unit of length" in mixed.stderr
     assert "Mechanism" not in mixed.stdout
+    monkeypatch.setattr(uc.constraints, "identify", lambda *_, **__: SimpleNamespace(kind="point"))
+    still = call("constraint", tmp_path / "none.csv", "-o", tmp_path / "s.npz")
+    assert "positions keep to a point, which would hold every motion; 'none' moves least." in still.stderr
 
 
 @pytest.fixture(scope="module")

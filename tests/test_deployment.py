@@ -355,7 +355,7 @@ def test_the_header_says_what_the_numbers_are(policy, tmp_path):
         "states: x (mm), y",
         "actions: vx, vy",
         "learnt by: Hybrid",
-        f"relative to: {form.origin[0]:.6g}, ",
+        f"subtracted inside: {form.origin[0]:.6g}, ",
         "sources: wipes/ *.csv * / of ü",
         f"sha256: {digest(form)}",
     ):

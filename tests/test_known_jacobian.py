@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import unconstrain as uc
+from test_cli import refused, run, write
 from unconstrain.learners.robust.held_rows import UNKNOWN, HeldRows
 from unconstrain.learners.robust.noise import noise_by_differences
 from unconstrain.paper.systems.arm import Arm
@@ -157,3 +158,27 @@ def test_the_policy_is_stored_without_the_jacobian(one_row, tmp_path):
     loaded = uc.load(tmp_path / "policy.npz")
     assert loaded.learner == uc.Robust()
     assert_allclose(loaded(one_row[0].states), policy(one_row[0].states))
+
+
+def test_on_the_command_line_it_is_that_of_a_robot_file(tmp_path):
+    links, lengths = ("base", "upper", "lower", "palm", "hand"), (0.0, 1.0, 0.8, 0.6)
+    kinds = ("continuous",) * 3 + ("fixed",)
+    joints = [
+        f'<joint name="{one}" type="{kind}"><parent link="{one}"/><child link="{next_}"/>'
+        f'<origin xyz="{length} 0 0"/><axis xyz="0 0 1"/></joint>'
+        for one, next_, length, kind in zip(links, links[1:], lengths, kinds, strict=False)
+    ]
+    robot = "".join(f'<link name="{one}"/>' for one in links) + "".join(joints)
+    (tmp_path / "robot.urdf").write_text(f'<robot name="planar">{robot}</robot>')
+    for k, one in enumerate(demonstrate([[[0.8, 0.6]]], count=8)):
+        write(tmp_path / f"{k}.csv", "t,a,b,c,va,vb,vc", np.column_stack([one.times, one.states, one.actions]))
+    asked = ("fit", tmp_path / "*.csv", "--model", "affine", "-o", tmp_path / "p.npz", "--force")
+    known = ("--jacobian", tmp_path / "robot.urdf", "--tip", "hand")
+    assert "rows of the Jacobian" not in run(*asked)
+    without = error(uc.load(tmp_path / "p.npz"))
+    assert "Learnt as rows of the Jacobian (within 0.5%) held: 1:" in run(*asked, *known)
+    assert error(uc.load(tmp_path / "p.npz")) < 0.1 * without
+    assert "--jacobian and --tip belong together" in refused(*asked, *known[:2])
+    assert "--jacobian: belongs to the robust learner, got --learner direct." in refused(
+        *asked, *known, "--learner", "direct"
+    )

@@ -469,7 +469,7 @@ def test_a_movement_where_the_policy_is_not_determined_is_not_supported(folder, 
         assert ran.code == 0
         assert ran.out.startswith("! Near demonstrations")
         assert ("fewer than 3 tell the policy" in text(ran)) == open_
-        assert "as 'fit' said, the policy explains 100% of held-out motion: good along the motion, but" in text(ran)
+        assert "as 'fit' said, recordings tell too little: at 100% of the recorded states no" in text(ran)
     one_line = tmp_path.parent / "one_line.npz"  # what all recordings together tell, as fit notes it, is no doubt
     noted = {informing.TOLD: 1.0, informing.MARK: "good"}
     uc.save(uc.load(one_line), one_line, uc.storage.load_notes(one_line) | noted)

@@ -4,6 +4,7 @@ import json
 import re
 import shlex
 import shutil
+import warnings
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +14,7 @@ import unconstrain as uc
 from test_cli import call, refused, run, write
 from test_formats import workbook
 from test_newcomer import LINEAR, stroke, text
+from unconstrain.pages import replays
 
 READ = ("--state", "x,y", "--by", "savgol")
 
@@ -245,6 +247,50 @@ def test_a_cycle_that_was_not_shown_is_refused_with_what_shows_one(tmp_path):
     said = refused("fit", tmp_path, *READ, "--guided", "cycle", "-o", tmp_path / "p.npz")
     assert said.startswith("--guided: demonstrations make 0.16 turns in the mean, and no cycle is near them.")
     assert "record whole rounds; or guide it to a goal, or not at all" in said
+    turn = np.linspace(0, 2 * np.pi, 81)
+    write(tmp_path / "round.csv", "t,x,y", np.column_stack([t, 50 * np.cos(turn), 50 * np.sin(turn)]))
+    said = refused("fit", tmp_path, *READ, "--guided", "cycle", "-o", tmp_path / "p.npz")
+    assert "record whole rounds, or learn from the 1 alone that make one (round); or guide it to a goal" in said
+
+
+@pytest.mark.parametrize(("seconds", "doubted"), [(1.9, True), (6.0, False)])
+def test_a_goal_that_few_came_near_and_still_in_motion_is_doubted(tmp_path, seconds, doubted):
+    for k in range(8):
+        t = np.linspace(0, seconds if k < 3 else 0.7, 60)
+        start = [100 * np.cos(2 * np.pi * k / 8), 100 * np.sin(2 * np.pi * k / 8)]
+        write(tmp_path / f"w{k}.csv", "t,x,y", np.column_stack([t, np.exp(-t)[:, None] * start]))
+    ran = call("fit", tmp_path, *READ, *LINEAR, "--guided", "auto", "-o", tmp_path / "p.npz")
+    assert "Right where every movement is to end there" in text(ran)
+    said = "--guided: 3 of 8 demonstrations end near it, still at 2"
+    assert (said in text(ran)) == doubted
+    assert ("they show no goal. Record movements to their end, or give the goal with --guided." in text(ran)) == doubted
+    recipe = uc.Recipe(states=("x", "y"), differentiate="savgol")
+    with warnings.catch_warnings(action="ignore"):
+        demos = uc.prepare(uc.read(sorted(tmp_path.glob("w*.csv"))), recipe)
+    advice = replays._guide(uc.load(tmp_path / "p.npz", uc.Guided).policy, demos)  # where a policy strays
+    assert advice == (replays.GUIDE_TO.format("") if doubted else replays.GUIDE)
+
+
+@pytest.mark.parametrize(
+    ("columns", "why"),
+    [
+        (lambda v: v, ""),
+        (lambda v: 1000 * v, "the actions are not the velocities of the states, as far as these tell"),
+        (lambda v: v[:, ::-1], "the actions are not the velocities of the states, as far as these tell"),
+        (lambda v: v[:, :1], "1 actions are not the velocities of 2 states"),
+    ],
+    ids=["velocities", "other unit", "swapped", "one"],
+)
+def test_recorded_velocities_are_run_from_the_same_starts_and_what_is_not_run_says_why(tmp_path, columns, why):
+    for k in range(4):
+        table = stroke(k)
+        moves = columns(np.gradient(table[:, 1:], table[:, 0], axis=0))
+        write(tmp_path / f"w{k}.csv", f"t,x,y,{'vx,vy'[: 3 * moves.shape[1] - 1]}", np.hstack([table, moves]))
+    asked = "--state", "x,y", "--action", "vx,vy" if moves.shape[1] > 1 else "vx"
+    said = text(call("fit", tmp_path, *asked, *LINEAR, "-o", tmp_path / "p.npz"))
+    assert ("un from the same starts: size" in said) == (not why)
+    assert ("Its size and pace over time: not run from the same starts, as " in said) == bool(why)
+    assert why in said
 
 
 # Samples far off their neighbours

@@ -396,6 +396,17 @@ def test_the_file_of_one_demonstration_says_so_and_is_drawn_on_it_alone(tmp_path
     assert json.loads(re.search(r"const shown = (.*);\n", one.read_text("utf-8"))[1])["patches"] == []
 
 
+def test_a_page_that_cannot_say_where_a_policy_is_told_says_how_much_is(folder, tmp_path):
+    files, said = sorted(folder.glob("held_*.csv")), []
+    run("fit", *files, "--state", "x,y,z", "--differentiate", "--model", "affine", "-o", tmp_path / "told.npz")
+    for policy in (folder / "same.npz", tmp_path / "told.npz"):
+        run("look", *files, policy, "-o", tmp_path / "look.html", "--force")
+        page = (tmp_path / "look.html").read_text("utf-8")
+        said.append(json.loads(re.search(r"const shown = (.*);\n", page)[1])["policy"]["untold"])
+    assert said[0] == "whether recordings tell the policy there is not known here"
+    assert re.fullmatch(r"but .*recorded state.*, and 'unconstrain rollout' says where", said[1])
+
+
 def test_a_policy_of_some_strokes_says_of_which(folder, tmp_path):
     files = sorted(folder.glob("held_*.csv"))
     columns = ("--state", "x,y,z", "--differentiate", "--learner", "hybrid")
@@ -405,7 +416,7 @@ def test_a_policy_of_some_strokes_says_of_which(folder, tmp_path):
     assert "policy: learnt from 2 of these 3 demonstrations, held_3, held_4." in said
     said = run("look", files[2], tmp_path / "p.npz", "-o", tmp_path / "other.html")
     assert "policy: learnt from none of these 1 demonstration." in said
-    for told, doubted in ((0.69, True), (0.71, False)):  # as fit judges what is told across the motion
+    for told, doubted in ((0.79, True), (0.81, False)):  # as fit judges what is told across the motion
         uc.save(uc.load(folder / "same.npz"), tmp_path / "q.npz", {TOLD: told})
         said = " ".join(run("look", *files, tmp_path / "q.npz", "-o", tmp_path / "look.html", "--force").split())
         assert ("across the motion recordings tell the policy too little." in said) is doubted
@@ -489,7 +500,7 @@ def test_where_some_demonstrations_alone_are_run_it_is_said_how_many_and_why(fol
     wound = [[t, 60 * np.cos(t), 60 * np.sin(t) * np.cos(t / 7), 60 * np.sin(t) * np.sin(t / 7)] for t in turns]
     bent = write(tmp_path / "bent.csv", HEAD, np.array(wound) * [0.1, 1, 1, 1])
     asked = ("--by", "savgol", "--model", "affine", "--learner", "direct", "-o", tmp_path / "p.npz", "--force")
-    told = "for 4 of 5 demonstrations, each held in the same way all the time (along a line, in a plane), size"
+    told = "for 4 of 5 demonstrations that look flat (on a line, in a plane), as what was held and short strokes do, "
     assert f"un from the same starts: {told}" in " ".join(run("fit", *held, bent, *asked).split())
     assert f"un from the same starts: {told}" in " ".join(run("info", tmp_path / "p.npz").split())
     assert told in " ".join(run("score", tmp_path / "p.npz", *held, bent).split())

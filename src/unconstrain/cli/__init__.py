@@ -18,7 +18,7 @@ from ..base.errors import NOTHING_LEFT, ReadError, UnconstrainError
 from ..base.files import write
 from ..paper import experiments
 from .certifying import certify
-from .constraining import constraint
+from .constraining import constraint, jacobian_of, options_for_arm
 from .converting import convert, example
 from .diagnosing import diagnose
 from .exporting import export
@@ -216,6 +216,7 @@ def _are_there(names: Sequence[str] | None, recording: uc.Recording) -> bool:
     default=0.0,
     help="Weight samples by this power of their speed; 2 for noisy recordings.",
 )
+@options_for_arm
 @click.option("--folds", type=click.IntRange(2), default=10, help="Folds to choose the threshold on.")
 @of_words(
     "--hold-out",
@@ -264,8 +265,8 @@ def fit(
     check_outputs((output, report), paths, force)
     check_name(output)
     learner = learner or default_learner(scheduler, alpha, softness, speed_power)
-    chosen = {"learner": learner_of(learner, alpha, softness, speed_power), "validation": uc.Folds(folds, hold_out)}
-    fitted = policy_of(model, variance, centres, scale, **chosen)
+    taught = learner_of(learner, alpha, softness, speed_power, jacobian_of(reading.pop("jacobian"), reading.pop("tip")))
+    fitted = policy_of(model, variance, centres, scale, learner=taught, validation=uc.Folds(folds, hold_out))
     with shown("reading, placing, learning") as progress:
         stream = stream_of(paths, speed_power, progress, **reading)
         with of_files(recordings_of(stream)):
@@ -277,22 +278,21 @@ def fit(
     refuse_warnings(reading["strict"])
     found = {TOLD: told, LOST: judged.lost, RAN: judged.ran or None, MARK: judged.verdict.mark.name.lower()}
     uc.save(moving, output, provenance(paths, stream.recipe, stream.first, **reading) | found)
-    written = {"policy": output} | _reported(moving, stream, report, Path(output).stem, judged)
-    say_written(written, judged.to_json() if as_json else None)
+    say_written(_reported(moving, stream, report, output, judged), judged.to_json() if as_json else None)
 
 
 def _reported(
-    policy: uc.Policy | uc.Guided, stream: uc.Stream, report: str | None, title: str, judged: Judged
+    policy: uc.Policy | uc.Guided, stream: uc.Stream, report: str | None, output: str, judged: Judged
 ) -> dict[str, str]:
-    """Write the page of a fit, if there is to be one; what and where."""
+    """Write the page of a fit, if there is to be one; what is written, and where."""
     if report is None:
-        return {}
+        return {"policy": output}
     from ..pages.fit import policy_page
 
     with shown("report: drawing"):
         demos, units = stream.beginning(), stream.first.units
-        write(report, policy_page(policy, demos, title, stream.recipe, units, judged.verdict))
-    return {"report": report}
+        write(report, policy_page(policy, demos, Path(output).stem, stream.recipe, units, judged.verdict))
+    return {"policy": output, "report": report}
 
 
 @main.command(epilog="\b\nExample:\n  unconstrain reproduce table1 --trials 100 --out results")

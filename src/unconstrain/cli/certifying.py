@@ -9,7 +9,9 @@ import click
 
 import unconstrain as uc
 
+from ..base.display import unit_of
 from ..base.errors import ModelFileError
+from .printing import say_verdict
 from .reading import loaded
 
 
@@ -34,11 +36,24 @@ def certify(policy: str, seed: int) -> None:
     else:
         raise ModelFileError(f"{policy}: holds no policy that is fitted or guided. Learn one with 'unconstrain fit'.")
     found = uc.certify(stored, around, seed)
-    click.echo(f"{policy}: {found.said}")
+    say_verdict(_judged(policy, found))
     if not found.holds:
-        click.echo("Next: unconstrain fit with --guided auto, cycle, or a goal such as 0.1,0, and certify that")
         raise SystemExit(1)
-    click.echo(f"Next: unconstrain export {shlex.quote(policy)} -o policy.c")
+
+
+def _judged(policy: str, found: uc.motion.certificate.Certificate) -> uc.evaluation.verdicts.Verdict:
+    """What is guaranteed, in which units, and what may go against it; or what was found against it."""
+    notes, marks = uc.storage.load_notes(policy), uc.evaluation.verdicts.Mark
+    unit = unit_of(uc.Recipe.from_dict(notes.get("recipe", {})).labels(notes.get("units", {}))[0])
+    unit = f"Lengths are in {unit or 'the unit of the states'}, and all rates per second."
+    if not found.holds:
+        then = "unconstrain fit with --guided auto, cycle, or a goal such as 0.1,0, and certify that"
+        return uc.evaluation.verdicts.Verdict(marks.BAD, f"{policy}: {found.said} {unit}", next=then)
+    promise, away, checked = found.said.partition("A constraint that moves or is not told")
+    doubt = f"{away}{checked.partition(' Checked at')[0]}"
+    then = f"unconstrain export {shlex.quote(policy)} -o policy.c"
+    said = f"{policy}: guaranteed. {unit}"
+    return uc.evaluation.verdicts.Verdict(marks.GOOD, said, promise.strip(), doubt, then)
 
 
 def _learnt_at(policy: Any) -> Any:

@@ -37,6 +37,19 @@ MAY_LEAVE = "holds to the directions that were learnt, not to {}, which was name
 FEATURES = ("auto", "constant", "affine", "quadratic", "rbf")
 
 
+options_for_arm = with_options(
+    click.option("--jacobian", metavar="URDF", help="States are joint angles of this robot: what is held is its hand."),
+    click.option("--tip", help="With --jacobian: the link that is its hand."),
+)
+
+
+def jacobian_of(urdf: str | None, tip: str | None) -> Any:
+    """Joint angles (N, n) to the Jacobian (N, 6, n) of a robot's hand, by the options; None where there are none."""
+    if (urdf is None) != (tip is None):
+        raise SettingError("--jacobian and --tip belong together: a URDF file, and the link that is held.")
+    return None if urdf is None else arm_of(urdf, tip).jacobian
+
+
 @click.command(epilog="\b\nExample:\n  unconstrain constraint wipe_*.csv --state x,y,z --differentiate -o plate.npz")
 @options_for_reading
 @click.option(
@@ -47,8 +60,7 @@ FEATURES = ("auto", "constant", "affine", "quadratic", "rbf")
     help="File for the constraint (.npz); where each demonstration has its own, the stem of theirs.",
 )
 @of_words("--features", " ".join(FEATURES), "How the held directions may vary with the state.", "auto")
-@click.option("--jacobian", metavar="URDF", help="States are joint angles of this robot: what is held is its hand.")
-@click.option("--tip", help="With --jacobian: the link that is its hand.")
+@options_for_arm
 @click.option(
     "--with-task", is_flag=True, help="What is held also moves by itself: learn how, as a function of the state."
 )
@@ -76,11 +88,10 @@ def constraint(
     paths = uc.readers.expand(files)
     check_outputs((output, report), (*paths, jacobian), force)
     check_name(output)
-    _check_asked(jacobian, tip, surface, with_task)
+    asked = _asked(features, jacobian, tip, surface, with_task)
     with shown("reading, learning"):
         demonstrations, recipe, (first, *_) = prepared(paths, reading)
-        arm = None if jacobian is None else arm_of(jacobian, tip).jacobian
-        learnt = _learnt(uc.LearntConstraint(features, arm, task=with_task), demonstrations, surface)
+        learnt = _learnt(asked, demonstrations, surface)
     refuse_warnings(reading["strict"])
     if recipe.angles:
         click.echo(f"Note: {', '.join(recipe.angles)} as unwrapped: a turn more is another state to it.", err=True)
@@ -101,6 +112,13 @@ def constraint(
         _report(report, learnt, demonstrations, recipe.labels(first.units)[0], named, verdict)
         written["report"] = report
     say_written(written, _told(learnt, verdict, named) if as_json else None)
+
+
+def _asked(features: str, jacobian: str | None, tip: str | None, surface: bool, task: bool) -> uc.LearntConstraint:
+    """What is to be learnt, by the options."""
+    if surface and (task or jacobian is not None):
+        raise SettingError("--surface: got --with-task or --jacobian too; positions alone show neither.")
+    return uc.LearntConstraint(features, jacobian_of(jacobian, tip), task=task)
 
 
 def _of(
@@ -164,13 +182,6 @@ def _learnt(
 def _of_demonstration(output: str, name: str) -> str:
     path, plain = Path(output), re.sub(r"[^\w.-]+", "_", name)
     return str(path.with_name(f"{path.stem}_{plain}{path.suffix}")) if name else output
-
-
-def _check_asked(jacobian: str | None, tip: str | None, surface: bool, with_task: bool) -> None:
-    if (jacobian is None) != (tip is None):
-        raise SettingError("--jacobian and --tip belong together: a URDF file, and the link that is held.")
-    if surface and (with_task or jacobian is not None):
-        raise SettingError("--surface: got --with-task or --jacobian too; positions alone show neither.")
 
 
 def _told(
@@ -337,7 +348,8 @@ def mechanism_of(demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe, 
         unit = _length_of([recipe.units(first.units).get(name, "") for name in names])
         found = uc.constraints.identify(positions[::every], groups=groups[::every], unit=unit)
         if found.kind == "point":
-            raise InvalidDataError("positions keep to a point, which would hold every motion.")
+            least = min(demonstrations, key=lambda one: one.states.var(axis=0).sum()).name
+            raise InvalidDataError(f"positions keep to a point, which would hold every motion; {least!r} moves least.")
     except InvalidDataError as error:
         click.echo(f"Note: no mechanism is named: {error}", err=True)
         return None

@@ -79,15 +79,21 @@ def default_learner(
     return "hybrid" if of_sums else "robust"
 
 
-def learner_of(name: str, alpha: float | Literal["auto"] | None, softness: float | None, speed_power: float) -> Any:
+def learner_of(
+    name: str, alpha: float | Literal["auto"] | None, softness: float | None, speed_power: float, jacobian: Any = None
+) -> Any:
     """Make the learner of the options."""
+    if jacobian is not None and name != "robust":
+        raise SettingError(f"--jacobian: belongs to the robust learner, got --learner {name}.")
     if name == "robust" and speed_power:
         raise SettingError("--speed-power: the robust learner weights by speed itself; give another --learner with it.")
     given = {key: value for key, value in (("alpha", alpha), ("softness", softness)) if value is not None}
     if name != "hybrid":
         if given:
             raise SettingError(f"--{next(iter(given))}: belongs to the hybrid learner, got --learner {name}.")
-        return {"direct": uc.Direct, "inconsistency": uc.Inconsistency, "robust": uc.Robust}[name]()
+        if name == "robust":
+            return uc.Robust(jacobian=jacobian)
+        return uc.Direct() if name == "direct" else uc.Inconsistency()
     if alpha is not None and softness:
         raise SettingError(
             "--alpha: got --softness too, expected one of them; a softened split has no threshold to choose."

@@ -201,7 +201,8 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     there = _least_known(policy, demos, stream.recipe) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
     found = uc.evaluation.verdicts.of_explained(alone, count, told, there, 1.0 - missed, lost)
     ran = retraced(found, moving, demos, stream.recipe, None, stream.first.units, False)
-    verdict = uc.evaluation.diagnosis.about_recordings(ran.verdict, demos, stream.recipe, moving)
+    cured = ran.verdict._replace(next=there) if there and found.next == there else ran.verdict
+    verdict = uc.evaluation.diagnosis.about_recordings(cured, demos, stream.recipe, moving)
     return Judged(as_noted(verdict), ran.medians, ran.in_words, count, samples, 1.0 - missed, held_out, lost)
 
 

@@ -1,4 +1,4 @@
-"""What is to be said of a policy where it is used: columns, units, centring, origin, hash."""
+"""What is to be said of a policy where it is used: columns, units, what is subtracted, hash."""
 
 import hashlib
 import json
@@ -44,7 +44,7 @@ class Description:
         recipe, units, _ = notes.pop("recipe", {}), notes.pop("units", {}), notes.pop("digests", None)
         states = _named(recipe.get("states"), form.columns, "x")
         given = recipe.get("actions") or [*map(speed_of, recipe.get("states") or ())]
-        lines = {"learnt by": learnt, "relative to": ", ".join(f"{value:.6g}" for value in form.origin)}
+        lines = {"learnt by": learnt, "subtracted inside": ", ".join(f"{value:.6g}" for value in form.origin)}
         lines |= {name: _said(value) for name, value in notes.items()}
         lines["recorded in degrees"] = ", ".join(recipe.get("degrees") or ())
         lines["guided"] = form.correction.promise if form.correction else ""

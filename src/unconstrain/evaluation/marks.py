@@ -14,6 +14,10 @@ the second more than half, beyond which little but the rough direction is left."
 MOSTLY, PARTLY = 0.95, 0.7
 """Share of recorded states at which the policy is determined: of the rest, one in twenty is an edge."""
 
+WELL = 0.8
+"""Share of recorded states at which all recordings tell the policy, from which on a check mark stands: at the others
+about half of an action is across the motion; if all of that is wrong, as much is missed as at :data:`GOOD`."""
+
 OTHERWISE = 1.2
 """Size or pace of a roll-out over that demonstrated, or the inverse, from which on it is another movement."""
 
@@ -81,12 +85,19 @@ def graded(
     share: float, good: float = GOOD, fair: float = FAIR, told: float | None = None, under: bool = False
 ) -> tuple[Mark, str]:
     """The mark of a share, and a word for it; where recordings tell too little of a policy, in what they do."""
-    if share >= good and told is not None and told < PARTLY:
-        where = "under this one, but of movement under others" if under else "along the motion, but across it"
-        return Mark.DOUBTFUL, f"good {where} recordings tell too little"
-    if share >= good:
-        return Mark.GOOD, "good"
-    return (Mark.DOUBTFUL, "fair") if share >= fair else (Mark.BAD, "poor")
+    mark, word = (Mark.GOOD, "good") if share >= good else (Mark.DOUBTFUL, "fair")
+    if share < fair:
+        return Mark.BAD, "poor"
+    if (allowed := allowed_by(told)) is Mark.GOOD:
+        return mark, word
+    where = "under this one, but of movement under others" if under else "along the motion, but across it"
+    mark = Mark.BAD if allowed is Mark.BAD and mark is not Mark.GOOD and not under else Mark.DOUBTFUL
+    return mark, f"{word} {where} recordings tell too little"
+
+
+def allowed_by(told: float | None) -> Mark:
+    """The best mark where all recordings together tell a policy at such a share of their states, or it is not known."""
+    return Mark.GOOD if told is None or told >= WELL else Mark.DOUBTFUL if told >= PARTLY else Mark.BAD
 
 
 def doubted(found: Verdict, how: str) -> Verdict:

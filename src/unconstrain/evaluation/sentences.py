@@ -59,7 +59,7 @@ def _about_noise(found: Diagnosis, unit: str) -> str:
     said += f"typical action ({found.typical:.3g}{unit}) in all.{hidden}"
     if found.noise_share < 0.5 * SMALL or found.noise < MISFIT * found.jitter:
         return said
-    rest = "the rest is what the model does not follow, or people who vary."
+    rest = "the rest is what the model does not follow, fast parts that --window smooths, or people who vary."
     return f"{said} Only {found.jitter:.3g}{unit} of it changes from sample to sample; {rest}"
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..base.arrays import Array
+from ..base.display import listed
 from ..learners import robust
 from ..recordings import Demonstration, Recipe, readers, stack
 from .marks import ENOUGH, Mark, Verdict
@@ -89,8 +90,9 @@ def _about_rest(
         found = found._replace(next=f"--still {slow} leaves out rest at an end, as in most of these. {found.next}")
     if found.mark is Mark.GOOD or goal or not kept:
         return found
-    said = f"{len(kept)} of {len(speeds)} demonstrations come to rest where no other moves on: whether something "
-    return found._replace(doubt=f"{said}stopped them cannot be told. {found.doubt}".rstrip())
+    few = listed([f"'{names[row]}'" for row, _ in kept], 4)
+    said = f"{few} ended slower than {SLOW:.0%} of a usual speed where no other moves on: whether something stopped "
+    return found._replace(doubt=f"{said}{'them' if kept[1:] else 'it'} cannot be told. {found.doubt}".rstrip())
 
 
 def _rests(

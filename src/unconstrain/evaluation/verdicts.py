@@ -20,6 +20,7 @@ from .marks import SMALL as SMALL
 from .marks import WIDTH as WIDTH
 from .marks import Mark as Mark
 from .marks import Verdict as Verdict
+from .marks import allowed_by as allowed_by
 
 if TYPE_CHECKING:
     from ..constraints import LearntConstraint
@@ -80,12 +81,15 @@ def of_explained(
     ``there`` what to record where fewer show it. ``learnt`` is the share of what was learnt from, and ``lost`` what
     guiding takes of that, None where it is not guided: a guided policy is judged by the one in it, or worse.
     """
-    across = "What constraints hid: no recording shows it, so no score does."
+    across, little = "What constraints hid: no recording shows it, so no score does.", ""
+    (alone, word), (mark, _) = (graded(each, told=determined) for each in (share, share - (lost or 0.0)))
     if determined is not None and determined < MOSTLY and demonstrations >= ENOUGH:
-        across = f"Across the motion: {of_untold(1 - determined)}"
+        untold = of_untold(1 - determined)
+        if allowed_by(determined) is not Mark.GOOD and word != "poor":  # which is so for another reason
+            little = f"Recordings tell too little: {untold}. "
+        across = f"Across the motion: {'as said first' if little else untold}"
         across += "." if there else "; 'unconstrain diagnose' says where."
     much = f"{percent(lost)} less" if lost and round(lost, 2) else "as much"
-    (alone, word), (mark, _) = (graded(each, told=determined) for each in (share, share - (lost or 0.0)))
     guided = "Guided" if mark is alone else "But guided"
     retold = f" {guided}, it explains {much} of the demonstrations it was fitted to; that says nothing of new starts."
     retold *= lost is not None
@@ -94,10 +98,12 @@ def of_explained(
         few = f"{seen} verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
         return Verdict(Mark.DOUBTFUL, few + retold, doubt=across, next=MORE)
     missed = f"where the policy predicts, it misses {percent(np.sqrt(max(1 - share, 0)))} of a typical action"
-    advice = _advice(word, learnt, mark is not alone)
+    advice = f"{_advice(word, learnt, mark is not alone)} {there}".rstrip()
+    if little:
+        advice = there or "'unconstrain diagnose' says what to record."
     trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
-    said = f"The policy {_explains(share)}: {word}.{retold}"
-    return Verdict(mark, said, trust, across, f"{advice} {there}".rstrip())
+    said = f"{little}The policy {_explains(share)}: {word}.{retold}"
+    return Verdict(mark, said, trust, across, advice)
 
 
 def of_score(
@@ -162,7 +168,7 @@ def of_planes(found: Verdict, shares: Array, motion: Array) -> Verdict:
 
 def of_told(found: Verdict, told: float | None) -> Verdict:
     """Add to a verdict that recordings tell a policy at too small a share of their states, as :func:`of_explained`."""
-    if told is None or told >= PARTLY:
+    if allowed_by(told) is Mark.GOOD:
         return found
     return doubted(found, "across the motion recordings tell the policy too little")
 
@@ -226,7 +232,7 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
     mark, word = graded(share, MOSTLY, PARTLY)
     how = {"good": "enough", "fair": "enough in most places", "poor": "not enough"}
     said = f"Recordings: at {percent(share)} of their states three demonstrations or more tell the policy: {how[word]}."
-    if mark is Mark.BAD and found.told_together >= PARTLY:
+    if mark is Mark.BAD and allowed_by(found.told_together) is not Mark.BAD:
         mark = Mark.DOUBTFUL
         said = f"Recordings: all together tell the policy at {percent(found.told_together)} of their states, "
         said += f"but at {percent(share)} whichever two are left out: it may hang on one or two."
@@ -264,7 +270,9 @@ def of_constraint(
         little = "free strokes that turn as little keep to a surface of their own, too"
         why = "each state was passed one way only, as by a free policy" if one_way else little
         then = "Record movements that cross each other, and learn it again; or name the --features."
-        said = f"Whether anything was held cannot be told: {why}."
+        single = not others and not choice.several
+        then += " 'unconstrain diagnose' tells of several together which look held." * single
+        said = f"Whether anything was held cannot be told{' by one demonstration alone' * single}: {why}."
         return Verdict(Mark.DOUBTFUL, said, doubt=f"That {min(ranks)} of {choice.actions} are held.", next=then)
     mark, word = graded(1.0 - missed)
     held = f"{min(ranks)} of {choice.actions} directions were held"
@@ -275,6 +283,9 @@ def of_constraint(
     undecided = " Positions do not decide it." if shown is False else ""
     said = f"{held}{apart}; {percent(missed)} of held-out motion is along them: {word}.{undecided}"
     then = "Use it with 'unconstrain rollout --constraint' or 'score --constraint'."
+    if choice.several and not others and mark is not Mark.GOOD:
+        said = f"If one constraint held all: {said}"
+        then = "Learn it of each alone (--episodes, --leave-out): each may have been held otherwise, or not at all."
     if (choice.doubts or len(ranks) > 1 or undecided) and mark is Mark.GOOD:
         mark = Mark.DOUBTFUL
     if choice.lacking:

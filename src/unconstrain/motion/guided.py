@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import Array, as_matrix, as_vector, check_at_least
-from ..base.display import Shown
+from ..base.display import Shown, listed
 from ..base.errors import InvalidDataError, SettingError
 from ..deployment import Exportable
 from ..models import ClosedForm, spaces
@@ -32,6 +32,9 @@ of it or faster though one began at four times that, movements to a goal that pl
 _LATE, _SLOWED = (0.93, 0.97), 0.6
 """Who comes to a goal is slower, in the last part of the way, than the second share of a usual speed; on a cycle many
 stop at once."""
+
+_ENDING = 0.1
+"""Who ends faster than this share of a usual speed had not arrived, where most end elsewhere."""
 
 _STILL = 0.02
 """A policy rests where it wants less than this share of its fastest motion, or twice as much as where it rests most."""
@@ -168,7 +171,7 @@ class Guided(Exportable, Shown):
         if goal is not None:
             as_vector(goal, "goal", demos[0].states.shape[1])
             return False
-        rests, around = _resting(demos), turns(demos)
+        rests, around = _resting(demos), _around(demos)
         if orbit is not None and around < _HALF and 2 * sum(rests) > len(demos):
             raise _no_cycle(demos)
         if orbit is not None or (around >= _ROUND and 2 * sum(rests & _slowing(demos)) <= len(demos)):
@@ -290,14 +293,28 @@ def _encircled(demos: Sequence[Demonstration], policy: Callable[[Array], Array])
 
 def _no_cycle(demos: Sequence[Demonstration]) -> SettingError:
     return SettingError(
-        f"orbit: demonstrations make {turns(demos):.2f} turns in the mean, and no cycle is near them. At least "
-        f"{_HALF:g} is needed, and {_ROUND:g} to be sure: record whole rounds; or guide it to a goal, or not at all."
+        f"orbit: demonstrations make {_around(demos):.2f} turns in the mean, and no cycle is near them. At least "
+        f"{_HALF:g} is needed, and {_ROUND:g} to be sure: record whole rounds{_rounds(demos)}; or guide it to a goal, "
+        "or not at all."
     )
+
+
+def _around(demos: Sequence[Demonstration]) -> float:
+    """Turns in the mean, whichever way round."""
+    return float(abs(turns(demos).mean()))
+
+
+def _rounds(demos: Sequence[Demonstration]) -> str:
+    """Which demonstrations alone go round, if some do."""
+    names = [one.name or str(k + 1) for k, one in enumerate(demos) if abs(turns(demos)[k]) >= _ROUND]
+    return f", or learn from the {len(names)} alone that make one ({listed(names, 8)})" * (0 < len(names) < len(demos))
 
 
 def _given(demos: Sequence[Demonstration]) -> str:
     """What says where to, where demonstrations do not."""
-    return "pass goal=, or orbit='shown' for a cycle" if turns(demos) >= _HALF else "give it with goal="
+    alone = _rounds(demos)
+    cycle = alone or _around(demos) >= _HALF
+    return f"pass goal=, or orbit='shown' for a cycle{alone}" if cycle else "give it with goal="
 
 
 def _descent(
@@ -384,6 +401,7 @@ def _found(demos: Sequence[Demonstration], policy: Any, wanted: Array) -> Array:
             f"goal: demonstrations end at rest in places up to {apart:.0%} of their extent from the mean of these; "
             f"expected one place; {_given(demos)}.{_proposed(policy, ends, demos, wanted)}"
         )
+    _doubt_goal(demos, ends.mean(axis=0))
     if not slow.any():
         warnings.warn(
             f"goal: where demonstrations end at rest the policy goes on, at {left[rests].min():.0%} of its fastest: "
@@ -392,6 +410,23 @@ def _found(demos: Sequence[Demonstration], policy: Any, wanted: Array) -> Array:
             stacklevel=3,
         )
     return np.asarray(np.mean(ends, axis=0))
+
+
+def _doubt_goal(demos: Sequence[Demonstration], place: Array) -> None:
+    """Warn of a goal that most demonstrations end far from, and the others were still moving at."""
+    states, last = stack(demos).states, np.array([one.states[-1] for one in demos])
+    near = np.linalg.norm(last - place, axis=1) <= _TOGETHER * np.linalg.norm(np.ptp(states, axis=0))
+    speeds = [np.linalg.norm(one.actions, axis=1) for one in demos]
+    left = np.array([one[-1] / (_usual(np.sort(one)) or 1.0) for one in speeds])[near]
+    if 2 * near.sum() < len(demos) and len(left) and np.median(left) > _ENDING:
+        spread = ", ".join(f"{one:.2g}" for one in last.std(axis=0))
+        warnings.warn(
+            f"goal: {near.sum()} of {len(demos)} demonstrations end near it, still at {np.median(left):.0%} of their "
+            f"usual speed, and all ends scatter by ({spread}): they show no goal. Record movements to their end, or "
+            "give the goal with goal=.",
+            UserWarning,
+            stacklevel=4,
+        )
 
 
 def _proposed(policy: Any, ends: Array, demos: Sequence[Demonstration], wanted: Array) -> str:

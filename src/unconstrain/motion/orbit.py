@@ -192,15 +192,15 @@ class Orbit(Shown):
         return counted(len(self.turn), "state"), f"radius={self.radius:.4g}", f"rate={self.rate:.4g}"
 
 
-def turns(demos: Sequence[Demonstration]) -> float:
-    """How often demonstrations go round the middle of their states, in their mean, as seen along the least of them."""
+def turns(demos: Sequence[Demonstration]) -> Array:
+    """How often each of K demonstrations goes round the middle of all states, seen along their least axis, (K,)."""
     states = stack(demos).states
     middle = states.mean(axis=0)
     axes = np.linalg.svd(states - middle, full_matrices=False)[2][:2]
     if len(axes) < 2:
-        return 0.0
+        return np.zeros(len(demos))
     plane = [(demo.states - middle) @ axes.T @ np.array([1.0, 1j]) for demo in demos]
-    return float(abs(sum(np.angle(z[1:] * z[:-1].conj()).sum() for z in plane))) / (2.0 * np.pi * len(demos))
+    return np.array([np.angle(z[1:] * z[:-1].conj()).sum() for z in plane]) / (2.0 * np.pi)
 
 
 def encircled(demos: Sequence[Demonstration], policy: Callable[[Array], Array]) -> Orbit:

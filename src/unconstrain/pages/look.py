@@ -222,7 +222,10 @@ def _described(policy: Policy | Guided, columns: int) -> dict[str, Any]:
             policy.closed_form()
         except SettingError as error:
             trouble = str(error)
-    return {"method": learnt.solution_.method, "trouble": trouble}
+    belief, untold = learnt.solution_.belief, "whether recordings tell the policy there is not known here"
+    if belief is not None:  # too large for a page
+        untold = f"but {verdicts.of_untold(1.0 - belief.told_together)}, and 'unconstrain rollout' says where"
+    return {"method": learnt.solution_.method, "trouble": trouble, "untold": untold}
 
 
 def _told(policy: Policy) -> str:

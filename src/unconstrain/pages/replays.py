@@ -39,6 +39,10 @@ ROUNDS = 1.5
 PASSING = 0.2
 """Nearer to the middle than this share of the usual distance from it, noise turns what goes straight."""
 
+DRIFT = 0.2
+"""Recorded actions are velocities of the states if, integrated, they miss their ways by less than this share: noise and
+a bias of a fifth of the speed do; another unit, order or sign do not."""
+
 
 class Replay(NamedTuple):
     """One demonstration and a roll-out from its start, for as long as it lasted."""
@@ -86,14 +90,15 @@ def replayed(
         return Replayed(_advised(verdicts.of_divergence(found), found, policy, demos), None)
     known = [one for one in runs if one.held]
     if not known:
-        unknown = " Its size and pace over time: not compared, as what held these recordings is not known."
-        return Replayed(found._replace(doubt=(found.doubt + unknown).strip()) if runs else found, None, runs)
+        why = "not compared, as what held these recordings is not known" if runs else unlike(demos, recipe)
+        why = why and f" Its size and pace over time: {why}."
+        return Replayed(found._replace(doubt=(found.doubt + why).strip()), None, runs)
     extents, paces, lasts, apart = np.array([one[:4] for one in known]).T
     said = f"{np.median(apart):.3g} {unit_of(recipe.labels(units)[0]) or '(unit of the states)'}"
     measured = {"extent": extents, "pace": paces, "last_round": lasts, "apart": apart}
     finite = {name: values[np.isfinite(values)] for name, values in measured.items()}
     told = {name: float(np.median(values)) if len(values) else None for name, values in finite.items()}
-    alike = "" if held is not None else ", each held in the same way all the time (along a line, in a plane)"
+    alike = "" if held is not None else " that look flat (on a line, in a plane), as what was held and short strokes do"
     of = "" if len(known) == len(demos) else f"for {len(known)} of {len(demos)} demonstrations{alike}, "
     judged = verdicts.of_replays(found, extents, paces, said, lasts, of)
     judged = _advised(judged, found, policy, demos)
@@ -125,28 +130,25 @@ def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Any, de
 
 def _guide(policy: Policy | Guided, demos: Sequence[Demonstration]) -> str:
     """What keeps a policy to where demonstrations lead, if they show it, or to what is given."""
-    with warnings.catch_warnings(action="ignore"):
+    with warnings.catch_warnings(action="always", record=True) as doubts:
         try:
             Guided.goes_round(demos, policy=lambda states: np.asarray(policy(states)))  # without proposing a goal
         except (SettingError, InvalidDataError) as error:
             return GUIDE_TO.format(", or '--guided cycle'," if "orbit=" in str(error) else "")
-    return GUIDE
+    return GUIDE_TO.format("") if any(str(one.message).startswith("goal: ") for one in doubts) else GUIDE
 
 
 def replays(
     policy: Policy | Guided, demos: Sequence[Demonstration], recipe: Recipe, held: Any = None, free: bool = True
 ) -> list[Replay]:
-    """Compare at most twenty demonstrations; none where actions are not known to be velocities of Euclidean states.
+    """Compare at most twenty demonstrations; none where :func:`unlike` says why not.
 
     Raises
     ------
     DivergedError
         If a run leaves the finite numbers.
     """
-    n, d = demos[0].states.shape[1], demos[0].actions.shape[1]
-    chosen = [one for one in demos if one.times is not None and len(one) > 2 and np.ptp(one.states, axis=0).any()]
-    if recipe.actions is not None or n != d or demos[0].space != spaces.Euclidean(n) or not chosen:
-        return []
+    chosen = [] if unlike(demos, recipe) else _moving(demos)
     chosen = chosen if free or held is not None else [one for one in chosen if diagnosis.flat(one.states)[0].any()]
     if not chosen:
         return []
@@ -164,6 +166,38 @@ def replays(
         _compared(one, run, along, held is not None or bool(rows.any()))
         for one, run, (rows, along) in zip(chosen, cut, shapes, strict=True)
     ]
+
+
+def unlike(demos: Sequence[Demonstration], recipe: Recipe) -> str:
+    """Why a policy cannot be run from the starts of demonstrations, the rest of a sentence; empty where it can."""
+    n, d, chosen = demos[0].states.shape[1], demos[0].actions.shape[1], _moving(demos)
+    if demos[0].space != spaces.Euclidean(n):
+        why = "states hold angles or orientations"
+    elif n != d:
+        why = f"{d} actions are not the velocities of {n} states"
+    elif not chosen:
+        why = "nothing tells the time of what moves"
+    elif recipe.actions is not None and _strayed(chosen) > DRIFT:
+        why = "the actions are not the velocities of the states, as far as these tell"
+    else:
+        return ""
+    return f"not run from the same starts, as {why}"
+
+
+def _moving(demos: Sequence[Demonstration]) -> list[Demonstration]:
+    return [one for one in demos if one.times is not None and len(one) > 2 and np.ptp(one.states, axis=0).any()]
+
+
+def _strayed(demos: Sequence[Demonstration]) -> float:
+    """How much recorded actions, integrated over tenths of demonstrations, miss the ways of the states, as a share."""
+    missed, moved = 0.0, 0.0
+    for one in demos:
+        over = min(max(len(one) // 10, 4), len(one) - 1)
+        steps = 0.5 * np.diff(np.asarray(one.times))[:, None] * (one.actions[1:] + one.actions[:-1])
+        path = np.vstack([np.zeros(one.actions.shape[1]), steps.cumsum(axis=0)])
+        ways, led = (each[over:] - each[:-over] for each in (one.states, path))
+        missed, moved = missed + float(((ways - led) ** 2).sum()), moved + float((ways**2).sum())
+    return float(np.sqrt(missed / (moved or 1.0)))
 
 
 def _same(rows: Array, states: Array, _times: Array) -> Array:

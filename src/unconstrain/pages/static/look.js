@@ -473,7 +473,7 @@
     };
     const away = part(isAway), open = part(isOpen);
     const said = away && `No demonstration passes near for ${away}, where it is grey and dashed: extrapolated.`;
-    if (!untold) return said || "All of it is near the data; whether recordings tell the policy there is not known here.";
+    if (!untold) return said || `All of it is near the data; ${shown.policy.untold}.`;
     if (!open) return said || "All of it is near the data, and recordings tell the policy.";
     const every = roll.untold.filter((_, i) => isOpen(i)).sort((one, other) => one - other);
     const off = every[Math.floor(every.length / 2)];
