@@ -251,6 +251,21 @@ def test_an_export_for_ros_says_how_messages_become_the_unit_of_the_policy(folde
     assert "scale: 1.0" in (tmp_path / "wipe" / "config" / "wipe.yaml").read_text("utf-8")
 
 
+def test_an_export_says_whether_states_are_relative_to_a_mean(folder, tmp_path):
+    columns = (folder / "same_10.csv", "--state", "x,y,z", "--differentiate", "--learner", "direct")
+    run("fit", *columns, "--centre", "-o", tmp_path / "mean.npz")
+    run("fit", *columns, "-o", tmp_path / "plain.npz")
+    for name, centred in (("mean", True), ("plain", False)):
+        said = " ".join(run("export", tmp_path / f"{name}.npz", "-o", tmp_path / f"{name}.c").split())
+        assert ("relative to the mean of a demonstration; first subtract that of the place" in said) == centred
+        comment = (tmp_path / f"{name}.c").read_text("utf-8").partition("*/")[0]
+        assert ("centring: relative to the mean of each demonstration; subtract" in comment) == centred
+        assert ("centring: none\n" in comment) == (not centred)
+    assert "which the node cannot know" in refused("export", tmp_path / "mean.npz", "--ros2", tmp_path / "mean")
+    run("export", tmp_path / "plain.npz", "--ros2", tmp_path / "plain")
+    assert "\n- centring: none\n" in (tmp_path / "plain" / "README.md").read_text("utf-8")
+
+
 def test_strokes_that_are_too_large_are_not_outweighed_by_others_that_are_too_small():
     found = of_replays(Verdict(Mark.GOOD, "Good."), np.array([0.6, 0.7, 1.0, 1.5, 1.7]), np.full(5, np.nan), "3 mm")
     assert found.mark is Mark.DOUBTFUL

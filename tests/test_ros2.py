@@ -147,6 +147,17 @@ def test_the_package_says_what_it_needs(tmp_path):
     assert "@" not in (root / "src" / "my_wiping_node.cpp").read_text()
 
 
+def test_what_is_long_stays_one_item_of_the_list_in_the_readme(tmp_path):
+    policy, _, notes = learnt(3, ["x", "y", "z"])
+    notes |= {"sources": [f"wipe_{k}.csv" for k in range(30)]}
+    policy.export_ros2(tmp_path / "wipe", notes=notes)
+    listed = (tmp_path / "wipe" / "README.md").read_text().partition("- ")[2].partition("\n\n")[0]
+    items = f"\n{listed}".split("\n- ")
+    named = policy.describe(policy.closed_form(), notes).whole
+    assert len(items) == len(named)
+    assert any("\n  " in item for item in items)
+
+
 def loop_of(folder):
     """The loop in Python beside a node."""
     spec = spec_from_file_location("wiping_loop", folder / "wiping" / "scripts" / "wiping_loop.py")

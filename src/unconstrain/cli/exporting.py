@@ -33,6 +33,10 @@ _NEXT_ROS2 = "colcon build, then colcon test; let it run with the robot held sti
 _UNIT = " Units: messages are in metres or radians, and 'scale' in {}/config makes them the policy's: 1.0 as written, "
 _UNIT += "1000.0 for millimetres, 100.0 for centimetres, 57.29578 for degrees."
 
+_CENTRED = (
+    " States as measured: it takes them relative to the mean of a demonstration; first subtract that of the place."
+)
+
 TARGETS = {
     ".c": Target("C source", "export_c", ("name", "single", "notes"), _NEXT_C),
     ".onnx": Target("ONNX graph", "export_onnx", ("single", "notes"), _NEXT_ONNX),
@@ -91,9 +95,10 @@ def export(
 def _judged(learnt: Any, notes: dict[str, Any], ros2: str | None) -> uc.evaluation.verdicts.Verdict:
     """Of a policy that goes to a robot, also in which unit where nobody has said it."""
     judged, units = verdict_of(learnt, notes), notes.get("units", {})
-    of_states = {units.get(name) for name in uc.Recipe.from_dict(notes.get("recipe", {})).states or ("",)}
+    recipe = uc.Recipe.from_dict(notes.get("recipe", {}))
+    of_states = {units.get(name) for name in recipe.states or ("",)}
     unit = "" if ros2 is None or of_states in ({"mm"}, {"cm"}, {"m"}, {"deg"}, {"rad"}) else _UNIT.format(ros2)
-    far = "States far from all data, where its support is near 0."
+    far = "States far from all data, where its support is near 0." + _CENTRED * recipe.centre
     return judged._replace(doubt=f"{far}{unit} {judged.doubt}".rstrip())
 
 

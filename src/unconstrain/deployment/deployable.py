@@ -110,7 +110,8 @@ class Exportable:
         Raises
         ------
         SettingError
-            Also if actions are not velocities of the states, or states are orientations, or not the three of a pose.
+            Also if actions are not velocities of the states, or states are orientations, centred, or not the three of
+            a pose.
         """
         form = self.closed_form(scaler)
         return export_ros2(form, self._after(scaler), folder, name, self.describe(form, notes), messages)

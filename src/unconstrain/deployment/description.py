@@ -1,4 +1,4 @@
-"""What is to be said of a policy where it is used: columns, units, what is subtracted, hash."""
+"""What is to be said of a policy where it is used: columns, units, centring, what is subtracted, hash."""
 
 import hashlib
 import json
@@ -13,6 +13,9 @@ from ..base.display import legible, speed_of, with_unit
 from ..models import ClosedForm
 
 _WIDTH = 116
+
+CENTRED = "relative to the mean of each demonstration; subtract that of the place from states before"
+"""Of states that were centred."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,8 @@ class Description:
         recipe, units, _ = notes.pop("recipe", {}), notes.pop("units", {}), notes.pop("digests", None)
         states = _named(recipe.get("states"), form.columns, "x")
         given = recipe.get("actions") or [*map(speed_of, recipe.get("states") or ())]
-        lines = {"learnt by": learnt, "subtracted inside": ", ".join(f"{value:.6g}" for value in form.origin)}
+        lines = {"centring": CENTRED if recipe.get("centre") else "none" if recipe else "", "learnt by": learnt}
+        lines["subtracted inside"] = ", ".join(f"{value:.6g}" for value in form.origin)
         lines |= {name: _said(value) for name, value in notes.items()}
         lines["recorded in degrees"] = ", ".join(recipe.get("degrees") or ())
         lines["guided"] = form.correction.promise if form.correction else ""

@@ -13,7 +13,7 @@ from ..base.errors import SettingError
 from ..base.files import put_folder, workshop
 from ..models import ClosedForm, spaces
 from .c99 import c_name, c_source, speed_limit
-from .description import Description
+from .description import CENTRED, Description
 from .filling import filled, own_version
 
 DISTRIBUTIONS = ("Humble", "Jazzy", "Rolling")
@@ -94,7 +94,7 @@ def _words(package: str, form: ClosedForm, described: Description, kind: Message
         "state_message": received,
         "command_message": sent,
         "comment": "\n".join(f"# {line}" for line in described.comment()),
-        "about": "\n".join(f"- {line}" for line in described.comment()),
+        "about": "\n".join(line if line[0] == " " else f"- {line}" for line in described.comment()),
         "n": str(form.columns),
         "d": str(form.sizes[1]),
         "scale": {"mm": "1000.0", "cm": "100.0", "deg": "57.29578"}.get("".join(units), "1.0"),
@@ -114,6 +114,11 @@ def _check(form: ClosedForm, kind: Messages, described: Description) -> None:
     n, d, _ = form.columns, *form.sizes[1:]
     if any(isinstance(factor, spaces.Sphere) for factor in form.embedding.space.factors):
         raise SettingError("ros2: states hold an orientation; the node takes joints, or the position of a pose.")
+    if described.lines.get("centring") == CENTRED:
+        raise SettingError(
+            "ros2: states are relative to the mean of each demonstration (--centre), which the node cannot know. Learn "
+            "without it; or export it as C, ONNX or JavaScript, and subtract that mean from states."
+        )
     if n != d or _of_second_order(described):
         raise SettingError(
             f"ros2: got {n} states ({', '.join(described.states)}) and {d} actions ({', '.join(described.actions)}), "
