@@ -29,6 +29,7 @@ from unconstrain import cli, storage
 from unconstrain.base.display import percent
 from unconstrain.base.errors import MissingExtraError
 from unconstrain.cli import fitting, rolling
+from unconstrain.evaluation.verdicts import Mark
 from unconstrain.paper import commands, experiments
 from unconstrain.paper import pages as report
 from unconstrain.paper.experiments import table1, washing
@@ -182,6 +183,48 @@ def test_help_has_an_example_and_fits_a_terminal(command):
     assert run(command, "-h") == said
 
 
+@pytest.mark.parametrize("command", COMMANDS)
+def test_each_command_prints_json(command):
+    assert re.search(r"^  --json +Print JSON\.$", run(command, "--help"), re.MULTILINE)
+
+
+TELLING = {
+    "inspect": ("HERE/swing_*.csv",),
+    "look": ("HERE/swing_*.csv", "-o", "look.html"),
+    "play": ("-o", "play.html"),
+    "certify": ("HERE/swing.npz",),
+    "example": ("wiping",),
+    "convert": ("HERE/swing_*.csv", "all.parquet"),
+    "doctor": (),
+}
+
+
+@pytest.mark.parametrize("command", TELLING)
+def test_json_has_the_verdict_that_is_printed(command, folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = [command, *(word.replace("HERE", str(folder)) for word in TELLING[command])]
+    said = call(*words, "--json")
+    told = json.loads(said.out)
+    written = [*tmp_path.iterdir()]
+    assert all(str(one.name) in said.out for one in written)
+    again = call(*words, *["--force"] * bool(written))
+    assert again.code == said.code == 0
+    verdict = uc.evaluation.verdicts.Verdict(**told["verdict"] | {"mark": Mark[told["verdict"]["mark"].upper()]})
+    assert again.out.startswith("\n".join(verdict.lines()))
+
+
+def test_json_says_from_where_a_policy_does_not_arrive_and_how_much_was_looked_at(folder, policy, tmp_path):
+    states = np.random.default_rng(0).uniform(-1, 1, (40, 2))
+    storage.save(uc.ParametricPolicy(uc.Affine(), "direct").fit(states, 0.5 * states), tmp_path / "leaves.npz")
+    ran = call("certify", tmp_path / "leaves.npz", "--json")
+    found = json.loads(ran.out)
+    assert (ran.code, found["holds"], found["verdict"]["mark"], len(found["start"])) == (1, False, "bad", 2)
+    assert json.loads(run("certify", policy, "--json"))["holds"]
+    found = json.loads(run("look", folder / "swing_*.csv", policy, "-o", tmp_path / "l.html", "--json"))
+    assert (found["demonstrations"], found["page"]) == (8, str(tmp_path / "l.html"))
+    assert found["about"][0].startswith("policy: ")
+
+
 def test_help_of_all_names_each_command_in_a_whole_sentence():
     said = run("--help")
     for command in COMMANDS:
@@ -264,7 +307,7 @@ def test_inspect_finds_what_is_wrong(tmp_path):
 
 
 def test_inspect_prints_json_for_programs(files):
-    found = json.loads(run("inspect", *files, "--json"))
+    found = json.loads(run("inspect", *files, "--json"))["demonstrations"]
     assert [one["name"] for one in found] == [f"swing_{number}" for number in range(8)]
     assert found[0]["columns"] == ["x", "y", "vx", "vy"]
     assert found[0]["samples"] == 40
@@ -556,7 +599,7 @@ def test_fit_and_inspect_read_parquet_and_hdf5(folder, policy, tmp_path):
                 file[name] = values
     for suffix in ("parquet", "h5"):
         pattern = tmp_path / f"swing_*.{suffix}"
-        surveyed = json.loads(run("inspect", pattern, "--json"))
+        surveyed = json.loads(run("inspect", pattern, "--json"))["demonstrations"]
         assert [found["name"] for found in surveyed] == [f"swing_{number}" for number in range(8)]
         learnt_here = tmp_path / f"{suffix}.npz"
         assert "8 demonstrations, 320 samples." in run("fit", pattern, "--model", "linear", "-o", learnt_here)
@@ -1122,7 +1165,7 @@ def test_no_traceback_in_a_process_of_its_own(folder):
 def test_a_closed_pipe_is_no_error_to_see(folder):
     for command, head in (
         ("rollout swing.npz --start 0.5,0 --steps 3000 2>verdict.txt", "t,x,y,vx,vy\n"),
-        ("inspect swing_*.csv --json", "[\n"),
+        ("inspect swing_*.csv --json", "{\n"),
     ):
         ran = shell(f"unconstrain {command} | head -1", folder)
         assert (ran.code, ran.out, ran.err) == (0, head, "")
@@ -1370,13 +1413,13 @@ def test_inspect_says_how_a_file_was_read(tmp_path):
     (tmp_path / "a.csv").write_text("".join(f"{k} {k % 7} {k}\n" for k in range(9)))
     said = run("inspect", tmp_path / "a.csv")
     assert "'a': it has no header, so its columns are called column1, column2, column3; name them" in said
-    [found] = json.loads(run("inspect", tmp_path / "a.csv", "--json"))
+    [found] = json.loads(run("inspect", tmp_path / "a.csv", "--json"))["demonstrations"]
     assert [note["code"] for note in found["notes"]] == ["no-header"]
     assert "column" not in run("inspect", tmp_path / "a.csv", "--columns", "t,x,y").partition("columns:")[2]
 
 
 def test_doctor_finds_everything_that_the_tests_need():
-    found = {one["what"]: one for one in json.loads(run("doctor", "--json"))}
+    found = {one["what"]: one for one in json.loads(run("doctor", "--json"))["found"]}
     extras = ("viz", "data", "formats", "arm", "sim", "onnx", "rerun", "live", "cluster", "arrays")
     assert list(found) == ["Python", *extras, "graphics"]
     assert found["graphics"]["found"] in ("egl", "osmesa", "the system's own")
@@ -1397,7 +1440,7 @@ def test_doctor_tells_how_to_fix_what_is_missing(monkeypatch):
     assert fixes["graphics"] == "apt-get install libegl1 libegl-mesa0"
     said = run("doctor").splitlines()
     assert said[0] == "! 2 of 12 are missing something."
-    assert [line.strip() for line in said[-2:]] == list(filter(None, fixes.values()))  # each on a line, to be pasted
+    assert [line.strip() for line in said[2:4]] == list(filter(None, fixes.values()))  # each on a line, to be pasted
     assert max(map(len, said)) <= 100
     versions["mujoco"] = None
     assert {one.what: one.found for one in doctor.examine()}["graphics"] == "needs sim"

@@ -98,7 +98,7 @@ def test_so_does_every_kind_of_file_and_with_that_column_they_are_the_strokes(on
     shown = run("inspect", one_file, "--state", states, "--differentiate")
     assert "column 'Strich': has 4 values, a stroke each by its jumps: give --group Strich." in shown
     assert shown.startswith("! 1 of 1 demonstration not as it should be: several-in-one")
-    found = json.loads(run("inspect", one_file, "--group", "Strich", "--json"))
+    found = json.loads(run("inspect", one_file, "--group", "Strich", "--json"))["demonstrations"]
     assert [one["samples"] for one in found] == [40] * 4
     assert not any(one["code"] == "several-in-one" for each in found for one in each["warnings"])
 
@@ -199,12 +199,13 @@ def test_leaving_out_what_is_not_there_is_an_error(folder, policy, tmp_path, com
 
 def test_a_folder_stands_for_its_own_files_and_says_what_lies_below(folder, tmp_path):
     ran = call("inspect", folder, "--json")
-    assert [one["name"] for one in json.loads(ran.out)] == [f"w{k}" for k in range(6)]
+    assert [one["name"] for one in json.loads(ran.out)["demonstrations"]] == [f"w{k}" for k in range(6)]
     assert ran.err == (
         f"Note: {folder}: 6 files read. Folders in it (unseen) hold 2 more .csv; '{folder}/**/*.csv' reads all.\n"
     )
     every = call("inspect", f"{folder}/**/*.csv", "--json")
-    assert [one["name"] for one in json.loads(every.out)] == ["w6", "w7", *(f"w{k}" for k in range(6))]
+    names = [one["name"] for one in json.loads(every.out)["demonstrations"]]
+    assert names == ["w6", "w7", *(f"w{k}" for k in range(6))]
     assert every.err == ""
     shutil.copytree(folder, tmp_path / "alles" / "wischen")
     said = refused("inspect", tmp_path / "alles")

@@ -56,13 +56,13 @@ def test_that_nothing_tells_the_time_is_said_before_fit_refuses(tmp_path):
 def test_rows_without_numbers_are_no_gap_of_the_clock(tmp_path):
     rows = stroke(0)
     rows[12:22, 1:] = np.nan
-    [found] = json.loads(run("inspect", write(tmp_path / "w.csv", "t,x,y", rows), *READ, "--json"))
+    [found] = json.loads(run("inspect", write(tmp_path / "w.csv", "t,x,y", rows), *READ, "--json"))["demonstrations"]
     told = {one["code"]: one for one in found["warnings"]}
     assert set(told) == {"missing", "few-demonstrations"}
     assert told["missing"]["row"] == 12
     assert told["missing"]["message"].startswith("10 rows without numbers in x, y, empty or NaN,")
     late = np.delete(stroke(0), slice(12, 22), axis=0)  # they are not there at all
-    [found] = json.loads(run("inspect", write(tmp_path / "w.csv", "t,x,y", late), *READ, "--json"))
+    [found] = json.loads(run("inspect", write(tmp_path / "w.csv", "t,x,y", late), *READ, "--json"))["demonstrations"]
     assert "clock-gap" in [one["code"] for one in found["warnings"]]
 
 
@@ -196,12 +196,13 @@ def test_inspect_counts_what_still_leaves(tmp_path):
     demonstration = uc.prepare(uc.read(tmp_path / "a.csv"), uc.Recipe(("x", "y"), differentiate="savgol", still=0.5))
     left = len(demonstration[0])
     assert 35 < left < 55
-    found = json.loads(run("inspect", tmp_path, *READ, "--still", "0.5", "--json"))
+    found = json.loads(run("inspect", tmp_path, *READ, "--still", "0.5", "--json"))["demonstrations"]
     assert [one["left"] for one in found] == [left, 0]
     said = run("inspect", tmp_path, *READ, "--still", "0.5")
     assert "left by --still" in said
     assert f"{left} of 60" in said
-    assert [one["left"] for one in json.loads(run("inspect", tmp_path, *READ, "--json"))] == [None, None]
+    found = json.loads(run("inspect", tmp_path, *READ, "--json"))["demonstrations"]
+    assert [one["left"] for one in found] == [None, None]
 
 
 @pytest.mark.parametrize("odd", ["columns", "clock", "size"])

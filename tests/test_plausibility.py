@@ -767,7 +767,7 @@ def wrapped(tmp_path):
 
 def test_inspect_fit_and_diagnose_say_the_same(wrapped):
     options = (wrapped / "crank_*.csv", "--state", "x,yaw", "--differentiate")
-    shown = json.loads(run("inspect", *options, "--json"))
+    shown = json.loads(run("inspect", *options, "--json"))["demonstrations"]
     [first] = [one for one in shown[0]["warnings"] if one["code"] == "angle-wrap"]
     assert set(first) == {"code", "message", "column", "row"}
     assert (first["column"], first["row"]) == ("yaw", 25)
@@ -775,7 +775,7 @@ def test_inspect_fit_and_diagnose_say_the_same(wrapped):
     assert line in run("inspect", *options).splitlines()
     assert f"Note: {line}" in call("fit", *options, "--model", "linear", "-o", wrapped / "p.npz").err.splitlines()
     assert f"Note: {line}" in call("diagnose", *options).err.splitlines()
-    cured = json.loads(run("inspect", *options, "--angle", "yaw", "--json"))
+    cured = json.loads(run("inspect", *options, "--angle", "yaw", "--json"))["demonstrations"]
     assert "angle-wrap" not in {one["code"] for found in cured for one in found["warnings"]}
 
 
@@ -846,7 +846,8 @@ def test_a_file_in_milliseconds_among_others_is_named_and_no_unit_is_advised(tmp
 
 def test_demonstrations_can_be_left_out_by_name(wrapped):
     options = (wrapped / "crank_*.csv", "--state", "x,yaw", "--differentiate", "--leave-out", "crank_1")
-    assert [one["name"] for one in json.loads(run("inspect", *options, "--json"))] == ["crank_0", "crank_2"]
+    found = json.loads(run("inspect", *options, "--json"))["demonstrations"]
+    assert [one["name"] for one in found] == ["crank_0", "crank_2"]
     ran = call("fit", *options, "--model", "linear", "-o", wrapped / "p.npz")
     assert "2 demonstrations" in ran.out
     assert "Note: few-demonstrations: 2 demonstrations" in ran.err

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
@@ -36,6 +35,7 @@ from .printing import (
     refuse_warnings,
     say_fit,
     say_surveys,
+    say_verdict,
     say_written,
 )
 from .progress import shown
@@ -113,16 +113,20 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     names = uc.readers.unique_names(own)
     surveys = [replace(found, name=name) for found, name in zip(surveys, names, strict=True)]
     keep_codes(remark.code for found in surveys for remark in found.warnings)
+    used, needed, lacking = _used(recipe, first[0], surveys)
+    left_out = [*reading["leave_out"], *dict.fromkeys([*differ, *lacking])] if differ or lacking else []
+    then = _to_fit(recipe, first[0], surveys, bool(needed and not lacking), left_out)
+    apart = next_command("inspect", "--group", without=["group"])
+    verdict = uc.evaluation.verdicts.of_surveys(surveys, needed, then, apart)
     if as_json:
         plain = [
             asdict(found) | {kind: [*map(_plain, getattr(found, kind))] for kind in ("warnings", "notes")}
             for found in surveys
         ]
-        click.echo(json.dumps(plain, indent=2))
+        say_written({}, {"verdict": verdict.to_json(), "demonstrations": plain})
     else:
-        used, needed, lacking = _used(recipe, first[0], surveys)
-        left_out = [*reading["leave_out"], *dict.fromkeys([*differ, *lacking])] if differ or lacking else []
-        say_surveys(surveys, needed, _to_fit(recipe, first[0], surveys, bool(needed and not lacking), left_out))
+        say_verdict(verdict)
+        say_surveys(surveys)
         click.echo(used, nl=False)
     refuse_warnings(reading["strict"])
 
@@ -347,18 +351,17 @@ def doctor(as_json: bool) -> None:
     from .doctor import examine
 
     found = examine()
+    verdicts, fixes = uc.evaluation.verdicts, [one.fix for one in found if one.fix]
+    verdict = verdicts.Verdict(verdicts.Mark.GOOD, "Everything is there.")
+    if fixes:
+        then = "\n".join(["To install what is missing, paste:", *dict.fromkeys(fixes)])
+        said = f"{len(fixes)} of {len(found)} are missing something."
+        verdict = verdicts.Verdict(verdicts.Mark.DOUBTFUL, said, next=then)
     if as_json:
-        click.echo(json.dumps([one._asdict() for one in found], indent=2))
+        say_written({}, {"verdict": verdict.to_json(), "found": [one._asdict() for one in found]})
         return
-    missing = [one for one in found if one.fix]
-    sign = "! " if missing else "✔ "
-    said = f"{len(missing)} of {len(found)} are missing something." if missing else "Everything is there."
-    click.echo(f"{sign}{said}\n")
+    say_verdict(verdict)
     print_table(["what", "for", "found"], [[one.what, one.serves, one.found] for one in found])
-    if missing:
-        click.echo("\nTo install what is missing, paste:")
-    for command in dict.fromkeys(one.fix for one in missing):
-        click.echo(f"  {command}")
 
 
 for _command in (certify, constraint, convert, diagnose, example, export, info, look, play, rollout, score):

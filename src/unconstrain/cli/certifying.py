@@ -11,7 +11,7 @@ import unconstrain as uc
 
 from ..base.display import unit_of
 from ..base.errors import ModelFileError
-from .printing import say_verdict
+from .printing import option_for_json, say_verdict, say_written
 from .reading import loaded
 
 
@@ -20,7 +20,8 @@ from .reading import loaded
 @click.option(
     "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the starts and planes that are tried."
 )
-def certify(policy: str, seed: int) -> None:
+@option_for_json
+def certify(policy: str, seed: int, as_json: bool) -> None:
     """Say what is guaranteed of the motion of POLICY.
 
     By what margin, where and under which constraints. Exits with 1 where it is not, with a start, and a plane, from
@@ -36,7 +37,13 @@ def certify(policy: str, seed: int) -> None:
     else:
         raise ModelFileError(f"{policy}: holds no policy that is fitted or guided. Learn one with 'unconstrain fit'.")
     found = uc.certify(stored, around, seed)
-    say_verdict(_judged(policy, found))
+    verdict = _judged(policy, found)
+    if as_json:
+        against = {"start": found.start, "normal": found.normal}
+        plain = {name: None if value is None else value.tolist() for name, value in against.items()}
+        say_written({}, {"verdict": verdict.to_json(), "holds": found.holds, **plain})
+    else:
+        say_verdict(verdict)
     if not found.holds:
         raise SystemExit(1)
 

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import click
 
 import unconstrain as uc
 
+from ..base.display import counted
 from ..base.errors import NOTHING_LEFT, ReadError
-from .printing import option_for_json
+from .printing import option_for_json, say_verdict, say_written
 from .progress import shown
 from .reading import left_in, of_files, options_for_reading, reading_of, recipe_of
 from .writing import check_outputs, option_for_force
@@ -46,25 +47,33 @@ def convert(files: Sequence[str], output: str, align: bool, force: bool, as_json
         chosen = [replace(each, columns=kept, values=each.select(kept)) for each in recordings]
     uc.writers.write_recordings(chosen, output, states, actions)
     counts = {"recordings": len(chosen), "samples": sum(map(len, chosen))}
-    if as_json:
-        click.echo(json.dumps({"output": output, **counts}))
-    else:
-        click.echo(f"✔ {counts['recordings']} recordings, {counts['samples']} samples: {output}")
+    said = f"{counted(counts['recordings'], 'recording')}, {counted(counts['samples'], 'sample')}."
+    _say(said, f"unconstrain inspect {quote(output)}", {"output": output}, counts if as_json else None)
 
 
 @click.command(epilog="\b\nExample:\n  unconstrain example wiping")
 @click.argument("folder", type=click.Path(file_okay=False))
 @option_for_force
-def example(folder: str, force: bool) -> None:
+@option_for_json
+def example(folder: str, force: bool, as_json: bool) -> None:
     """Write recordings to begin with to FOLDER.
 
     Simulated wiping of tilted plates, which comes with this package.
     """
     check_outputs((folder,), (), force)
     paths = uc.datasets.write_example(folder)
-    click.echo(f"{len(paths)} recordings: {folder}")
-    click.echo(f"to judge what was learnt: {Path(folder) / 'unseen'}")
-    click.echo(f"  Next: unconstrain inspect {Path(folder) / '*.csv'}")
+    written = {"output": folder, "to judge what was learnt": str(Path(folder) / "unseen")}
+    said = f"{counted(len(paths), 'recording')} to begin with."
+    then = f"unconstrain inspect {Path(quote(folder)) / '*.csv'}"
+    _say(said, then, written, {"recordings": len(paths)} if as_json else None)
+
+
+def _say(said: str, then: str, written: dict[str, str], counts: dict[str, Any] | None) -> None:
+    """Print what was written and what comes next, or, with counts, all as JSON."""
+    verdict = uc.evaluation.verdicts.Verdict(uc.evaluation.verdicts.Mark.GOOD, said, next=then)
+    if counts is None:
+        say_verdict(verdict)
+    say_written(written, None if counts is None else {"verdict": verdict.to_json()} | counts)
 
 
 def _columns(recording: uc.Recording, options: dict[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -18,7 +18,7 @@ from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainEr
 from ..base.files import write
 from .constraining import arm_of, known_arms, said_elsewhere
 from .informing import OF, TOLD, learnt_from
-from .printing import refuse_warnings, say_verdict
+from .printing import option_for_json, refuse_warnings, say_verdict, say_written
 from .reading import options_for_reading, prepared, reading_of, typed
 from .speaking import as_typed
 from .writing import check_outputs, option_for_force
@@ -32,7 +32,8 @@ MOST_QUICK = 20_000
     "-o", "--output", type=click.Path(dir_okay=False), default="play.html", show_default=True, help="HTML file."
 )
 @option_for_force
-def play(output: str, force: bool) -> None:
+@option_for_json
+def play(output: str, force: bool, as_json: bool) -> None:
     """Write a page to draw on, to see what it is about.
 
     Strokes on a plate, a rail that takes away what points into it, and three learners beside each other.
@@ -42,8 +43,10 @@ def play(output: str, force: bool) -> None:
     check_outputs((output,), (), force)
     write(output, play_page())
     verdicts = uc.evaluation.verdicts
-    say_verdict(verdicts.Verdict(verdicts.Mark.GOOD, "A page to draw on, by itself.", next="Open it in a browser."))
-    click.echo(f"page: {output}")
+    verdict = verdicts.Verdict(verdicts.Mark.GOOD, "A page to draw on, by itself.", next="Open it in a browser.")
+    if not as_json:
+        say_verdict(verdict)
+    say_written({"page": output}, {"verdict": verdict.to_json()} if as_json else None)
 
 
 @click.command(epilog="\b\nExample:\n  unconstrain look wipe_*.csv wipe.npz --state x,y,z -o look.html")
@@ -57,6 +60,7 @@ def play(output: str, force: bool) -> None:
 @click.option("--robot", metavar="URDF", help="States are joint angles of this robot: show it (--live), and its hand.")
 @click.option("--tip", help="With --robot: the link that is its hand.")
 @option_for_force
+@option_for_json
 def look(
     files: Sequence[str],
     output: str,
@@ -66,6 +70,7 @@ def look(
     robot: str | None,
     tip: str | None,
     force: bool,
+    as_json: bool,
     **reading: Any,
 ) -> None:
     """Write a page that shows demonstrations.
@@ -79,18 +84,27 @@ def look(
         raise SettingError("--port: belongs to --live; a page needs none.")
     check_outputs((None if live else output, rrd), (*paths, robot), force)
     seen = _seen(paths, reading)
-    scene = None if rrd is None and not live else _scene(seen, robot, tip)
+    scene: Any = None if rrd is None and not live else _scene(seen, robot, tip)
     surveys = uc.preparation.survey_set(seen.recordings, seen.recipe)
-    say_verdict(verdict := _judged(seen, surveys, live))
-    for line in _about(seen):
-        click.echo(line)
-    samples = sum(map(len, seen.demonstrations))
-    click.echo(f"{counted(len(seen.demonstrations), 'demonstration')}, {counted(samples, 'sample')}")
+    verdict, about = _judged(seen, surveys, live), [*_about(seen)]
+    counts = {"demonstrations": len(seen.demonstrations), "samples": sum(map(len, seen.demonstrations))}
+    if not as_json:
+        say_verdict(verdict)
+        numbers = (counted(count, name[:-1]) for name, count in counts.items())
+        click.echo("\n".join([*about, ", ".join(numbers)]))
+    written = {} if live else {"page": output}
     if not live:
         write(output, _page(seen, surveys, verdict))
-        click.echo(f"page: {output}")
-    if scene is not None:
-        _show(scene, rrd, live, robot, port)
+    if rrd is not None:
+        from ..pages.look import recorded
+
+        write(rrd, recorded(scene))
+        written["rerun"] = rrd
+    say_written(written, {"verdict": verdict.to_json(), "about": about, **counts} if as_json else None)
+    if live:
+        from ..pages.look import serve
+
+        serve(scene, robot, lambda address: click.echo(f"live: {address} (Ctrl-C ends it)", err=as_json), port)
 
 
 class Seen(NamedTuple):
@@ -223,16 +237,6 @@ def _scene(seen: Seen, robot: str | None, tip: str | None) -> Any:
         raise SettingError(f"--robot: has {arm.joints} joints on the way to {tip!r}, got {len(states)} states.")
     directions = seen.recipe.actions or seen.recipe.directions
     return Scene(seen.demonstrations, states, directions, seen.policy, seen.constraint, arm)
-
-
-def _show(scene: Any, rrd: str | None, live: bool, robot: str | None, port: int | None) -> None:
-    from ..pages.look import recorded, serve
-
-    if rrd is not None:
-        write(rrd, recorded(scene))
-        click.echo(f"rerun: {rrd}")
-    if live:
-        serve(scene, robot, lambda address: click.echo(f"live: {address} (Ctrl-C ends it)"), port)
 
 
 def _model(path: str | Path) -> Any:

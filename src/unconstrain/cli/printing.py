@@ -105,13 +105,8 @@ def of_option(name: str) -> Iterator[None]:
         raise SettingError(f"{name}: {re.sub(r'^[a-z_]+: ', '', str(error))}") from None
 
 
-def say_surveys(surveys: Sequence[Any], needed: str, then: str) -> None:
-    """Print what was found in recordings: a line for each, columns, what is not as it seems, what fit has to know.
-
-    ``then`` is the command that comes next.
-    """
-    apart = next_command("inspect", "--group", without=["group"])
-    say_verdict(uc.evaluation.verdicts.of_surveys(surveys, needed, then, apart))
+def say_surveys(surveys: Sequence[Any]) -> None:
+    """Print what was found in recordings: a line for each, columns, what is not as it seems."""
     rows = [
         [
             found.name,
