@@ -257,7 +257,7 @@ def test_an_export_says_whether_states_are_relative_to_a_mean(folder, tmp_path):
     run("fit", *columns, "-o", tmp_path / "plain.npz")
     for name, centred in (("mean", True), ("plain", False)):
         said = " ".join(run("export", tmp_path / f"{name}.npz", "-o", tmp_path / f"{name}.c").split())
-        assert ("relative to the mean of a demonstration; first subtract that of the place" in said) == centred
+        assert ("relative to the mean of a demonstration; first subtract that." in said) == centred
         comment = (tmp_path / f"{name}.c").read_text("utf-8").partition("*/")[0]
         assert ("centring: relative to the mean of each demonstration; subtract" in comment) == centred
         assert ("centring: none\n" in comment) == (not centred)

@@ -34,8 +34,8 @@ from .printing import (
     print_table,
     refuse_warnings,
     say_fit,
+    say_judged,
     say_surveys,
-    say_verdict,
     say_written,
 )
 from .progress import shown
@@ -118,14 +118,12 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     then = _to_fit(recipe, first[0], surveys, bool(needed and not lacking), left_out)
     apart = next_command("inspect", "--group", without=["group"])
     verdict = uc.evaluation.verdicts.of_surveys(surveys, needed, then, apart)
-    if as_json:
-        plain = [
-            asdict(found) | {kind: [*map(_plain, getattr(found, kind))] for kind in ("warnings", "notes")}
-            for found in surveys
-        ]
-        say_written({}, {"verdict": verdict.to_json(), "demonstrations": plain})
-    else:
-        say_verdict(verdict)
+    plain = [
+        asdict(found) | {kind: [*map(_plain, getattr(found, kind))] for kind in ("warnings", "notes")}
+        for found in surveys
+    ]
+    say_judged(verdict, {}, as_json, demonstrations=plain)
+    if not as_json:
         say_surveys(surveys)
         click.echo(used, nl=False)
     refuse_warnings(reading["strict"])
@@ -357,11 +355,9 @@ def doctor(as_json: bool) -> None:
         then = "\n".join(["To install what is missing, paste:", *dict.fromkeys(fixes)])
         said = f"{len(fixes)} of {len(found)} are missing something."
         verdict = verdicts.Verdict(verdicts.Mark.DOUBTFUL, said, next=then)
-    if as_json:
-        say_written({}, {"verdict": verdict.to_json(), "found": [one._asdict() for one in found]})
-        return
-    say_verdict(verdict)
-    print_table(["what", "for", "found"], [[one.what, one.serves, one.found] for one in found])
+    say_judged(verdict, {}, as_json, found=[one._asdict() for one in found])
+    if not as_json:
+        print_table(["what", "for", "found"], [[one.what, one.serves, one.found] for one in found])
 
 
 for _command in (certify, constraint, convert, diagnose, example, export, info, look, play, rollout, score):

@@ -11,7 +11,7 @@ import unconstrain as uc
 
 from ..base.display import unit_of
 from ..base.errors import ModelFileError
-from .printing import option_for_json, say_verdict, say_written
+from .printing import option_for_json, say_judged
 from .reading import loaded
 
 
@@ -37,13 +37,8 @@ def certify(policy: str, seed: int, as_json: bool) -> None:
     else:
         raise ModelFileError(f"{policy}: holds no policy that is fitted or guided. Learn one with 'unconstrain fit'.")
     found = uc.certify(stored, around, seed)
-    verdict = _judged(policy, found)
-    if as_json:
-        against = {"start": found.start, "normal": found.normal}
-        plain = {name: None if value is None else value.tolist() for name, value in against.items()}
-        say_written({}, {"verdict": verdict.to_json(), "holds": found.holds, **plain})
-    else:
-        say_verdict(verdict)
+    start, normal = (None if one is None else one.tolist() for one in (found.start, found.normal))
+    say_judged(_judged(policy, found), {}, as_json, holds=found.holds, start=start, normal=normal)
     if not found.holds:
         raise SystemExit(1)
 

@@ -14,7 +14,7 @@ import unconstrain as uc
 
 from ..base.display import counted
 from ..base.errors import NOTHING_LEFT, ReadError
-from .printing import option_for_json, say_verdict, say_written
+from .printing import option_for_json, say_judged
 from .progress import shown
 from .reading import left_in, of_files, options_for_reading, reading_of, recipe_of
 from .writing import check_outputs, option_for_force
@@ -48,7 +48,8 @@ def convert(files: Sequence[str], output: str, align: bool, force: bool, as_json
     uc.writers.write_recordings(chosen, output, states, actions)
     counts = {"recordings": len(chosen), "samples": sum(map(len, chosen))}
     said = f"{counted(counts['recordings'], 'recording')}, {counted(counts['samples'], 'sample')}."
-    _say(said, f"unconstrain inspect {quote(output)}", {"output": output}, counts if as_json else None)
+    verdicts, then = uc.evaluation.verdicts, f"unconstrain inspect {quote(output)}"
+    say_judged(verdicts.Verdict(verdicts.Mark.GOOD, said, next=then), {"output": output}, as_json, **counts)
 
 
 @click.command(epilog="\b\nExample:\n  unconstrain example wiping")
@@ -65,15 +66,8 @@ def example(folder: str, force: bool, as_json: bool) -> None:
     written = {"output": folder, "to judge what was learnt": str(Path(folder) / "unseen")}
     said = f"{counted(len(paths), 'recording')} to begin with."
     then = f"unconstrain inspect {Path(quote(folder)) / '*.csv'}"
-    _say(said, then, written, {"recordings": len(paths)} if as_json else None)
-
-
-def _say(said: str, then: str, written: dict[str, str], counts: dict[str, Any] | None) -> None:
-    """Print what was written and what comes next, or, with counts, all as JSON."""
-    verdict = uc.evaluation.verdicts.Verdict(uc.evaluation.verdicts.Mark.GOOD, said, next=then)
-    if counts is None:
-        say_verdict(verdict)
-    say_written(written, None if counts is None else {"verdict": verdict.to_json()} | counts)
+    verdicts = uc.evaluation.verdicts
+    say_judged(verdicts.Verdict(verdicts.Mark.GOOD, said, next=then), written, as_json, recordings=len(paths))
 
 
 def _columns(recording: uc.Recording, options: dict[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:

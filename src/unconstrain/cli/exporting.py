@@ -11,7 +11,7 @@ import unconstrain as uc
 
 from ..base.errors import SettingError
 from .informing import verdict_of
-from .printing import option_for_json, say_verdict, say_written
+from .printing import option_for_json, say_judged
 from .reading import fitted_policy, of_words
 from .writing import check_outputs, option_for_force
 
@@ -33,9 +33,7 @@ _NEXT_ROS2 = "colcon build, then colcon test; let it run with the robot held sti
 _UNIT = " Units: messages are in metres or radians, and 'scale' in {}/config makes them the policy's: 1.0 as written, "
 _UNIT += "1000.0 for millimetres, 100.0 for centimetres, 57.29578 for degrees."
 
-_CENTRED = (
-    " States as measured: it takes them relative to the mean of a demonstration; first subtract that of the place."
-)
+_CENTRED = " States as measured: it takes them relative to the mean of a demonstration; first subtract that."
 
 TARGETS = {
     ".c": Target("C source", "export_c", ("name", "single", "notes"), _NEXT_C),
@@ -86,10 +84,7 @@ def export(
         written[target.what] = output
     if header is not None:
         written["header"] = header
-    judged = _judged(learnt, notes, ros2)._replace(next=then)
-    if not as_json:
-        say_verdict(judged)
-    say_written(written, {"verdict": judged.to_json()} if as_json else None)
+    say_judged(_judged(learnt, notes, ros2)._replace(next=then), written, as_json)
 
 
 def _judged(learnt: Any, notes: dict[str, Any], ros2: str | None) -> uc.evaluation.verdicts.Verdict:

@@ -18,7 +18,7 @@ from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainEr
 from ..base.files import write
 from .constraining import arm_of, known_arms, said_elsewhere
 from .informing import OF, TOLD, learnt_from
-from .printing import option_for_json, refuse_warnings, say_verdict, say_written
+from .printing import option_for_json, refuse_warnings, say_judged, say_verdict, say_written
 from .reading import options_for_reading, prepared, reading_of, typed
 from .speaking import as_typed
 from .writing import check_outputs, option_for_force
@@ -44,9 +44,7 @@ def play(output: str, force: bool, as_json: bool) -> None:
     write(output, play_page())
     verdicts = uc.evaluation.verdicts
     verdict = verdicts.Verdict(verdicts.Mark.GOOD, "A page to draw on, by itself.", next="Open it in a browser.")
-    if not as_json:
-        say_verdict(verdict)
-    say_written({"page": output}, {"verdict": verdict.to_json()} if as_json else None)
+    say_judged(verdict, {"page": output}, as_json)
 
 
 @click.command(epilog="\b\nExample:\n  unconstrain look wipe_*.csv wipe.npz --state x,y,z -o look.html")

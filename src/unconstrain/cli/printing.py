@@ -156,6 +156,13 @@ def say_written(places: dict[str, str], told: dict[str, Any] | None) -> None:
         click.echo(f"{what}: {place}")
 
 
+def say_judged(verdict: uc.evaluation.verdicts.Verdict, written: dict[str, str], as_json: bool, **told: Any) -> None:
+    """Print a verdict and where files were written; or these, and what else is told, as JSON."""
+    if not as_json:
+        say_verdict(verdict)
+    say_written(written, {"verdict": verdict.to_json(), **told} if as_json else None)
+
+
 class Judged(NamedTuple):
     """How much of the motion a policy explains."""
 

@@ -61,6 +61,13 @@ def null_space_component(
     References
     ----------
     .. [1] C. Towell, M. Howard and S. Vijayakumar. Learning nullspace policies. IROS, 2010.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).uniform(-1, 1, (60, 2))
+    >>> plane = uc.constraints.Plane([0.0, 1.0])  # takes away what points along y
+    >>> uc.constraints.null_space_component(states, -states, plane, uc.Affine())(np.array([[0.5, 0.3]])).round(6)
+    array([[-0.5,  0. ]])
     """
     table, moves = as_matrix(states, "states"), as_matrix(actions, "actions")
     if len(table) != len(moves):

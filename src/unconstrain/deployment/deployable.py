@@ -69,6 +69,11 @@ class Exportable:
         ------
         SettingError
             For another name, if a number does not fit ``float``, and as :meth:`closed_form` does.
+
+        Examples
+        --------
+        >>> policy = uc.ParametricPolicy(uc.Affine(), "direct").fit([[0.0], [1.0]], [[0.0], [-2.0]])
+        >>> policy.export_c("wipe.c")  # and wipe.h
         """
         form = self.closed_form(scaler)
         export_c(form, self._after(scaler), path, name, self.describe(form, notes), single=single)
@@ -84,6 +89,11 @@ class Exportable:
         """Write the policy as an ONNX graph, ``states`` (N, n) to ``actions`` (N, d), in float64 or float32.
 
         Needs the extra ``onnx``. Parameters and errors as in :meth:`export_c`; what is said goes into the metadata.
+
+        Examples
+        --------
+        >>> policy = uc.ParametricPolicy(uc.Affine(), "direct").fit([[0.0], [1.0]], [[0.0], [-2.0]])
+        >>> policy.export_onnx("wipe.onnx")
         """
         form = self.closed_form(scaler)
         files.write(path, onnx_model(form, self.describe(form, notes), single=single))
@@ -112,6 +122,12 @@ class Exportable:
         SettingError
             Also if actions are not velocities of the states, or states are orientations, centred, or not the three of
             a pose.
+
+        Examples
+        --------
+        >>> policy = uc.ParametricPolicy(uc.Affine(), "direct").fit([[0.0], [1.0]], [[0.0], [-2.0]])
+        >>> policy.export_ros2("wipe")
+        'joints'
         """
         form = self.closed_form(scaler)
         return export_ros2(form, self._after(scaler), folder, name, self.describe(form, notes), messages)
@@ -169,6 +185,12 @@ class Deployable(Exportable):
         ------
         InvalidDataError
             If the state is not of shape (n,).
+
+        Examples
+        --------
+        >>> policy = uc.ParametricPolicy(uc.Affine(), "direct").fit([[0.0], [1.0]], [[0.0], [-2.0]])
+        >>> policy.step([0.5]).round(6)
+        array([-1.])
         """
         known = self.__dict__
         solution, step = known.get("_prepared") or (None, None)
@@ -200,6 +222,12 @@ class Deployable(Exportable):
             scale each state.
         InvalidDataError
             If the weights are not finite.
+
+        Examples
+        --------
+        >>> policy = uc.ParametricPolicy(uc.Affine(), "direct").fit([[0.0], [1.0]], [[0.0], [-2.0]])
+        >>> policy.closed_form()
+        ClosedForm(1 state, 1 action, 1 model)
         """
         check_is_fitted(self, "solution_")
         form = self.training_.model.formula(self.solution_.checked().weights)

@@ -33,6 +33,11 @@ class Certificate:
         What is guaranteed, by what margin, where and under which constraints; or what was found against it.
     start, normal : ndarray, shape (n,), optional
         A counterexample, where there is one: a state, and the normal of a plane through it; None where it is free.
+
+    Examples
+    --------
+    >>> uc.certify(lambda states: 0.5 * states, np.eye(2)).start.shape  # moves away from there
+    (2,)
     """
 
     holds: bool

@@ -25,6 +25,12 @@ class Descent(Shown):
     potential : Potential
     pace : float
         The s in ``r = max(‖m‖ − s, ½ ‖m‖)``, in units of the state per second.
+
+    Examples
+    --------
+    >>> bowl = uc.motion.Potential(np.zeros(2), np.vstack([np.eye(2), -np.eye(2)]), np.zeros(4), np.ones(4))
+    >>> uc.motion.descent.Descent(bowl, pace=0.1).guided(np.array([[1.0, 0.0]]), np.array([[1.0, 0.0]]))  # away
+    array([[-0.5,  0. ]])
     """
 
     potential: Potential

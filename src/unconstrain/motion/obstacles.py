@@ -9,12 +9,6 @@ zero on the surface, and about one where the obstacle is hardly felt any more. O
 the first by 1 − λ where it comes nearer, and left as it is where it does not. So it is the modulation of Khansari-Zadeh
 and Billard (*Autonomous Robots* 32, 2012), inside the null space: nothing leaves that, and ``∇gᵀu = mᵀu`` is zero on
 the surface. As g is convex, ``g(x + Δt u) ≥ g(x) + Δt ∇gᵀu``: steps are shortened so that this stays positive.
-
-Examples
---------
->>> ball = uc.motion.obstacles.Ellipsoid([0.0, 0.0], 1.0)
->>> uc.motion.obstacles.avoided([ball], np.array([[-1.0, 0.0]]), np.array([[1.0, 1.0]]))
-array([[0., 2.]])
 """
 
 from collections.abc import Callable, Sequence
@@ -47,6 +41,11 @@ class Ellipsoid:
         R, above zero; one of a ball. Those of the robot are to be added.
     axes : array_like, shape (n, n), optional
         Q, orthogonal, with an axis in each column; those of the state by default.
+
+    Examples
+    --------
+    >>> uc.motion.obstacles.Ellipsoid([0.0, 0.0], 2.0)(np.array([[4.0, 0.0]]))
+    (array([1.]), array([[0.5, 0. ]]))
     """
 
     centre: Array
@@ -83,6 +82,11 @@ class Wall:
         Away from it, of any length but zero.
     reach : float
         From how far off it is felt, in units of the state.
+
+    Examples
+    --------
+    >>> uc.motion.obstacles.Wall([0.0, 0.0], [0.0, 1.0], reach=0.5)(np.array([[3.0, 0.5]]))
+    (array([1.]), array([[0., 2.]]))
     """
 
     point: Array
@@ -121,6 +125,12 @@ def avoided(
         N; all is free by default.
     dt : float, optional
         Seconds of an Euler step with which none is entered. By default of none: the velocities of continuous time.
+
+    Examples
+    --------
+    >>> ball = uc.motion.obstacles.Ellipsoid([0.0, 0.0], 1.0)
+    >>> uc.motion.obstacles.avoided([ball], np.array([[-1.0, 0.0]]), np.array([[1.0, 1.0]]))
+    array([[0., 2.]])
     """
     near = [obstacle(states) for obstacle in obstacles]
     for k, (value, slope) in enumerate(near):

@@ -68,6 +68,13 @@ class Orbit(Shown):
         B, 1/s.
     rate : float
         ω, rad/s.
+
+    Examples
+    --------
+    >>> bowl = uc.motion.Potential(np.zeros(2), np.vstack([np.eye(2), -np.eye(2)]), np.zeros(4), np.ones(4))
+    >>> orbit = uc.motion.orbit.Orbit(bowl, radius=1.0, turn=np.array([[0.0, -1.0], [1.0, 0.0]]), rate=1.0)
+    >>> orbit.guided(np.array([[1.0, 0.0]]), np.zeros((1, 2)))  # on the cycle, where the policy rests
+    array([[0. , 0.9]])
     """
 
     potential: Potential

@@ -60,6 +60,12 @@ class Potential(Shown):
     offsets : ndarray, shape (K,)
     weights : ndarray, shape (K,)
         In 1/s: V's gradient is a velocity. Some may be negative, running sums along a direction are not.
+
+    Examples
+    --------
+    >>> bowl = uc.motion.Potential(np.zeros(2), np.vstack([np.eye(2), -np.eye(2)]), np.zeros(4), np.ones(4))
+    >>> bowl(np.array([[3.0, 4.0]])), bowl.gradient(np.array([[3.0, 4.0]]))
+    (array([12.5]), array([[3., 4.]]))
     """
 
     goal: Array

@@ -61,6 +61,13 @@ def write_recordings(
         If it cannot be written.
     MissingExtraError
         If the library of a format is not installed.
+
+    Examples
+    --------
+    >>> recording = uc.Recording(("x", "y"), np.eye(2), times=np.array([0.0, 0.1]), name="wipe")
+    >>> uc.writers.write_recordings([recording], "wipe.csv")
+    >>> uc.read("wipe.csv")[0].columns
+    ('x', 'y')
     """
     target = Path(path)
     writer = WRITERS.get(target.suffix.lower())

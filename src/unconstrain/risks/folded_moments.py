@@ -21,6 +21,12 @@ class FoldedMoments(Shown):
         One for each fold, all of the same shape; empty before the first sample.
     held_out : range
         Indices of the folds that are held out, one after the other.
+
+    Examples
+    --------
+    >>> parts = tuple(uc.gather(np.ones((count, 1)), np.ones((count, 1))) for count in (5, 2))
+    >>> [(train.weight, test.weight) for train, test in uc.risks.FoldedMoments(parts, range(2)).rounds()]
+    [(array([2.]), array([5.])), (array([5.]), array([2.]))]
     """
 
     parts: tuple[Moments, ...]

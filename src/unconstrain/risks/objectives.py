@@ -11,6 +11,11 @@ def inconsistency(moments: Moments) -> Quadratic:
     """Squared distance of each action from the policy projected onto it (eqs 4 and 14).
 
     ``E_i = Σ w (r − ûᵀ π̃(x))²``
+
+    Examples
+    --------
+    >>> uc.risks.inconsistency(uc.gather(np.ones((2, 1)), np.array([[1.0, 0.0], [0.0, 3.0]])))(np.array([[1.0, 3.0]]))
+    array([0.])
     """
     return Quadratic(moments.consistent, vec(moments.cross), moments.energy)
 
@@ -19,6 +24,11 @@ def standard_risk(moments: Moments) -> Quadratic:
     """Squared distance of each action from the policy (eqs 5 and 11).
 
     ``E_2 = Σ w ‖u − π̃(x)‖²``
+
+    Examples
+    --------
+    >>> uc.risks.standard_risk(uc.gather(np.ones((2, 1)), np.array([[1.0], [3.0]])))(np.array([[2.0]]))
+    array([2.])
     """
     models, d, p = moments.cross.shape
     each = beside(np.eye(d), moments.gram)[:, None, :]  # eye[k, l] at (k, j, l)

@@ -221,6 +221,13 @@ def lexicographic_path(first: Quadratic, second: Quadratic | None = None) -> Pat
     second : Quadratic, optional
         Minimised over the rest (eqs 8–13). Without it the undetermined
         directions stay zero: the truncated pseudo-inverse.
+
+    Examples
+    --------
+    >>> moments = uc.gather(np.ones((2, 1)), np.array([[1.0, 0.0], [2.0, 0.0]]))
+    >>> path = uc.risks.lexicographic_path(uc.risks.inconsistency(moments), uc.risks.standard_risk(moments))
+    >>> path.weights.shape  # one problem, two weights, three splits
+    (1, 2, 3)
     """
     xp = namespace(first.hessian)
     eigenvalues, vectors = eigensystem(first.hessian)
@@ -264,7 +271,13 @@ def _in_orthonormal_features(first: Quadratic, second: Quadratic) -> tuple[NDArr
 
 
 def minimum(objective: Quadratic) -> Array:
-    """Minimiser of one objective, shape (M, P); that of least norm where it is not unique."""
+    """Minimiser of one objective, shape (M, P); that of least norm where it is not unique.
+
+    Examples
+    --------
+    >>> uc.risks.minimum(uc.Quadratic(np.eye(1)[None], linear=np.array([[3.0]]), constant=np.array([9.0])))
+    array([[3.]])
+    """
     xp = namespace(objective.linear)
     axes = xp.eye(objective.linear.shape[1], dtype=xp.float64, device=objective.linear.device)
     axes = xp.broadcast_to(axes, objective.hessian.shape)

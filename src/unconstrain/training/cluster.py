@@ -71,6 +71,13 @@ def fit(
         As ``fit`` does, and if the chunks do not match.
     MissingExtraError
         If dask is not installed.
+
+    Examples
+    --------
+    >>> from dask.array import from_array
+    >>> states = from_array(np.linspace(-1, 1, 9)[:, None], chunks=(3, 1))
+    >>> uc.cluster.fit(uc.ParametricPolicy(uc.Affine(), "direct"), states, -2.0 * states).predict([[0.5]]).round(6)
+    array([[-1.]])
     """
     delayed = require_extra("dask", "cluster").delayed
     columns = [_by_rows(array) for array in (X, y, sample_weight, groups)]
@@ -108,6 +115,12 @@ def fit_batches(policy: P, parts: Sequence[Any], *, client: Any | None = None) -
         If the learner needs the samples, or the cluster gives up.
     MissingExtraError
         If dask is not installed.
+
+    Examples
+    --------
+    >>> parts = [[([[x]], [[-2.0 * x]])] for x in (0.0, 0.5, 1.0)]  # one batch in each of three files
+    >>> uc.cluster.fit_batches(uc.ParametricPolicy(uc.Affine(), "direct"), parts).predict([[0.5]]).round(6)
+    array([[-1.]])
     """
     delayed = require_extra("dask", "cluster").delayed
     return policy.fit_parts([delayed(part, traverse=False) for part in parts], partial(_summed, client))

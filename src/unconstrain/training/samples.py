@@ -50,6 +50,12 @@ class Samples(Shown):
         Standard deviation of the noise on each action coordinate, where it was given.
     notes : tuple of str
         What had to be assumed of their order.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).uniform(-1, 1, (60, 2))
+    >>> uc.ParametricPolicy(uc.Affine(), uc.Robust()).fit(states, -states).training_.samples
+    Samples(60 samples, 2 states, 2 actions, 3 features, 1 model)
     """
 
     states: Array

@@ -229,6 +229,12 @@ def identify(
     ------
     InvalidDataError
         If the tables do not fit together, a demonstration has fewer than ten samples, or nothing moves.
+
+    Examples
+    --------
+    >>> turn, noise = np.linspace(0, 2, 50), np.random.default_rng(0).normal(scale=1e-3, size=(50, 2))
+    >>> uc.constraints.identify(0.4 * np.column_stack([np.cos(turn), np.sin(turn)]) + noise).mechanism.kind
+    'circle'
     """
     track, order, scale, origin = _track(positions, orientations, groups)
     pushed = None if forces is None else _as_long(forces, "forces", track.positions.shape)[order]

@@ -32,6 +32,13 @@ def align(recordings: Sequence[Recording], name: str | None = None) -> Recording
     ------
     InvalidDataError
         If one has no times, or there is no time in which all were recorded.
+
+    Examples
+    --------
+    >>> arm = uc.Recording(("x",), np.arange(3.0)[:, None], np.array([0.0, 1.0, 2.0]), "arm")
+    >>> force = uc.Recording(("f",), np.full((5, 1), 7.0), np.array([0.0, 0.5, 1.0, 1.5, 2.0]), "force")
+    >>> uc.preparation.align([arm, force]).columns
+    ('x', 'f')
     """
     clocks = [_clock(recording, recordings) for recording in recordings]
     start, end = max(clock[0] for clock in clocks), min(clock[-1] for clock in clocks)
