@@ -1,9 +1,8 @@
 """A policy, with its moments, or a learnt constraint, in one file that runs nothing when it is opened.
 
-The file is a NumPy ``.npz`` of plain arrays and one JSON header. The header
-names classes from a fixed list; arrays are never unpickled; a digest over
-everything shows damage. Writing goes to a new file that takes the old one's
-place in one step.
+The file is a NumPy ``.npz`` of plain arrays and one JSON header. The header names classes from a fixed list; arrays are
+never unpickled; a digest over everything shows damage. Writing goes to a new file that takes the old one's place in one
+step.
 
 Examples
 --------

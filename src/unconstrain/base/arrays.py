@@ -1,12 +1,10 @@
 """Shapes, checks at the door, other array libraries, and optional imports.
 
-Letters used in shapes throughout: ``T`` samples of one demonstration, ``N``
-samples in all, ``n`` state dimensions, ``d`` action dimensions, ``p``
-features, ``P = d p`` weights, ``M`` models (receptive fields; 1 when global).
+Letters used in shapes throughout: ``T`` samples of one demonstration, ``N`` samples in all, ``n`` state dimensions,
+``d`` action dimensions, ``p`` features, ``P = d p`` weights, ``M`` models (receptive fields; 1 when global).
 
-The mathematics is written in terms of the array API standard: ``xp`` is the
-library that an array belongs to, and is NumPy for everything that is no array
-of another library. Such an array stays on its device.
+The mathematics is written in terms of the array API standard: ``xp`` is the library that an array belongs to, and is
+NumPy for everything that is no array of another library. Such an array stays on its device.
 """
 
 import importlib

@@ -1,13 +1,10 @@
 """Independent pieces of work side by side, in as many threads as BLAS may use, and no more.
 
-Matrices of the size that occurs here leave most of BLAS' threads waiting for
-one another, which takes longer than one thread alone where another program
-wants the cores too, and they go on waiting for some time after each product.
-Several pieces of work at once, in a thread each, with one of BLAS, do not
-wait. What was said to BLAS (OPENBLAS_NUM_THREADS and its like, or
-``threadpoolctl``) counts here too, so that processes side by side do not get
-in each other's way. The limit is the process's, and so it is one for all who
-ask for it at once: the first sets it, the last takes it back.
+Matrices of the size that occurs here leave most of BLAS' threads waiting for one another, which takes longer than one
+thread alone where another program wants the cores too, and they go on waiting for some time after each product. Several
+pieces of work at once, in a thread each, with one of BLAS, do not wait. What was said to BLAS (OPENBLAS_NUM_THREADS and
+its like, or ``threadpoolctl``) counts here too, so that processes side by side do not get in each other's way. The
+limit is the process's, and so it is one for all who ask for it at once: the first sets it, the last takes it back.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """Constraint matrices ``A(x, t)``, with ``A u = 0`` (eqs 2, 19 and 20).
 
-A constraint is any callable that maps states (T, n) and times (T,) to
-matrices (T, k, d). Rows may be zero, and so where there are fewer constraints.
-Times are in seconds; one that does not read them holds at demonstrations
-without times too.
+A constraint is any callable that maps states (T, n) and times (T,) to matrices (T, k, d). Rows may be zero, and so
+where there are fewer constraints. Times are in seconds; one that does not read them holds at demonstrations without
+times too.
 """
 
 from __future__ import annotations

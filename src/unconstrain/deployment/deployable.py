@@ -165,10 +165,9 @@ class Deployable(Exportable):
     def step(self, x: ArrayLike, out: Array | None = None) -> Array:
         """Predict for one state, without overhead: for control loops.
 
-        The same as :meth:`predict` to rounding. It is prepared on the first
-        call after each fit. Any number of threads may call it at once, also
-        while one of them learns by :meth:`partial_fit`; each step is then by
-        the old or by the new solution, never by half of each.
+        The same as :meth:`predict` to rounding. It is prepared on the first call after each fit. Any number of threads
+        may call it at once, also while one of them learns by :meth:`partial_fit`; each step is then by the old or by
+        the new solution, never by half of each.
 
         Parameters
         ----------

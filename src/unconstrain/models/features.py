@@ -1,8 +1,7 @@
 """Feature maps: states (N, n) to features (N, p).
 
-A feature map is any callable on a table of states. One whose parameters depend
-on the data also has ``place(states)``, which returns the map to use; a policy
-calls it once, on the first batch.
+A feature map is any callable on a table of states. One whose parameters depend on the data also has ``place(states)``,
+which returns the map to use; a policy calls it once, on the first batch.
 """
 
 from __future__ import annotations
@@ -194,8 +193,7 @@ class Kernels(Shown):
 class NormalisedRBF(Kernels):
     """Gaussian kernels normalised to sum to one at each state (section III-C).
 
-    ``b_i(x) = K(x − c_i) / Σ_j K(x − c_j)`` with
-    ``K(δ) = exp(−‖δ‖² / 2σ²)``. Computed by log-sum-exp: far from all
+    ``b_i(x) = K(x − c_i) / Σ_j K(x − c_j)`` with ``K(δ) = exp(−‖δ‖² / 2σ²)``. Computed by log-sum-exp: far from all
     centres the nearest kernel has a share of one, and nothing overflows.
 
     Parameters
@@ -393,8 +391,7 @@ def gaussian(squared: Array, variance: float) -> Array:
 def squared_distances(states: Array, centres: Array) -> Array:
     """Squared Euclidean distances, shape (N, M), without forming (N, M, n).
 
-    Both are taken relative to the centres' mean, so that a large common
-    offset costs no digits.
+    Both are taken relative to the centres' mean, so that a large common offset costs no digits.
     """
     near, far = _apart(states, centres)
     xp = namespace(near)

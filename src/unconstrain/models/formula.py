@@ -55,11 +55,10 @@ class ClosedForm(Shown):
 
         ``π̃(x) = Σ_m s_m(x) (A_m z + b_m)``,  ``s_m = exp(e_m) / Σ_k exp(e_k)``,
 
-    where ``e_m = slope_mᵀ z + offset_m`` is the logarithm of a Gaussian
-    kernel without ``−‖z‖² / 2σ²``, which is common to all and cancels.
-    A parametric policy on normalised RBFs has A = 0. Of one map, M = 1, no kernel has a share: if there are any,
-    they only measure support. That of a polynomial policy takes products of entries of ``(z, 1)`` in place of these.
-    All of :mod:`~unconstrain.deployment` is generated from it.
+    where ``e_m = slope_mᵀ z + offset_m`` is the logarithm of a Gaussian kernel without ``−‖z‖² / 2σ²``, which is common
+    to all and cancels. A parametric policy on normalised RBFs has A = 0. Of one map, M = 1, no kernel has a share: if
+    there are any, they only measure support. That of a polynomial policy takes products of entries of ``(z, 1)`` in
+    place of these. All of :mod:`~unconstrain.deployment` is generated from it.
 
     Parameters
     ----------

@@ -112,9 +112,8 @@ class Everywhere:
 def cover(states: Array, variance: float, at_least: float = 0.7) -> ReceptiveFields:
     """Place fields on the samples so that each sample has a least membership in one of them.
 
-    Farthest-first traversal: the first centre is the sample nearest to the
-    mean, each further one the sample farthest from all centres, until every
-    sample has ``w_m(x) ≥ at_least`` for some m (section IV-B).
+    Farthest-first traversal: the first centre is the sample nearest to the mean, each further one the sample farthest
+    from all centres, until every sample has ``w_m(x) ≥ at_least`` for some m (section IV-B).
 
     Parameters
     ----------

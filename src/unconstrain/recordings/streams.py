@@ -50,9 +50,8 @@ class Block(NamedTuple):
 class Stream:
     """Files as batches, for :meth:`~unconstrain.ParametricPolicy.fit_batches`; can be walked through many times.
 
-    One file is in memory at a time; of Parquet and HDF5 files a block of
-    rows, where the recipe treats each row by itself (actions are columns,
-    nothing is resampled, trimmed or centred). What is small is kept.
+    One file is in memory at a time; of Parquet and HDF5 files a block of rows, where the recipe treats each row by
+    itself (actions are columns, nothing is resampled, trimmed or centred). What is small is kept.
 
     Parameters
     ----------
@@ -63,8 +62,7 @@ class Stream:
     reading : Reading, optional
         How to read them; ``group`` and ``time`` alone may be given by name instead.
     speed_power : float
-        Samples count by this power of their speed; see
-        :meth:`~unconstrain.ParametricPolicy.fit_demonstrations`.
+        Samples count by this power of their speed; see :meth:`~unconstrain.ParametricPolicy.fit_demonstrations`.
     leave_out : iterable of str
         Names of recordings to pass over.
     progress : callable, optional

@@ -64,8 +64,7 @@ def write_recordings(
 
     Examples
     --------
-    >>> recording = uc.Recording(("x", "y"), np.eye(2), times=np.array([0.0, 0.1]), name="wipe")
-    >>> uc.writers.write_recordings([recording], "wipe.csv")
+    >>> uc.writers.write_recordings([uc.Recording(("x", "y"), np.eye(2), name="wipe")], "wipe.csv")
     >>> uc.read("wipe.csv")[0].columns
     ('x', 'y')
     """

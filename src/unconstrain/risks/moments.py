@@ -1,17 +1,14 @@
 """Moments: the sufficient statistics of all objectives. No other code of the learners from moments sees N samples.
 
-All risks of the method are one quadratic with three metrics. For any
-orthogonal projection P with ``P u = u``,
+All risks of the method are one quadratic with three metrics. For any orthogonal projection P with ``P u = u``,
 
     Σ w ‖u − P π̃(x)‖² = Σ w uᵀu − 2 Σ w uᵀπ̃ + Σ w π̃ᵀ P π̃,
 
-so the standard risk (P = I, eq. 5) and the inconsistency (P = ûûᵀ, eq. 4)
-share the constant and the linear term, and with ``π̃(x) = W φ(x)`` five sums
-are sufficient statistics.
+so the standard risk (P = I, eq. 5) and the inconsistency (P = ûûᵀ, eq. 4) share the constant and the linear term, and
+with ``π̃(x) = W φ(x)`` five sums are sufficient statistics.
 
-A zero action has no direction: it counts in ``weight`` and ``gram`` (and, as
-zero, in ``energy`` and ``cross``), but not in ``consistent``. The caller sets
-the length up to which actions are zero (``at_rest``): the direction of a
+A zero action has no direction: it counts in ``weight`` and ``gram`` (and, as zero, in ``energy`` and ``cross``), but
+not in ``consistent``. The caller sets the length up to which actions are zero (``at_rest``): the direction of a
 rounding error would state that the policy is zero along it.
 """
 
@@ -149,8 +146,7 @@ def gather(features: Array, actions: Array, weights: Array | None = None, at_res
         array API standard; the moments then are too. Summed in float64.
     actions : ndarray, shape (N, d)
     weights : ndarray, shape (N, M), optional
-        Sample weight times membership in each model, not negative; ones for
-        a single model if None.
+        Sample weight times membership in each model, not negative; ones for a single model if None.
     at_rest : float
         Actions of at most this length have no direction.
 
@@ -284,10 +280,9 @@ def _products_of_one(
 ) -> list[Array]:
     """Products from which those of each metric follow (:func:`_by_metric`), for one model, each (p, p).
 
-    With ``F_k = diag(√w û_k) φ`` they are ``Σ w φφᵀ``, ``F_kᵀF_k`` for each
-    k, and ``(F_k + F_m)ᵀ(F_k + F_m)`` for each k < m: all of a matrix with its
-    own transpose, which BLAS does at half the price. One ``F_kᵀF_k``
-    follows from the others, since ``Σ û_k² = 1``.
+    With ``F_k = diag(√w û_k) φ`` they are ``Σ w φφᵀ``, ``F_kᵀF_k`` for each k, and ``(F_k + F_m)ᵀ(F_k + F_m)`` for each
+    k < m: all of a matrix with its own transpose, which BLAS does at half the price. One ``F_kᵀF_k`` follows from the
+    others, since ``Σ û_k² = 1``.
     """
     root = xp.sqrt(weights)
     pointed = directions * root

@@ -34,8 +34,7 @@ def null_space_projection(constraint_matrix: Array, tolerance: float = RANK_TOLE
     constraint_matrix : ndarray, shape (..., k, d)
         One constraint in each row; rows may be zero or linearly dependent.
     tolerance : float
-        Singular values of the rows, scaled to unit length, count as zero below
-        ``tolerance`` times the largest.
+        Singular values of the rows, scaled to unit length, count as zero below ``tolerance`` times the largest.
 
     Returns
     -------

@@ -2,36 +2,30 @@
 
 Everything here has a leading axis of M independent problems.
 
-The derivation of :func:`lexicographic_path`, for one problem. Let
-``H = V Λ Vᵀ`` with ascending eigenvalues, and let V₂ be the first k columns
-of V: the directions that count as undetermined. Eqs 7–13 ask for the
-minimum of the second objective over all w that agree with ``Λ⁻¹ Vᵀ g`` along
-the other columns.
+The derivation of :func:`lexicographic_path`, for one problem. Let ``H = V Λ Vᵀ`` with ascending eigenvalues, and let V₂
+be the first k columns of V: the directions that count as undetermined. Eqs 7–13 ask for the minimum of the second
+objective over all w that agree with ``Λ⁻¹ Vᵀ g`` along the other columns.
 
-With ``Vᵀ M V = L Lᵀ`` (Cholesky) the columns of ``A = V L⁻ᵀ`` are the
-eigenvectors, made orthonormal in the metric of the second objective one after
-the other, the smallest eigenvalue first. L is lower triangular, so
+With ``Vᵀ M V = L Lᵀ`` (Cholesky) the columns of ``A = V L⁻ᵀ`` are the eigenvectors, made orthonormal in the metric of
+the second objective one after the other, the smallest eigenvalue first. L is lower triangular, so
 
 - the first k columns of A span what those of V span, for *every* k, and
 - of ``w = A s`` the entries of s from k on depend on the columns of V from k
   on alone: they are those of ``γ = Lᵀ Λ⁻¹ Vᵀ g`` (eq. 7), whatever k is.
 
-In these coordinates the second objective is ``‖s‖² − 2 sᵀβ`` with
-``β = Aᵀ m = L⁻¹ Vᵀ m``. It falls apart into its entries; the free ones, below
-k, are those of β (eq. 12). So the solution at split k is
+In these coordinates the second objective is ``‖s‖² − 2 sᵀβ`` with ``β = Aᵀ m = L⁻¹ Vᵀ m``. It falls apart into its
+entries; the free ones, below k, are those of β (eq. 12). So the solution at split k is
 
     s = (β[:k], γ[k:])                                                (13)
 
 and the solutions at all splits are sums from the left of ``A diag(β)`` and
 from the right of ``A diag(γ)``: one factorisation, and P numbers for each.
 
-An eigenvalue below rounding says that a direction is undetermined only where
-the features are independent. Where they nearly depend on each other, both
-matrices are as small along it, and the second objective knows no better.
-There the smallest split is made in features made orthonormal by the second
-objective: with ``M = E Λ Eᵀ``, ``W = E Λ^-½`` over the eigenvalues above
-rounding, and ``Wᵀ H W = Y diag(μ) Yᵀ``, the columns of ``W Y`` are
-orthonormal in M, a share μ of each is determined, and
+An eigenvalue below rounding says that a direction is undetermined only where the features are independent. Where they
+nearly depend on each other, both matrices are as small along it, and the second objective knows no better. There the
+smallest split is made in features made orthonormal by the second objective: with ``M = E Λ Eᵀ``, ``W = E Λ^-½`` over
+the eigenvalues above rounding, and ``Wᵀ H W = Y diag(μ) Yᵀ``, the columns of ``W Y`` are orthonormal in M, a share μ of
+each is determined, and
 
     w = W Y s,   s_i = (Yᵀ Wᵀ g)_i / μ_i  where μ_i > 0,  (Yᵀ Wᵀ m)_i  elsewhere.
 """
@@ -151,8 +145,7 @@ class Path:
     eigenvalues : ndarray, shape (M, P)
         Of the first objective's Hessian, ascending.
     lowest : ndarray of int, shape (M,)
-        Splits below this one would divide by rounding errors; there the path
-        repeats the solution at this one.
+        Splits below this one would divide by rounding errors; there the path repeats the solution at this one.
     basis : ndarray, shape (M, P, P)
         The A of the derivation above.
     undetermined, determined : ndarray, shape (M, P)
@@ -172,8 +165,7 @@ class Path:
     def weights(self) -> Array:
         """Weights at every split, shape (M, P, P + 1).
 
-        ``weights[m, :, k]`` solves problem m when its k smallest eigenvalues
-        count as undetermined.
+        ``weights[m, :, k]`` solves problem m when its k smallest eigenvalues count as undetermined.
         """
         xp = namespace(self.basis)
         left = _running(self.basis * self.undetermined[:, None, :])
@@ -318,10 +310,9 @@ def eigensystem(hessian: Array) -> tuple[Array, Array]:
 def _factor(objective: Quadratic, vectors: Array) -> Array:
     """Cholesky factor of ``Vᵀ M V`` with M the Hessian, shape (M, P, P).
 
-    Where M is singular, its zero eigenvalues are replaced by the largest one.
-    The linear term is orthogonal to their eigenvectors, so weights along them
-    stay zero: the solution of least norm. An M of underflow only, as of a
-    field far from all samples, counts as zero.
+    Where M is singular, its zero eigenvalues are replaced by the largest one. The linear term is orthogonal to their
+    eigenvectors, so weights along them stay zero: the solution of least norm. An M of underflow only, as of a field far
+    from all samples, counts as zero.
     """
     xp = namespace(objective.hessian)
     try:

@@ -1,10 +1,8 @@
 """Learning on many machines with dask: chunks to sums, and a tree of sums.
 
-Each chunk is looked at where it is; what is chosen from all first looks
-(features, fields, folds) is sent back; each chunk becomes moments, which
-add. No sample travels, and a chunk whose worker dies is summed again by
-another. The result is that of :meth:`~unconstrain.ParametricPolicy.fit`, to
-rounding. Needs the extra ``cluster``.
+Each chunk is looked at where it is; what is chosen from all first looks (features, fields, folds) is sent back; each
+chunk becomes moments, which add. No sample travels, and a chunk whose worker dies is summed again by another. The
+result is that of :meth:`~unconstrain.ParametricPolicy.fit`, to rounding. Needs the extra ``cluster``.
 
 Examples
 --------
@@ -95,9 +93,8 @@ def fit_batches(policy: P, parts: Sequence[Any], *, client: Any | None = None) -
     ----------
     policy : Policy
     parts : sequence
-        Each an iterable of batches as :meth:`~unconstrain.ParametricPolicy.fit_batches`
-        takes them, or a dask ``Delayed`` of one. ``stream.parts()`` of a
-        :class:`~unconstrain.Stream` is one for each file; the workers need
+        Each an iterable of batches as :meth:`~unconstrain.ParametricPolicy.fit_batches` takes them, or a dask
+        ``Delayed`` of one. ``stream.parts()`` of a :class:`~unconstrain.Stream` is one for each file; the workers need
         to see the files under the same names.
     client : distributed.Client, optional
         See :func:`fit`.

@@ -26,8 +26,7 @@ class Folds(Parameters):
     Parameters
     ----------
     count : int
-        Number of folds. As many as demonstrations, or more, leaves one
-        demonstration out at a time.
+        Number of folds. As many as demonstrations, or more, leaves one demonstration out at a time.
     by : {"auto", "demonstration", "sample"}
         What stays together. "auto" holds out demonstrations where ``groups``
         names at least two (in a stream: where it is given), and samples otherwise.
@@ -117,12 +116,10 @@ Validation = Folds | HeldOut
 class Split:
     """Which fold each sample is in, decided as samples arrive, so that one pass over any stream is enough.
 
-    Demonstrations seen at first look are dealt in turn, in an order drawn by
-    hashes of their mean states: their fold depends neither on the order of arrival nor on
-    their names. What comes later in a stream is dealt as it arrives. A
-    sample's fold is a hash of its state, to a thousandth of the spread at
-    first look: it depends neither on order nor on units, equal samples stay
-    together, and so a weight of two is the same as a repetition.
+    Demonstrations seen at first look are dealt in turn, in an order drawn by hashes of their mean states: their fold
+    depends neither on the order of arrival nor on their names. What comes later in a stream is dealt as it arrives. A
+    sample's fold is a hash of its state, to a thousandth of the spread at first look: it depends neither on order nor
+    on units, equal samples stay together, and so a weight of two is the same as a repetition.
 
     Parameters
     ----------
