@@ -178,6 +178,23 @@ def test_what_a_file_is_called_does_not_change_what_cures_it(tmp_path, name):
     assert "--leave-out" not in said
 
 
+@pytest.mark.parametrize(
+    ("asked", "near"),
+    [
+        ("X,Y", "'x [m]' or 'y [m]'"),
+        ("pos_x,y", "'x [m]'"),
+        ("x (m),y", "'x [m]'"),
+        ("hand.x,hand.y", "'x [m]' or 'y [m]'"),
+        ("x_pos,y", ""),
+        ("joint_1,y", ""),
+    ],
+)
+def test_a_column_is_asked_after_whatever_its_case_its_unit_or_what_stands_before_it(tmp_path, asked, near):
+    file = write(tmp_path / "w.csv", "t [s],x [m],y [m]", stroke(0))
+    said = refused("fit", file, "--state", asked, "--differentiate", "-o", tmp_path / "p.npz")
+    assert said.endswith(f"Did you mean {near}?" if near else "it has x [m], y [m].")
+
+
 def test_states_without_actions_are_not_cured_by_leaving_a_file_out(tmp_path):
     for k in range(2):
         write(tmp_path / f"s{k}.csv", "t,a,b", stroke(k))

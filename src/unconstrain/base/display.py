@@ -98,8 +98,9 @@ def listed(names: Sequence[str], most: int = 30) -> str:
 
 def meant(asked: Sequence[str], known: Iterable[str]) -> str:
     """A question after what somebody may have meant by names that are none of the known; empty where none is near."""
-    plain = {name.casefold(): name for name in reversed(list(known))}
-    close = (get_close_matches(name.casefold(), plain, n=2, cutoff=0.7) for name in asked)
+    plain = {form.casefold(): name for name in reversed(list(known)) for form in (bare(name), name)}
+    forms = (form.casefold() for name in asked for form in (name, re.split(r"[._/ ]", bare(name))[-1]))
+    close = [get_close_matches(form, plain, n=2, cutoff=0.7) for form in forms]
     for mark, apart in (("..", r"\s*[-–:]\s*"), (",", r"[\s;]+")):
         if several := [parts for name in asked if {*(parts := re.split(apart, name))} <= {*known} and parts[1:]]:
             return f" Write {mark.join(several[0])}."

@@ -120,8 +120,7 @@ class Exportable:
         Raises
         ------
         SettingError
-            Also if actions are not velocities of the states, or states are orientations, centred, or not the three of
-            a pose.
+            Also if actions are no velocities of the states, or states are centred, orientations, or not three of a pose.
 
         Examples
         --------
