@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+from doctest import ELLIPSIS, NORMALIZE_WHITESPACE, OutputChecker
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -125,14 +126,21 @@ def table_of(name, states, actions):
 
 
 def run_console(text):
-    """Each command of a console block, as the shell parts its words, where it has not yet been run."""
+    """Each command of a console block, as the shell parts its words, and what it prints, where that is shown."""
     for written in re.findall(r"(?:-o|--report) (\S+)", text):
-        Path(written).unlink(missing_ok=True)
-    for command in (line[2:] for line in text.splitlines() if line.startswith("$ ")):
+        for place in {Path(written), Path(written).with_suffix(".h")}:
+            place.unlink(missing_ok=True)
+    for command, shown in re.findall(r"^\$ (.*\n)((?:(?!\$ ).*\n)*)", text, re.MULTILINE):
         words = ["bash", "-ec", f"unconstrain() {{ printf '%s\\0' \"$@\"; }}; {command}"]
         parted = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split("\0")
         done = CliRunner().invoke(cli.main, parted[:-1], prog_name="unconstrain")
         assert (done.exit_code, parted[-1]) == (0, ""), f"{command}: {done.output}"
+        assert not shown.strip() or as_shown(shown, done.stdout), f"{command}prints {done.stdout}"
+
+
+def as_shown(shown, printed):
+    """Whether it was printed so; lines may break elsewhere, and ``...`` stands for anything."""
+    return OutputChecker().check_output(shown, printed, ELLIPSIS | NORMALIZE_WHITESPACE)
 
 
 @pytest.mark.slow
@@ -146,6 +154,19 @@ def test_the_blocks_of_a_page_run(page, names):
             run_console(text)
         else:
             exec(compile(text, f"{page.name}, block {number}", "exec"), names)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_what_commands_print_is_shown_without_measured_figures(page):
+    """They change with every release; words and figures that are counted stay, and are compared."""
+    shown = [line for kind, text in blocks(page) if kind == "console" for line in text.splitlines() if line[:2] != "$ "]
+    assert [line for line in shown if re.search(r"\d%|\d\.\d+ (?!\()", line)] == []
+
+
+def test_other_output_than_shown_is_found(names):
+    run_console("$ unconstrain play -o play.html\n✔ A page to draw on, ...\n  Next: Open it in a browser.\n\n...\n")
+    with pytest.raises(AssertionError, match="prints"):
+        run_console("$ unconstrain play -o play.html\n✔ A page to look at, ...\n")
 
 
 def test_all_that_is_left_out_is_there():

@@ -120,7 +120,7 @@ class Exportable:
         Raises
         ------
         SettingError
-            Also if actions are no velocities of the states, or states are centred, orientations, or not three of a pose.
+            Also if actions are no velocities of the states, or these are centred, orientations, or not three of a pose.
 
         Examples
         --------
