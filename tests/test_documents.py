@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+import tomllib
 from doctest import ELLIPSIS, NORMALIZE_WHITESPACE, OutputChecker
 from pathlib import Path
 from types import SimpleNamespace
@@ -167,6 +168,14 @@ def test_other_output_than_shown_is_found(names):
     run_console("$ unconstrain play -o play.html\n✔ A page to draw on, ...\n  Next: Open it in a browser.\n\n...\n")
     with pytest.raises(AssertionError, match="prints"):
         run_console("$ unconstrain play -o play.html\n✔ A page to look at, ...\n")
+
+
+def test_links_of_the_readme_work_in_a_package_index_once_there_is_an_address():
+    urls = "urls" in tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    readme = PAGES[0].read_text("utf-8")
+    relative = [link for link in re.findall(r"\]\(([^) ]+)", readme) if "://" not in link]
+    assert all((ROOT / link).exists() for link in relative)
+    assert bool(relative) == ("The package has no public address yet" in readme) == (not urls)
 
 
 def test_all_that_is_left_out_is_there():
