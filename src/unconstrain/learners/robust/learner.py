@@ -352,7 +352,7 @@ class Robust(_Maximising):
         if usual is not None and self.jacobian is not None:
             names = names[: names.index(usual) + 1]
         chosen, first = usual or names[0], list(Training.opening(seen))
-        best, views, worse = dict[str, Candidate](), dict[str, Samples](), 0
+        best, coarser, views = dict[str, Candidate](), dict[str, Candidate](), dict[str, Samples]()
         for name in names:
             training, _ = _trusted(begun[name].keeping(Training.MOST_KEPT).with_batches(first))
             views[name] = held_out_together(training.samples.counted)
@@ -362,13 +362,13 @@ class Robust(_Maximising):
             soft = np.inf if one.softness >= 1.0 else 0.0
             best[name] = replace(one, name=name, softness=soft, by_segments=False)
             if name == usual:
-                best = {one: best[one] for one in (*_simplest(_compared(best, views), list(best)), name)}
-            chosen = _compared(best, views).best.name
-            if usual is not None and usual in views:  # by pairs, as what a third is sure of decides between no two
-                worse = 0 if chosen == name or name == usual else worse + 1
-                best = {chosen: best[chosen]}
-                if worse == 2:
-                    break
+                coarser = {one: best[one] for one in _simplest(_compared(best, views), list(best))}
+                best = {name: best[name]}
+            found = chosen = _compared(best, views).best.name
+            if coarser:  # by itself: what a third is sure of decides between no two
+                chosen = _compared({**coarser, found: best[found]}, views).best.name
+            if usual in best and found not in list(best)[-2:]:
+                break
         return chosen
 
 
