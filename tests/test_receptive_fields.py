@@ -198,7 +198,7 @@ def test_one_model_for_all_states_is_that_of_affine_features_and_knows_where_dat
 
 
 def hand_on_lines(seed):
-    """Angles of four joints under one affine policy, four times freely, and twice with the hand on each of eight lines."""
+    """Angles of four joints under one affine policy, four times free and twice with the hand on each of eight lines."""
     rng, lengths, goal = np.random.default_rng(seed), [0.4, 0.35, 0.25, 0.2], np.array([0.3, 0.6, -0.4, 0.5])
 
     def across(states, normal):
