@@ -700,3 +700,19 @@ def test_without_the_recording_the_rest_is_shown(monkeypatch):
     assert "recorded" not in found.tables
     assert found.details == {}
     assert all(row["nppe"] < 1e-25 and row["noise_found"] is None for row in found.rows)
+
+
+@pytest.mark.parametrize(
+    ("ours", "direct", "mark", "said"),
+    [
+        (0.1, 0.4, "GOOD", "10.00% of the motion, 4.0 times less than ordinary regression."),
+        (0.3, 0.4, "DOUBTFUL", "1.3 times less than ordinary regression."),
+        (0.42, 0.4, "DOUBTFUL", "about as much as ordinary regression."),
+        (0.6, 0.4, "BAD", "1.5 times as much as ordinary regression."),
+    ],
+)
+def test_wiping_is_judged_against_ordinary_regression(ours, direct, mark, said):
+    rows = [{"seen": False, "method": one, "ncpe": value} for one, value in (("robust", ours), ("direct", direct))]
+    found = washing.verdict(trials.Result("washing", washing.Settings(real=True), rows))
+    assert found.mark.name == mark
+    assert found.said.endswith(said)

@@ -195,3 +195,34 @@ def test_one_model_for_all_states_is_that_of_affine_features_and_knows_where_dat
     assert_allclose([one.step(state) for state in states], one(states), atol=1e-12)
     assert one.closed_form().sizes == (2, 2, 1)
     assert one.closed_form().exponents.shape == (len(one.fields_.centres), 3)
+
+
+def hand_on_lines(seed):
+    """Angles of four joints under one affine policy, four times free and twice with the hand on each of eight lines."""
+    rng, lengths, goal = np.random.default_rng(seed), [0.4, 0.35, 0.25, 0.2], np.array([0.3, 0.6, -0.4, 0.5])
+
+    def across(states, normal):
+        angles = np.cumsum(np.atleast_2d(states), axis=1)
+        links = lengths * (normal[1] * np.cos(angles) - normal[0] * np.sin(angles))
+        return np.cumsum(links[:, ::-1], axis=1)[:, None, ::-1]
+
+    recordings = []
+    for angle in np.repeat([np.nan, *np.linspace(0.2, 2.9, 8)], [4, *[2] * 8]):
+        normal = np.array([np.cos(angle), np.sin(angle)])
+        held = None if np.isnan(angle) else lambda states, times=None, normal=normal: across(states, normal)
+        run = uc.rollout(lambda states: goal - states, goal + rng.uniform(-1, 1, 4), 180, 1 / 60, held)
+        noisy = run.states + 0.002 * rng.standard_normal(run.states.shape)
+        recordings.append(uc.Recording(("q1", "q2", "q3", "q4"), noisy, np.arange(180) / 60, f"r{len(recordings)}"))
+    return uc.prepare(recordings, uc.Recipe(("q1", "q2", "q3", "q4"), differentiate="savgol")), goal
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [3, 4, 6])
+def test_what_holds_most_strokes_is_not_taken_for_the_policy_of_an_arm(seed):
+    """Local models explain all by a policy that holds the hand, and call it free; the affine one is as consistent."""
+    demos, goal = hand_on_lines(seed)
+    policy = uc.LocallyLinearPolicy().fit_demonstrations(demos)
+    states = uc.stack(demos).states
+    assert ((policy(states) - (goal - states)) ** 2).sum() < 0.02 * ((goal - states) ** 2).sum()
+    assert policy.solution_.free.mean() < 0.4
+    assert policy.variance_ == np.inf

@@ -362,6 +362,41 @@ def test_noise_makes_actions_longer_and_no_policy_that_is_too_long_the_best(nois
     assert found["direct"].loss < min(found["0.9"].loss, found["1.05"].loss)
 
 
+def bias_shown(missed, other_missed, softness=np.inf, other_softness=0.0, by_segments=False):
+    """What is shown of a candidate's bias by another at a distance from it, and what each misses, of unequal motion."""
+    samples = samples_of(draw(samples=900, noise=0.0, groups=12))
+    one = replace(softened(samples)[0], softness=softness)
+    at, moved = one.weights.copy(), samples.actions * (1.0 - np.sqrt(missed))
+    at[..., 0] += 0.7
+    held_out = samples.actions * (1.0 - np.sqrt(other_missed))
+    same = {"by_segments": by_segments, "softness": other_softness, "spread": 0.0}
+    candidates = [replace(one, held_out=moved, spread=0.0, refits=one.weights[None].repeat(3, axis=0))]
+    candidates.append(
+        replace(one, name="other", weights=at, refits=at[None].repeat(3, axis=0), held_out=held_out, **same)
+    )
+    found = Comparison(candidates, np.zeros(len(samples)), samples).judged()
+    return found["direct"].bias, found["other"].loss - found["direct"].loss
+
+
+def test_who_misses_more_shows_a_bias_that_is_farther_than_it_may_be_wrong_itself():
+    apart, _ = bias_shown(0.05, 0.05)
+    assert apart > 0.3
+    shown, more = bias_shown(0.05, 0.052)
+    assert 1e-3 < more < 3e-3
+    assert shown == pytest.approx(apart - 100.0 * more)
+    assert apart - 100.0 * more < bias_shown(0.05, 0.052, by_segments=True)[0] < apart + 1e-9  # beyond chance only
+    assert bias_shown(0.05, 0.04)[0] == pytest.approx(apart)
+    assert bias_shown(0.05, 0.08)[0] == 0.0  # far less consistent
+
+
+def test_who_is_softer_shows_no_more_bias_than_it_is_more_consistent():
+    assert bias_shown(0.05, 0.05, 0.0, np.inf)[0] == 0.0
+    shown, more = bias_shown(0.05, 0.04, 0.0, np.inf)
+    assert shown == pytest.approx(-10.0 * more)
+    assert bias_shown(0.05, 0.049, 0.0, np.inf)[0] == 0.0  # by less than a tenth
+    assert bias_shown(0.05, 0.04, 0.3, 0.3)[0] == pytest.approx(bias_shown(0.05, 0.04)[0])  # who is as soft, all of it
+
+
 def test_changes_of_the_constraint_are_found():
     rng = np.random.default_rng(3)
     wanted = np.column_stack([1 + 0.2 * rng.standard_normal(60), 0.5 + 0.2 * rng.standard_normal(60)])

@@ -352,7 +352,7 @@ class Robust(_Maximising):
         if usual is not None and self.jacobian is not None:
             names = names[: names.index(usual) + 1]
         chosen, first = usual or names[0], list(Training.opening(seen))
-        best, views = dict[str, Candidate](), dict[str, Samples]()
+        best, coarser, views = dict[str, Candidate](), dict[str, Candidate](), dict[str, Samples]()
         for name in names:
             training, _ = _trusted(begun[name].keeping(Training.MOST_KEPT).with_batches(first))
             views[name] = held_out_together(training.samples.counted)
@@ -361,15 +361,14 @@ class Robust(_Maximising):
             one = Robust().compared(views[name], training).best
             soft = np.inf if one.softness >= 1.0 else 0.0
             best[name] = replace(one, name=name, softness=soft, by_segments=False)
-            found = _compared(best, views)
             if name == usual:
-                best = {one: best[one] for one in (*_simplest(found, list(best)), name)}
-                found = _compared(best, views)
-            chosen = found.best.name
-            if usual is not None and usual in best:
-                finer = {one: best[one] for one in list(best)[list(best).index(usual) :]}
-                if (chosen if chosen in finer else _compared(finer, views).best.name) not in list(finer)[-2:]:
-                    break
+                coarser = {one: best[one] for one in _simplest(_compared(best, views), list(best))}
+                best = {name: best[name]}
+            found = chosen = _compared(best, views).best.name
+            if coarser:  # by itself: what a third is sure of decides between no two
+                chosen = _compared({**coarser, found: best[found]}, views).best.name
+            if usual in best and found not in list(best)[-2:]:
+                break
         return chosen
 
 
