@@ -165,16 +165,7 @@ def test_the_reference_has_every_public_name():
     assert {"ParametricPolicy.export_ros2", "motion.orbit.Orbit"} <= {*REFERENCE}
 
 
-WITHOUT = {
-    *("learners.Belief", "learners.Uncertainty", "metrics.nnpe", "evaluation.diagnose", "evaluation.Diagnosis"),
-    *(f"learners.secondary.{name}" for name in ("towards", "like", "damped", "smooth")),
-    *("ParametricPolicy.uncertainty", "ParametricPolicy.covariances"),
-    *("paper.systems.arm.Arm", "paper.systems.arm.JointLimitAvoidance"),
-}
-"""Names that have no example yet; each that gets one leaves."""
-
-
-@pytest.mark.parametrize("name", [name for name in REFERENCE if name not in WITHOUT])
+@pytest.mark.parametrize("name", REFERENCE)
 def test_each_name_of_the_reference_has_an_example_that_runs_as_printed(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # some write files
     example = doctest.DocTestParser().get_doctest(inspect.getdoc(named(name)), {"np": np, "uc": uc}, name, None, 0)
@@ -182,8 +173,3 @@ def test_each_name_of_the_reference_has_an_example_that_runs_as_printed(name, tm
     said = []
     doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS).run(example, out=said.append)
     assert not said, "".join(said)
-
-
-def test_all_that_are_said_to_have_no_example_have_none():
-    assert sorted(WITHOUT - {*REFERENCE}) == []
-    assert [name for name in WITHOUT if ">>>" in (inspect.getdoc(named(name)) or "")] == []

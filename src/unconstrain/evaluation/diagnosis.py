@@ -169,6 +169,14 @@ class Diagnosis:
         Length of the standard deviations at each recorded state, as a share of the typical action.
     free : ndarray, shape (N,), optional
         Probability that each sample was free; None where the policy was fitted to others.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).uniform(-1, 1, (60, 2))
+    >>> demos = [uc.Demonstration(states[k::3], -states[k::3]) for k in range(3)]
+    >>> policy = uc.ParametricPolicy(uc.Affine(), uc.Robust()).fit_demonstrations(demos)
+    >>> uc.evaluation.diagnose(policy, demos).undetermined.shape
+    (60,)
     """
 
     method: str
@@ -215,6 +223,14 @@ def diagnose(policy: Policy, demonstrations: Sequence[Demonstration]) -> Diagnos
         If the learner does not use the samples.
     InvalidDataError
         If there is one action column only, no motion, or too little data to hold anything out.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).uniform(-1, 1, (60, 2))
+    >>> demos = [uc.Demonstration(states[k::3], -states[k::3]) for k in range(3)]
+    >>> policy = uc.ParametricPolicy(uc.Affine(), uc.Robust()).fit_demonstrations(demos)
+    >>> len(uc.evaluation.diagnose(policy, demos).movements)
+    3
     """
     if policy.scale_ is None:
         return _diagnosed(policy, list(demonstrations))

@@ -251,6 +251,12 @@ def nnpe(component: PolicyLike, demonstrations: Demonstrations) -> float:
 
     How far it is from the action's part along it, such as of :func:`~unconstrain.constraints.null_space_component`. The
     variance is that of the actions. Needs no truth.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).uniform(-1, 1, (60, 2))
+    >>> round(uc.metrics.nnpe(lambda states: -states, uc.Demonstration(states, -states)), 6)
+    0.0
     """
     demos = _listed(demonstrations)
     actions, found = stack(demos).actions, _predicted(component, demos)

@@ -110,25 +110,61 @@ class Towards:
 
 
 def like(policy: Callable[[Array], Array], weight: float = 1.0) -> Secondary:
-    """Do as another policy does; see :class:`Like`."""
+    """Do as another policy does; see :class:`Like`.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).uniform(-1, 1, (60, 2))
+    >>> learner = uc.Hybrid(secondary=uc.learners.secondary.like(lambda states: 2.0 * states))
+    >>> policy = uc.ParametricPolicy(uc.Affine(), learner).fit(states, -states * [1.0, 0.0])  # y was always held
+    >>> policy.predict([[0.5, 0.5]]).round(2) + 0.0
+    array([[-0.5,  1. ]])
+    """
     check_at_least("weight", weight, 0.0, strict=True)
     return Like(policy, weight)
 
 
 def towards(goal: ArrayLike, gain: float, weight: float = 1.0) -> Secondary:
-    """Move to a goal (n,) with ``−gain (x − x*)``, gain in 1/s, where actions are velocities of the state."""
+    """Move to a goal (n,) with ``−gain (x − x*)``, gain in 1/s, where actions are velocities of the state.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).uniform(-1, 1, (60, 2))
+    >>> learner = uc.Hybrid(secondary=uc.learners.secondary.towards([0.0, 0.0], gain=3.0))
+    >>> policy = uc.ParametricPolicy(uc.Affine(), learner).fit(states, -states * [1.0, 0.0])  # y was always held
+    >>> policy.predict([[0.5, 0.5]]).round(2) + 0.0
+    array([[-0.5, -1.5]])
+    """
     check_at_least("gain", gain, 0.0)
     return like(Towards(as_vector(goal, "goal"), float(gain)), weight)
 
 
 def smooth(weight: float = 1.0) -> Secondary:
-    """Change as little as can be along the demonstrated movements; see :class:`Smooth`."""
+    """Change as little as can be along the demonstrated movements; see :class:`Smooth`.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).uniform(-1, 1, (60, 2))
+    >>> learner = uc.Hybrid(secondary=uc.learners.secondary.smooth())
+    >>> policy = uc.ParametricPolicy(uc.Affine(), learner).fit(states, -states * [1.0, 0.0])  # y was always held
+    >>> policy.predict([[0.5, 0.5]]).round(2) + 0.0
+    array([[-0.5,  0. ]])
+    """
     check_at_least("weight", weight, 0.0, strict=True)
     return Smooth(weight)
 
 
 def damped(gain: float) -> Objective:
-    """Rather not move: ``gain · Σ w ‖π̃(x)‖²``."""
+    """Rather not move: ``gain · Σ w ‖π̃(x)‖²``.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).uniform(-1, 1, (60, 2))
+    >>> learner = uc.Hybrid(secondary=uc.learners.secondary.damped(1.0))
+    >>> policy = uc.ParametricPolicy(uc.Affine(), learner).fit(states, -states * [1.0, 0.0])  # y was always held
+    >>> policy.predict([[0.5, 0.5]]).round(2) + 0.0
+    array([[-0.5,  0. ]])
+    """
     check_at_least("gain", gain, 0.0, strict=True)
     return Damped(gain)
 

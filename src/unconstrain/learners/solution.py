@@ -23,6 +23,13 @@ class Uncertainty(NamedTuple):
     that the data does not determine, and ``total`` to both. The policy should
     be within 1.96 of ``total`` 95 % of the time, except where ``undetermined``
     is most of it.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).uniform(-1, 1, (60, 2))
+    >>> policy = uc.ParametricPolicy(uc.Affine(), uc.Robust()).fit(states, -states, groups=np.repeat([0, 1, 2], 20))
+    >>> policy.uncertainty(states[:5]).undetermined.shape
+    (5, 2)
     """
 
     from_noise: Array
@@ -91,6 +98,13 @@ class Belief(Shown):
         Share of samples at which all actions along themselves determine the policy, those of one or two demonstrations.
     together : ndarray of bool, shape (N,)
         Which samples these are; empty where not known.
+
+    Examples
+    --------
+    >>> states = np.random.default_rng(0).uniform(-1, 1, (60, 2))
+    >>> policy = uc.ParametricPolicy(uc.Affine(), uc.Robust()).fit(states, -states, groups=np.repeat([0, 1, 2], 20))
+    >>> policy.solution_.belief.free.shape
+    (60,)
     """
 
     noise: float

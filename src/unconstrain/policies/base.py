@@ -302,6 +302,13 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         ------
         SettingError
             If the learner does not look at samples; :class:`~unconstrain.Robust` does.
+
+        Examples
+        --------
+        >>> states = np.random.default_rng(0).uniform(-1, 1, (60, 2))
+        >>> policy = uc.ParametricPolicy(uc.Affine(), uc.Robust()).fit(states, -states, groups=np.repeat([0, 1, 2], 20))
+        >>> policy.uncertainty(states[:5]).total.shape
+        (5, 2)
         """
         model, told = self._fitted_model(), self.solution_.believed
         own = told.uncertainty(model, on_host(self._within(X)))
@@ -311,6 +318,13 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         """Covariance of the predicted actions due to what the data does not say, shape (N, d, d).
 
         Its diagonal is the square of ``uncertainty(X).undetermined``. Raises as :meth:`uncertainty` does.
+
+        Examples
+        --------
+        >>> states = np.random.default_rng(0).uniform(-1, 1, (60, 2))
+        >>> policy = uc.ParametricPolicy(uc.Affine(), uc.Robust()).fit(states, -states, groups=np.repeat([0, 1, 2], 20))
+        >>> policy.covariances(states[:5]).shape
+        (5, 2, 2)
         """
         model, told = self._fitted_model(), self.solution_.believed
         own = told.covariances(model, on_host(self._within(X)))

@@ -39,6 +39,11 @@ class Arm:
         Of the joints.
     slides : ndarray of bool, shape (n,), optional
         Which joints slide instead of turning.
+
+    Examples
+    --------
+    >>> uc.systems.arm.Arm.from_dh(a=[1.0, 0.5], alpha=[0.0, 0.0], d=[0.0, 0.0], limits=[3.1, 3.1]).joints
+    2
     """
 
     origins: Array
@@ -188,6 +193,11 @@ class JointLimitAvoidance:
     Parameters
     ----------
     gain, power : float
+
+    Examples
+    --------
+    >>> uc.systems.arm.JointLimitAvoidance(gain=0.05, power=2.0)(np.array([[1.0, -2.0]]))
+    array([[-0.1,  0.2]])
     """
 
     gain: float = 0.05
