@@ -288,7 +288,7 @@ def test_recorded_velocities_are_run_from_the_same_starts_and_what_is_not_run_sa
         write(tmp_path / f"w{k}.csv", f"t,x,y,{'vx,vy'[: 3 * moves.shape[1] - 1]}", np.hstack([table, moves]))
     asked = "--state", "x,y", "--action", "vx,vy" if moves.shape[1] > 1 else "vx"
     said = text(call("fit", tmp_path, *asked, *LINEAR, "-o", tmp_path / "p.npz"))
-    assert ("un from the same starts: size" in said) == (not why)
+    assert ("Run from the same starts: size" in said) == ("And run from the same starts, " in said) == (not why)
     assert ("Its size and pace over time: not run from the same starts, as " in said) == bool(why)
     assert why in said
 

@@ -24,7 +24,10 @@ LOST = "explained less by guiding"
 """Note of the share of what a policy learnt from that it explains less as it is guided."""
 
 RAN = "from the same starts"
-"""Note of size and pace of the policy's own movements over those of the demonstrations."""
+"""Note of size and pace of the policy's own movements over those of the demonstrations, in figures."""
+
+MOVES, STRAYS = "run from the same starts", "it moves otherwise than was demonstrated"
+"""Note of what is wrong with these movements, or nothing, in words; and what is said where that was not noted."""
 
 MARK = "verdict"
 """Note of how ``fit`` judged it."""
@@ -85,7 +88,7 @@ def info(file: str, as_json: bool) -> None:
     A policy, guided or not, or a constraint.
     """
     held, notes = loaded(file, uc.Policy | uc.LearntConstraint | uc.Guided), uc.storage.load_notes(file)
-    inner = ("recipe", "units", "digests", MARK, HELD_BY, SHOWN, WHERE, WOUND)
+    inner = ("recipe", "units", "digests", MARK, MOVES, HELD_BY, SHOWN, WHERE, WOUND)
     rest = {name: value for name, value in notes.items() if name not in inner}
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held, notes), **rest}
     if as_json:
@@ -151,7 +154,8 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
     strays = found.mark is uc.evaluation.verdicts.Mark.GOOD and notes.get(MARK) == "doubtful"
     run, doubt = ("But run", f"Its movement over time. {found.doubt}") if strays else ("Run", found.doubt)
     doubt += "" if MARK in notes else " Its movement over time: not run from its starts yet; 'unconstrain score' does."
-    ran = f" {run} from the same starts: {notes[RAN]}." if isinstance(notes.get(RAN), str) else ""
+    moves = notes.get(MOVES) or (STRAYS if strays else "")
+    ran = f" {run} from the same starts, {moves}." if moves else ""
     mark = uc.evaluation.verdicts.Mark.DOUBTFUL if strays else found.mark
     return found._replace(mark=mark, said=found.said + ran, doubt=doubt)
 
@@ -168,10 +172,9 @@ def doubted(policy: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> str:
     """What ``fit`` doubted of a policy, as the rest of a sentence; empty where it did not, or nobody noted it."""
     if notes.get(MARK) not in ("doubtful", "bad"):
         return ""
-    found, ran = _explained(policy, notes), notes.get(RAN)
-    if found.mark is not uc.evaluation.verdicts.Mark.GOOD:
+    if (found := _explained(policy, notes)).mark is not uc.evaluation.verdicts.Mark.GOOD:
         return found.said[0].lower() + found.said[1:].rstrip(".")
-    return f"the policy's movement over time is in doubt{f': {ran}' if isinstance(ran, str) else ''}"
+    return f"run from the starts of demonstrations, {notes.get(MOVES) or STRAYS}"
 
 
 def _said(value: Any) -> str:

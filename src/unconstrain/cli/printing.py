@@ -167,6 +167,7 @@ class Judged(NamedTuple):
     verdict: uc.evaluation.verdicts.Verdict
     replayed: Mapping[str, float | None] | None
     ran: str
+    moves: str
     demonstrations: int
     samples: int
     training: float
@@ -193,7 +194,7 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     if scheduler is not None:
         count = len(stream.paths)
         found = uc.evaluation.verdicts.of_explained(alone, count, told, lost=lost)
-        return Judged(found, None, "", count, 0, float("nan"), held_out, lost)
+        return Judged(found, None, "", "", count, 0, float("nan"), held_out, lost)
     say_left(demos, stream.recipe)
     usual = float((uc.stack(demos).actions ** 2).sum(axis=1).mean() ** 0.5)
     count, samples, missed = _walked(moving, stream, usual)
@@ -203,7 +204,7 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     ran = retraced(found, moving, demos, stream.recipe, None, stream.first.units, False)
     cured = ran.verdict._replace(next=there) if there and found.next == there else ran.verdict
     verdict = uc.evaluation.diagnosis.about_recordings(cured, demos, stream.recipe, moving)
-    return Judged(as_noted(verdict), ran.medians, ran.in_words, count, samples, 1.0 - missed, held_out, lost)
+    return Judged(as_noted(verdict), ran.medians, *ran[3:], count, samples, 1.0 - missed, held_out, lost)
 
 
 def as_noted(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.Verdict:
@@ -254,6 +255,7 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
     elif learner != "direct":
         _say_determined(solution, learner)
     seen = f"{judged.training:.4g} on the training data, " if known else ""
+    say_ran(judged.ran)
     rest = f"{judged.held_out:.4g} where held out." if isfinite(judged.held_out) else "nothing could be held out."
     click.echo(f"Share of the motion explained, where slow samples count less, as in the verdict: {seen}{rest}")
     for note in solution.notes:
@@ -268,6 +270,12 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
         print_table(["candidate", "estimated squared error", "what it is"], told)
     if known:
         say(uc.preparation.doubts(judged.demonstrations, 1.0 - judged.training - (judged.lost or 0.0)))
+
+
+def say_ran(figures: str, more: str = "") -> None:
+    """Print figures of runs from the starts of demonstrations, if there are any."""
+    if figures:
+        click.echo(f"Run from the same starts: {figures}.{more}")
 
 
 def _say_determined(solution: uc.Solution, learner: str) -> None:

@@ -338,43 +338,64 @@ def _part(where: NDArray[np.bool_], seconds: Array) -> str:
     return f"{percent(where.mean())} of the time, first at {seconds[int(where.argmax())]:.2f} s"
 
 
-def of_replays(
-    found: Verdict, extents: Array, paces: Array, apart: str, lasts: Sequence[float] = (), of: str = ""
-) -> Verdict:
-    """Add to a verdict how a policy moves from the starts of demonstrations, held as they were.
+LAST, DIVERGES = "last round over first", "it leaves the finite numbers"
+_WRONG = {"size": ("too large", "too small", ""), "pace": ("too fast", "too slow", "the other way")}
+_WRONG[LAST] = "too large in the last round", "too small in the last round", ""
+
+
+def of_replays(found: Verdict, extents: Array, paces: Array, lasts: Sequence[float] = (), more: str = "") -> Verdict:
+    """Add to a verdict, in words, how a policy moves from the starts of demonstrations, held as they were.
 
     ``extents`` and ``paces`` are size and turns of each run over those of its demonstration, NaN where there are none,
-    and ``lasts`` the size of the last round over that of the first, over the same; ``apart`` is how far the runs stray
-    from the nearest recorded states, with its unit; ``of`` is as of :func:`size_and_pace`.
+    and ``lasts`` the size of the last round over that of the first, over the same; ``more`` ends the sentence.
     Half of them may be off by :data:`OTHERWISE` either way, whatever the mean is, and none by :data:`FAR_OFF`.
     """
-    measured = _measured(*(given := (extents, paces, lasts)))
-    if not measured:
-        return found
-    ran = f"un from the same starts: {size_and_pace(*given, of)}, typically {apart} from the recorded path"
-    off = {name: np.abs(np.log(np.maximum(ratios, 1e-9))) for name, ratios in measured.items()}
-    strays = {
-        name: int((many > np.log(OTHERWISE)).sum())
-        for name, many in off.items()
-        if np.median(many) > np.log(OTHERWISE) or many.max() > np.log(FAR_OFF)
-    }
+    said, strays = moves(extents, paces, lasts)
     if not strays:
-        return found._replace(said=f"{found.said} R{ran}.")
-    counted = ", ".join(f"{name} of {count} of {len(extents)}" for name, count in strays.items())
-    which = f"; more than {OTHERWISE - 1:.0%} off: {counted}" if len(extents) > 1 else ""
-    return _strays(found, f"r{ran}{which}", " and ".join(strays))
+        return found._replace(said=f"{found.said} Run from the same starts, {said}{more}." if said else found.said)
+    return _strays(found, f"run from the same starts, {said}{more}", " and ".join(strays))
 
 
-def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = (), of: str = "") -> str:
-    """Those of :func:`of_replays` in words: the middle ones, and their ranges; ``of`` says which, if not all."""
-    told = ", ".join(f"{name} {_times(ratios)}" for name, ratios in _measured(extents, paces, lasts).items())
-    runs = f" (in brackets, least to most of {len(extents)} runs)" if "(" in told else ""
-    return f"{of}{told} the demonstrated{runs}" if told else ""
+def moves(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> tuple[str, list[str]]:
+    """How runs as in :func:`of_replays` move, the rest of a sentence, empty without any; and in what they stray."""
+    measured, many = _measured(extents, paces, lasts), len(extents)
+    goes = ("go round" if many > 1 else "goes round") if "pace" in measured else f"turn{'s' * (many == 1)} out"
+    said, strays = list[str](), list[str]()
+    for name, (ratios, off) in measured.items():
+        if np.median(off) > np.log(OTHERWISE) or off.max() > np.log(FAR_OFF):
+            wrong = ratios[off > np.log(OTHERWISE)]
+            ways = zip((wrong > 1, (wrong >= 0) & (wrong <= 1), wrong < 0), _WRONG[name], strict=True)
+            who = f"{len(wrong)} of {many} " if many > 1 else "it " * (not said)
+            said.append(who + f"{goes} " * (not said) + " or ".join(way for rows, way in ways if rows.any()))
+            strays.append(name.replace(LAST, "size"))
+    kept = " and ".join(name for name in measured if name != LAST)
+    return (" and ".join(said) if said else f"it keeps {kept}" * bool(kept)), [*dict.fromkeys(strays)]
 
 
-def _measured(*given: Sequence[float] | Array) -> dict[str, Array]:
-    named = zip(("size", "pace", "last round over first"), map(np.asarray, given), strict=True)
-    return {name: found for name, ratios in named if len(found := ratios[np.isfinite(ratios)])}
+def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = (), of: str = "", apart: str = "") -> str:
+    """Figures of :func:`of_replays`: the middle ones, and their ranges; ``of`` says which, if not all.
+
+    ``apart`` is how far the runs stray from the nearest recorded states, with its unit.
+    """
+    measured, many = _measured(extents, paces, lasts), len(extents)
+    if not measured:
+        return ""
+    told = ", ".join(f"{name} {_times(ratios)}" for name, (ratios, _) in measured.items())
+    runs = f" (in brackets, least to most of {many} runs)" if "(" in told else ""
+    off = [
+        f"{name} of {count} of {many}"
+        for name, (_, by) in measured.items()
+        if (count := (by > np.log(OTHERWISE)).sum())
+    ]
+    which = f"; more than {OTHERWISE - 1:.0%} off: {', '.join(off)}" if many > 1 and off else ""
+    return f"{of}{told} the demonstrated{runs}, typically {apart} from the recorded path{which}"
+
+
+def _measured(*given: Sequence[float] | Array) -> dict[str, tuple[Array, Array]]:
+    """Finite ratios by name, and how far off one they are, as logarithms."""
+    named = zip(("size", "pace", LAST), map(np.asarray, given), strict=True)
+    found = {name: ratios[np.isfinite(ratios)] for name, ratios in named}
+    return {name: (one, np.abs(np.log(np.maximum(one, 1e-9)))) for name, one in found.items() if len(one)}
 
 
 def _times(ratios: Array) -> str:
@@ -390,7 +411,7 @@ def _either_way(ratio: float, times: str = "") -> str:
 
 def of_divergence(found: Verdict) -> Verdict:
     """Add to a verdict that a policy leaves the finite numbers where demonstrations start."""
-    return _strays(found, "run from the same starts it leaves the finite numbers", "size and pace")
+    return _strays(found, f"run from the same starts, {DIVERGES}", "size and pace")
 
 
 def _strays(found: Verdict, how: str, what: str) -> Verdict:
