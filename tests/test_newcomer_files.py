@@ -436,7 +436,7 @@ def test_recordings_that_are_the_same_are_counted_and_left_out_as_said(tmp_path)
     said = "'copy' and 'w0', 'other' and 'w3' hold the same recording, which counts more than once"
     shown = text(call("inspect", *asked))
     assert shown.count(said) == 1
-    assert shown.startswith("! 2 of 6 demonstrations not as it should be: same-recording.")
+    assert shown.startswith("! 2 of 6 demonstrations not as it should be: same recording.")
     assert f"same-recording: 'copy': {said}" in shown
     assert "--leave-out copy,other -o" in shown
     assert text(call("fit", *asked, *fit)).count(said) == 1
@@ -520,7 +520,7 @@ def moving(tmp_path, way=lambda u: u, count=4, names="x,y,vx,vy", of=range(4)):
 def test_velocities_of_another_unit_or_column_are_told_with_the_command_that_takes_others(tmp_path, way, told, then):
     files = moving(tmp_path, way)
     said = text(call("inspect", *files))
-    assert "4 of 4 demonstrations not as it should be: not-velocities." in said
+    assert "4 of 4 demonstrations not as it should be: not velocities." in said
     assert told in said
     assert f" {then} -o policy.npz" in said
     shown = call("fit", *files, *LINEAR, "-o", tmp_path / "p.npz")

@@ -11,7 +11,7 @@ import unconstrain as uc
 from seen import opened
 from test_cli import call, refused, run, write
 from unconstrain.cli.informing import TOLD
-from unconstrain.evaluation.verdicts import Mark, Verdict, of_replays, size_and_pace
+from unconstrain.evaluation.verdicts import Mark, Verdict, moves, of_replays, size_and_pace
 from unconstrain.pages.fit import policy_page
 from unconstrain.pages.replays import replayed
 
@@ -145,7 +145,7 @@ def test_a_cycle_that_shrinks_is_told_by_its_last_round(folder):
 def test_the_last_round_is_judged_whatever_the_size_of_the_whole_is():
     for last, mark in ((0.6, Mark.DOUBTFUL), (0.9, Mark.GOOD), (np.nan, Mark.GOOD)):
         given = np.full(3, 0.9), np.full(3, 1.0), np.full(3, last)
-        assert of_replays(Verdict(Mark.GOOD, "Good."), *given).mark is mark
+        assert of_replays(Verdict(Mark.GOOD, "Good."), *moves(*given)).mark is mark
         told = size_and_pace(*given, apart="3 mm")
         assert (f"last round over first {last:.2f} times the demonstrated" in told) == np.isfinite(last)
 
@@ -267,7 +267,7 @@ def test_an_export_for_ros_says_how_messages_become_the_unit_of_the_policy(folde
 
 def added(sizes, paces=np.nan):
     given = np.array(sizes), np.broadcast_to(paces, len(sizes))
-    return of_replays(Verdict(Mark.GOOD, "Good."), *given), size_and_pace(*given, apart="3 mm")
+    return of_replays(Verdict(Mark.GOOD, "Good."), *moves(*given)), size_and_pace(*given, apart="3 mm")
 
 
 def test_strokes_that_are_too_large_are_not_outweighed_by_others_that_are_too_small():
@@ -289,7 +289,7 @@ def test_one_that_is_another_movement_is_said_whatever_the_others_do():
 
 
 def test_what_is_poor_anyway_is_not_excepted_by_but():
-    assert "Poor. And run from" in of_replays(Verdict(Mark.BAD, "Poor."), np.array([2.0]), np.array([1.0])).said
+    assert "Poor. And run from" in of_replays(Verdict(Mark.BAD, "Poor."), *moves(np.array([2.0]), np.array([1.0]))).said
 
 
 def test_of_one_that_was_run_no_share_is_said():
@@ -461,20 +461,18 @@ def test_a_fit_itself_says_how_its_policy_moves(folder, tmp_path):
     assert f"un from the same starts, {found['moves']}." in notes["verdict"]["said"]
     assert " times" not in notes["verdict"]["said"]
     doubted = {"from the same starts": "size 0.5 times", "verdict": "doubtful"}
-    for moves in ("it goes round too small", ""):  # or an older file
-        uc.save(uc.load(folder / "same.npz"), tmp_path / "q.npz", doubted | {"run from the same starts": moves})
+    for told_ in ("it goes round too small", ""):  # or an older file
+        uc.save(uc.load(folder / "same.npz"), tmp_path / "q.npz", doubted | {"run from the same starts": told_})
         again = json.loads(run("info", tmp_path / "q.npz", "--json"))["verdict"]
         assert again["mark"] == "doubtful"
-        told = f"good. But run from the same starts, {moves or 'it moves otherwise than was demonstrated'}."
+        told = f"good. But run from the same starts, {told_ or 'it moves otherwise than was demonstrated'}."
         assert told in again["said"]
         assert again["doubt"].startswith("Its movement over time.")
     start, moved = oval(3)[0, 1:], ("--steps", 5, "-o", tmp_path / "out.csv", "--force")
     start = "--start", ",".join(f"{one:.3f}" for one in start)
     assert run("rollout", tmp_path / "q.npz", *start, *moved).startswith("! Near demonstrations for all 0.08 s: suppor")
     said = " ".join(run("rollout", tmp_path / "q.npz", *start, *moved).split())
-    told = (
-        "But as 'fit' said, run from the starts of demonstrations, it moves otherwise than was demonstrated. Next: Look"
-    )
+    told = "But as 'fit' said, run from the same starts, it moves otherwise than was demonstrated. Next: Look"
     assert told in said
     for notes in ({}, doubted | {"verdict": "good"}):  # nobody has doubted it
         uc.save(uc.load(folder / "same.npz"), tmp_path / "r.npz", notes)
@@ -560,3 +558,38 @@ def test_what_goes_straight_past_its_middle_has_no_pace(tmp_path):
     found = json.loads(run("score", tmp_path / "p.npz", *reaches, "--plane", "0,0,1", "--json"))
     assert found["replayed"]["pace"] is None
     assert "pace" not in found["verdict"]["said"]
+
+
+def test_what_keeps_to_a_plane_that_others_cross_is_not_called_free_and_what_to_record_comes_first(folder):
+    files = sorted(folder.glob("held_*.csv"))
+    asked = ("diagnose", *files, "--state", "x,y,z", "--differentiate", "--model", "affine")
+    found, said = json.loads(run(*asked, "--json")), run(*asked)
+    assert {one["looks"] for one in found["movements"]} <= {"flat", "constrained", "untold"}
+    assert not re.search(r"look: \d+ free", words(said))
+    first = found["regions"][0]
+    assert f"Next: Demonstrate around (x [mm] = {first['state'][0]:.3g}, " in words(said)
+    assert words(said).count("tilt what holds it") == 1
+    assert "up to noise of" in said or found["verdict"]["mark"] == "bad"
+    table = said.partition("largest first:\n")[2].partition("told: ")[0].splitlines()
+    assert len(table) > 3
+    assert max(map(len, table)) <= 80
+    assert "(x y z)" in table[2]
+    assert "=" not in "".join(table)
+
+
+@pytest.mark.parametrize("copies", [True, False])
+def test_of_copies_of_one_recording_no_free_or_constrained_ones_are_counted(tmp_path, copies):
+    rng, files = np.random.default_rng(0), []
+    for k in range(4):
+        times, at, rows = 0.02 * np.arange(300), rng.uniform(-90, 90, 2), []
+        for _ in times:
+            rows.append(at := at + 0.02 * np.array([-0.3 * at[0] - 2 * at[1], 2 * at[0] - 0.3 * at[1]]))
+        table = np.column_stack([times, rows + 0.1 * rng.standard_normal((300, 2))])
+        files.append(write(tmp_path / f"{k}.csv", "t,x [mm],y [mm]", table))
+    files = [write(tmp_path / f"a{k}.csv", "t,x [mm],y [mm]", table) for k in range(4)] if copies else files
+    asked = ("diagnose", *files, "--state", "x,y", "--differentiate", "--model", "affine")
+    said, told = words(run(*asked)), json.loads(run(*asked, "--json"))["movements"]
+    assert ("How 4 demonstrations look: 4 not to be told (" in said) == copies
+    assert ("How 4 demonstrations look: 4 free." in said) == (not copies)
+    assert ({one["looks"] for one in told} == {"untold"}) == copies
+    assert ("Mean probability that a sample was free" in said) == (not copies)

@@ -26,8 +26,8 @@ LOST = "explained less by guiding"
 RAN = "from the same starts"
 """Note of size and pace of the policy's own movements over those of the demonstrations, in figures."""
 
-MOVES, STRAYS = "run from the same starts", "it moves otherwise than was demonstrated"
-"""Note of what is wrong with these movements, or nothing, in words; and what is said where that was not noted."""
+MOVES = "run from the same starts"
+"""Note of what is wrong with these movements in words, or that they keep size and pace."""
 
 MARK = "verdict"
 """Note of how ``fit`` judged it."""
@@ -151,13 +151,19 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
         mark = uc.evaluation.verdicts.Mark.BAD
         return uc.evaluation.verdicts.Verdict(mark, "Not fitted: it cannot predict.", next="unconstrain fit")
     found = _explained(held, notes)
-    strays = found.mark is uc.evaluation.verdicts.Mark.GOOD and notes.get(MARK) == "doubtful"
-    run, doubt = ("But run", f"Its movement over time. {found.doubt}") if strays else ("Run", found.doubt)
-    doubt += "" if MARK in notes else " Its movement over time: not run from its starts yet; 'unconstrain score' does."
-    moves = notes.get(MOVES) or (STRAYS if strays else "")
-    ran = f" {run} from the same starts, {moves}." if moves else ""
-    mark = uc.evaluation.verdicts.Mark.DOUBTFUL if strays else found.mark
-    return found._replace(mark=mark, said=found.said + ran, doubt=doubt)
+    if found.mark is uc.evaluation.verdicts.Mark.GOOD and notes.get(MARK) == "doubtful":
+        doubt = f"Its movement over time. {found.doubt}"
+        return uc.evaluation.verdicts.doubted(found, _doubt(notes))._replace(doubt=doubt)
+    unrun = "" if MARK in notes else " Its movement over time: not run from its starts yet; 'unconstrain score' does."
+    ran = f" Run from the same starts, {notes[MOVES]}." if notes.get(MOVES) else ""
+    return found._replace(said=found.said + ran, doubt=found.doubt + unrun)
+
+
+def _doubt(notes: Mapping[str, Any]) -> str:
+    """What ``fit`` doubted of a policy that explains enough: how it moves, or else what it noted of recordings."""
+    moves = notes.get(MOVES) or "it moves otherwise than was demonstrated"
+    kept = all(one.startswith("it keeps") for one in moves.split("; guided "))
+    return "its recordings are not all as they should be" if kept else f"run from the same starts, {moves}"
 
 
 def _explained(held: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:
@@ -174,7 +180,7 @@ def doubted(policy: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> str:
         return ""
     if (found := _explained(policy, notes)).mark is not uc.evaluation.verdicts.Mark.GOOD:
         return found.said[0].lower() + found.said[1:].rstrip(".")
-    return f"run from the starts of demonstrations, {notes.get(MOVES) or STRAYS}"
+    return _doubt(notes)
 
 
 def _said(value: Any) -> str:

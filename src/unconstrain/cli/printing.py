@@ -255,7 +255,8 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
     elif learner != "direct":
         _say_determined(solution, learner)
     seen = f"{judged.training:.4g} on the training data, " if known else ""
-    say_ran(judged.ran)
+    if judged.ran:
+        click.echo(f"Run from the same starts: {judged.ran}.")
     rest = f"{judged.held_out:.4g} where held out." if isfinite(judged.held_out) else "nothing could be held out."
     click.echo(f"Share of the motion explained, where slow samples count less, as in the verdict: {seen}{rest}")
     for note in solution.notes:
@@ -270,12 +271,6 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
         print_table(["candidate", "estimated squared error", "what it is"], told)
     if known:
         say(uc.preparation.doubts(judged.demonstrations, 1.0 - judged.training - (judged.lost or 0.0)))
-
-
-def say_ran(figures: str, more: str = "") -> None:
-    """Print figures of runs from the starts of demonstrations, if there are any."""
-    if figures:
-        click.echo(f"Run from the same starts: {figures}.{more}")
 
 
 def _say_determined(solution: uc.Solution, learner: str) -> None:

@@ -16,7 +16,7 @@ from ..base.display import innermost, listed, percent
 from ..base.errors import InvalidDataError, SettingError
 from .constraining import held_of, options_for_held
 from .informing import TOLD, learnt_from
-from .printing import explained, number, option_for_json, print_table, refuse_warnings, say_ran, say_verdict
+from .printing import explained, number, option_for_json, print_table, refuse_warnings, say_verdict
 from .progress import shown
 from .reading import fitted_policy, options_for_reading, prepared
 
@@ -79,7 +79,8 @@ def score(
 
 def _print_scores(rows: Sequence[dict[str, Any]], whole: dict[str, Any], left: dict[str, list[str]], ran: str) -> None:
     """Scores of each demonstration and of all, why others have none, and figures of runs from their starts."""
-    say_ran(ran, "\n")
+    if ran:
+        click.echo(f"Run from the same starts: {ran}.\n")
     head = ["demonstration", "samples", "explains", "normalised inconsistency", "nPOE", "nCPE"][: len(whole) - 1]
     each = [_row(*one.values()) for one in (*rows, whole)]
     none = [[name, "", f"{why}: no score"] for why, names in left.items() for name in names]

@@ -21,17 +21,20 @@ from .marks import ENOUGH as ENOUGH
 from .marks import SMALL as SMALL
 from .metrics import along_motion
 from .sentences import CONSTRAINED as CONSTRAINED
+from .sentences import COUNTED as COUNTED
 from .sentences import FREE as FREE
 from .sentences import about_choice as about_choice
 from .sentences import about_suspects as about_suspects
 from .sentences import in_words as in_words
+from .sentences import looks
 from .sentences import models_of as models_of
 from .sentences import sentences as sentences
+from .sentences import to_record as to_record
 from .shown import FLAT as FLAT
 from .shown import about_recordings as about_recordings
+from .shown import crossed, names_of
 from .shown import flat as flat
 from .shown import named as named
-from .shown import names_of
 from .shown import planes_of as planes_of
 
 if TYPE_CHECKING:
@@ -115,13 +118,17 @@ class Region:
 
 @dataclass(frozen=True)
 class Movement:
-    """One demonstration: its name, samples, mean probability of a free sample (None if unknown), and as in Region."""
+    """One demonstration: its name, samples, mean probability of a free sample (None if unknown), and as in Region.
+
+    It ``looks`` free, constrained, unsure, flat if it keeps to a plane that others cross, or untold; None if unknown.
+    """
 
     name: str
     samples: int
     free: float | None
     determined: float
     spread: float
+    looks: str | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -384,18 +391,14 @@ def _least_determined(policy: Policy, states: Array) -> tuple[Array, Array]:
 def _movements(
     demos: list[Demonstration], undetermined: Array, known: NDArray[np.bool_], free: Array | None
 ) -> tuple[Movement, ...]:
-    groups = stack(demos).groups
-    parts = [groups == index for index in range(len(demos))]
-    return tuple(
-        Movement(
-            name,
-            int(part.sum()),
-            None if free is None else float(free[part].mean()),
-            float(known[part].mean()),
-            float(np.sqrt((undetermined[part] ** 2).mean())),
-        )
-        for name, part in zip(names_of(demos), parts, strict=True)
-    )
+    groups, apart, found = stack(demos).groups, len({one.states.tobytes() for one in demos}), list[Movement]()
+    for index, (name, flat_) in enumerate(zip(names_of(demos), crossed(demos), strict=True)):
+        part = groups == index
+        mean, told = None if free is None else float(free[part].mean()), float(known[part].mean())
+        spread = float(np.sqrt((undetermined[part] ** 2).mean()))
+        how = None if mean is None else looks(mean, told if apart >= ENOUGH else 0.0, flat_)
+        found.append(Movement(name, int(part.sum()), mean, told, spread, how))
+    return tuple(found)
 
 
 def _numbers(values: Array) -> tuple[float, ...]:

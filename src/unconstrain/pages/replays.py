@@ -62,10 +62,7 @@ class Replay(NamedTuple):
 
 
 class Replayed(NamedTuple):
-    """A verdict; of those whose constraint is known, medians, None if there are none; all that were run.
-
-    ``in_figures`` and ``in_words`` are sizes and paces in figures, and what the verdict says of them, if anything.
-    """
+    """A verdict; of those whose constraint is known medians, or None; all that were run; figures and words for them."""
 
     verdict: verdicts.Verdict
     medians: dict[str, float | None] | None
@@ -91,8 +88,8 @@ def replayed(
     try:
         runs = replays(policy, demos, recipe, held, free)
     except DivergedError:
-        judged = _advised(verdicts.of_divergence(found), found, policy, demos)
-        return Replayed(judged, None, in_words=verdicts.DIVERGES)
+        judged = _advised(verdicts.of_replays(found, *verdicts.DIVERGES), found, policy, demos)
+        return Replayed(judged, None, in_words=verdicts.DIVERGES[0])
     known = [one for one in runs if one.held]
     if not known:
         why = "not compared, as what held these recordings is not known" if runs else unlike(demos, recipe)
@@ -104,11 +101,12 @@ def replayed(
     finite = {name: values[np.isfinite(values)] for name, values in measured.items()}
     told = {name: float(np.median(values)) if len(values) else None for name, values in finite.items()}
     alike = "" if held is not None else " that look flat (on a line, in a plane), as what was held and short strokes do"
-    of = "" if len(known) == len(demos) else f"for {len(known)} of {len(demos)} demonstrations{alike}, "
-    more = "" if len(known) == len(demos) else f", as far as compared ({len(known)} of {len(demos)} demonstrations)"
-    judged = _advised(verdicts.of_replays(found, extents, paces, lasts, more), found, policy, demos)
-    figures = verdicts.size_and_pace(extents, paces, lasts, of, said)
-    return Replayed(judged, told, runs, figures, verdicts.moves(extents, paces, lasts)[0] + more)
+    (words, strays), of = verdicts.moves(extents, paces, lasts), ""
+    if len(known) < len(demos):
+        some = f"{len(known)} of {len(demos)} demonstrations"
+        words, of = f"{words}, as far as compared ({some})", f"for {some}{alike}, "
+    judged = _advised(verdicts.of_replays(found, words, strays), found, policy, demos)
+    return Replayed(judged, told, runs, verdicts.size_and_pace(extents, paces, lasts, of, said), words)
 
 
 def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Replayed:
