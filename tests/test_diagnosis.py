@@ -169,6 +169,18 @@ class TestWhatIsFound:
             hang = "Told by one or two demonstrations alone: 50% of the states, 1 of 1 regions;" in said
             assert (hang, "Not determined" in said) == (not open_, open_)
 
+    @pytest.mark.parametrize("along", [0.05, 0.55])
+    def test_what_is_told_only_as_noise_leaves_more_open_is_said_and_the_first_place_comes_next(self, fitted, along):
+        found = diagnose(*fitted)
+        wide = replace(found.regions[0], along=along, determined=1.0)
+        found = replace(found, states_determined=1.0, regions=(wide, *found.regions[1:]), planes=0)
+        told = verdicts.of_diagnosis(found, "Demonstrate there.")
+        assert ("; at the place that comes next, up to 55%, where noise leaves more open." in told.trust) == (
+            along > 0.1
+        )
+        then = "Demonstrate there. The list below has more places." if along > 0.1 else "Demonstrate where nobody was."
+        assert told.next == then
+
     def test_a_learner_without_candidates_has_nothing_compared(self):
         demos = movements()
         policy = uc.ParametricPolicy(learner=uc.NoiseCorrected()).fit_demonstrations(demos)

@@ -661,3 +661,14 @@ def test_nothing_is_saved_under_the_name_of_a_pickle(tmp_path, name):
     with pytest.raises(uc.UnconstrainError, match=r"nothing here writes pickles, .*; name it \.npz"):
         uc.save(policy, tmp_path / name)
     assert not (tmp_path / name).exists()
+
+
+def test_a_verdict_says_in_words_what_is_not_as_it_should_be(tmp_path):
+    rows = np.vstack([stroke(0), np.add(stroke(1), [2.0, 500.0, 0.0])])
+    write(tmp_path / "g.csv", "t,x,y", rows)
+    said = text(call("inspect", tmp_path / "g.csv", *READ))
+    assert "! 1 of 1 demonstration not as it should be: " in said
+    verdict = said.partition("should be: ")[2].partition(".")[0]
+    assert "jumps to another place" in verdict
+    assert "seam" not in verdict
+    assert "seam: " in said  # which options and programs go by

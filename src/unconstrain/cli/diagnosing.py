@@ -100,7 +100,5 @@ def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequenc
         return
     click.echo("\nMean probability that a sample was free, of the freest and the most constrained demonstrations:")
     ends = free if len(free) <= MOST_ROWS else [*free[: MOST_ROWS // 2], *free[-MOST_ROWS // 2 :]]
-    print_table(
-        ["demonstration", "samples", "free", "by three"],
-        [[one.name, str(one.samples), percent(one.free or 0.0), percent(one.determined)] for one in ends],
-    )
+    rows = [[one.name, str(one.samples), percent(one.free or 0.0), percent(one.determined)] for one in ends]
+    print_table(["demonstration", "samples", "free", "by three"], rows)

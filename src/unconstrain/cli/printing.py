@@ -255,11 +255,10 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
     elif learner != "direct":
         _say_determined(solution, learner)
     seen = f"{judged.training:.4g} on the training data, " if known else ""
-    if judged.ran:
-        click.echo(f"Run from the same starts: {judged.ran}.")
+    ran = [f"Run from the same starts: {judged.ran}."] * bool(judged.ran)
     rest = f"{judged.held_out:.4g} where held out." if isfinite(judged.held_out) else "nothing could be held out."
     click.echo(f"Share of the motion explained, where slow samples count less, as in the verdict: {seen}{rest}")
-    for note in solution.notes:
+    for note in (*ran, *solution.notes):
         click.echo(note)
     of, to = len(stream.recipe.directions), len(stream.recipe.actions or stream.recipe.directions)
     if of not in (to, 2 * to):

@@ -79,8 +79,7 @@ def score(
 
 def _print_scores(rows: Sequence[dict[str, Any]], whole: dict[str, Any], left: dict[str, list[str]], ran: str) -> None:
     """Scores of each demonstration and of all, why others have none, and figures of runs from their starts."""
-    if ran:
-        click.echo(f"Run from the same starts: {ran}.\n")
+    click.echo(f"Run from the same starts: {ran}.\n" if ran else "", nl=bool(ran))
     head = ["demonstration", "samples", "explains", "normalised inconsistency", "nPOE", "nCPE"][: len(whole) - 1]
     each = [_row(*one.values()) for one in (*rows, whole)]
     none = [[name, "", f"{why}: no score"] for why, names in left.items() for name in names]

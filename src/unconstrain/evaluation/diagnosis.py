@@ -253,6 +253,7 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
     known = untold_at(policy, states, typical) <= SMALL
     models, d, _ = solution.weights.shape
     free = solution.free if len(solution.free) == len(states) else None
+    known &= free is None or len({one.states.tobytes() for one in demos}) >= ENOUGH  # a copy tells nothing more
     together = belief.together if free is not None and len(belief.together) == len(states) else known
     return Diagnosis(
         method=solution.method,
@@ -391,12 +392,12 @@ def _least_determined(policy: Policy, states: Array) -> tuple[Array, Array]:
 def _movements(
     demos: list[Demonstration], undetermined: Array, known: NDArray[np.bool_], free: Array | None
 ) -> tuple[Movement, ...]:
-    groups, apart, found = stack(demos).groups, len({one.states.tobytes() for one in demos}), list[Movement]()
-    for index, (name, flat_) in enumerate(zip(names_of(demos), crossed(demos), strict=True)):
+    groups, found = stack(demos).groups, list[Movement]()
+    for index, (name, plane) in enumerate(zip(names_of(demos), crossed(demos), strict=True)):
         part = groups == index
         mean, told = None if free is None else float(free[part].mean()), float(known[part].mean())
+        how = None if mean is None else looks(mean, told, plane)
         spread = float(np.sqrt((undetermined[part] ** 2).mean()))
-        how = None if mean is None else looks(mean, told if apart >= ENOUGH else 0.0, flat_)
         found.append(Movement(name, int(part.sum()), mean, told, spread, how))
     return tuple(found)
 

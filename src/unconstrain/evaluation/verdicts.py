@@ -341,9 +341,8 @@ def _part(where: NDArray[np.bool_], seconds: Array) -> str:
     return f"{percent(where.mean())} of the time, first at {seconds[int(where.argmax())]:.2f} s"
 
 
-LAST = "last round over first"
-DIVERGES = "it leaves the finite numbers", ["size and pace"]
-""":func:`moves` of what has no size."""
+LAST, DIVERGES = "last round over first", ("it leaves the finite numbers", ["size and pace"])
+"""A ratio of sizes, and :func:`moves` of what has no size."""
 
 _WRONG = {"size": ("too large", "too small", ""), "pace": ("too fast", "too slow", "the other way")}
 _WRONG[LAST] = "too large in the last round", "too small in the last round", ""
@@ -383,14 +382,12 @@ def moves(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> tuple[st
 def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = (), of: str = "", apart: str = "") -> str:
     """Figures of :func:`moves`, ``of`` some, if not all, and how far ``apart`` from recorded states, with its unit."""
     measured, many = _measured(extents, paces, lasts), len(extents)
-    if not measured:
-        return ""
     told = ", ".join(f"{name} {_times(ratios)}" for name, (ratios, _) in measured.items())
     runs = f" (in brackets, least to most of {many} runs)" if "(" in told else ""
     counts = {name: int((by > np.log(OTHERWISE)).sum()) for name, (_, by) in measured.items()}
     off = ", ".join(f"{name} of {count} of {many}" for name, count in counts.items() if count)
     which = f"; more than {OTHERWISE - 1:.0%} off: {off}" if many > 1 and off else ""
-    return f"{of}{told} the demonstrated{runs}, typically {apart} from the recorded path{which}"
+    return f"{of}{told} the demonstrated{runs}, typically {apart} from the recorded path{which}" if told else ""
 
 
 def _measured(*given: Sequence[float] | Array) -> dict[str, tuple[Array, Array]]:

@@ -142,9 +142,8 @@ def _freedom(found: Diagnosis) -> html.Markup:
     told = [one for one in found.movements if one.looks in diagnosis.COUNTED]
     if not (shown := told[:MOST_MOVEMENTS]):
         return html.paragraph("Of no demonstration this can be told; the sentences above say why.")
-    names = [one.name for one in shown]
     free = [one.free or 0.0 for one in shown]
-    picture = figures.bars(names, {"hybrid": free}, title="", label="probability of being free")
+    picture = figures.bars([one.name for one in shown], {"hybrid": free}, title="", label="probability of being free")
     picture.axes[0].set_ylim(0.0, 1.0)
     caption = html.words(
         "diagnosis_freedom",
