@@ -79,11 +79,11 @@ def score(
 
 def _print_scores(rows: Sequence[dict[str, Any]], whole: dict[str, Any], left: dict[str, list[str]], ran: str) -> None:
     """Scores of each demonstration and of all, why others have none, and figures of runs from their starts."""
-    click.echo(f"Run from the same starts: {ran}.\n" if ran else "", nl=bool(ran))
     head = ["demonstration", "samples", "explains", "normalised inconsistency", "nPOE", "nCPE"][: len(whole) - 1]
     each = [_row(*one.values()) for one in (*rows, whole)]
     none = [[name, "", f"{why}: no score"] for why, names in left.items() for name in names]
     print_table(head, [*each[:-1], *none, each[-1]])
+    click.echo(f"Run from the same starts: {ran}." if ran else "", nl=bool(ran))
 
 
 def _row(name: str, size: int, fast: int, share: float, *rest: float | None) -> list[str]:
