@@ -159,7 +159,7 @@ class TestWhatIsFound:
         found = diagnose(*fitted)
         sure = replace(found, regions=tuple(replace(one, determined=1.0) for one in found.regions))
         said = " ".join(sentences(sure, ["x", "y"], ["vx", "vy"]))
-        assert "Every recorded state is determined. If you record more: " in said
+        assert "Every recorded state is determined, as far as noise lets it be told." in said
         assert "Not determined" not in said
         for together, open_ in ((1.0, False), (0.5, True)):  # what hangs on one or two is not called undetermined
             left = replace(found.regions[0], determined=0.5, together=together)
@@ -168,6 +168,18 @@ class TestWhatIsFound:
             assert ("Not determined: 50% of the states, 1 of 1 regions. " in said) == open_
             hang = "Told by one or two demonstrations alone: 50% of the states, 1 of 1 regions;" in said
             assert (hang, "Not determined" in said) == (not open_, open_)
+
+    @pytest.mark.parametrize("along", [0.05, 0.55])
+    def test_what_is_told_only_as_noise_leaves_more_open_is_said_and_the_first_place_comes_next(self, fitted, along):
+        found = diagnose(*fitted)
+        wide = replace(found.regions[0], along=along, determined=1.0)
+        found = replace(found, states_determined=1.0, regions=(wide, *found.regions[1:]), planes=0)
+        told = verdicts.of_diagnosis(found, "Demonstrate there.")
+        assert ("; at the place that comes next, up to 55%, where noise leaves more open." in told.trust) == (
+            along > 0.1
+        )
+        then = "Demonstrate there. The list below has more places." if along > 0.1 else "Demonstrate where nobody was."
+        assert told.next == then
 
     def test_a_learner_without_candidates_has_nothing_compared(self):
         demos = movements()
@@ -204,10 +216,10 @@ class TestCommand:
             "Noise and misfit: ",
             "Learnt as likelihood: ",
             "Estimated squared error of other ways to learn, as times that of this (more is worse): ",
-            "demonstrate around (x = ",
-            "left free: tilt what holds it, such as the plate, another way, or take another (",
+            "Trust: The policy at these states, up to noise of ",
+            "Next: Demonstrate where nobody was.",
         ):
-            assert words in said
+            assert words in " ".join(said.split())
         references = References()
         references.feed(page.read_text("utf-8"))
         assert references.found == []
@@ -252,6 +264,20 @@ class TestPage:
         page = diagnosis.diagnosis_page(diagnose(policy, named), named, "A diagnosis", ["x", evil], ["vx", "vy"])
         assert evil not in page
         assert len(opened(browser, page, tmp_path)) == 2
+
+    def test_the_chart_draws_those_of_which_it_can_be_told(self, fitted):
+        found = diagnose(*fitted)
+        assert {one.looks for one in found.movements} == {"free", "constrained"}
+        for kept in (len(found.movements), 5, 0):
+            looks = [one.looks if index < kept else "untold" for index, one in enumerate(found.movements)]
+            some = [replace(one, looks=how) for one, how in zip(found.movements, looks, strict=True)]
+            page = diagnosis.diagnosis_page(
+                replace(found, movements=tuple(some)), fitted[1], "A page", ["x", "y"], ["vx", "vy"]
+            )
+            left = len(found.movements) - kept
+            assert (f"Of {left} more it cannot be told" in page) == (0 < left < len(found.movements))
+            assert ("Of no demonstration this can be told" in page) == (kept == 0)
+            assert ('id="free"' in page) == (kept > 0)
 
     def test_a_page_fits_on_a_phone(self, fitted, browser, tmp_path):
         policy, demos = fitted

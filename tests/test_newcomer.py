@@ -97,7 +97,7 @@ def test_so_does_every_kind_of_file_and_with_that_column_they_are_the_strokes(on
     states = "x,y" if one_file.suffix == ".npz" else "X,Y"
     shown = run("inspect", one_file, "--state", states, "--differentiate")
     assert "column 'Strich': has 4 values, a stroke each by its jumps: give --group Strich." in shown
-    assert shown.startswith("! 1 of 1 demonstration not as it should be: several-in-one")
+    assert shown.startswith("! 1 of 1 demonstration not as it should be: several in one")
     found = json.loads(run("inspect", one_file, "--group", "Strich", "--json"))["demonstrations"]
     assert [one["samples"] for one in found] == [40] * 4
     assert not any(one["code"] == "several-in-one" for each in found for one in each["warnings"])
@@ -106,7 +106,7 @@ def test_so_does_every_kind_of_file_and_with_that_column_they_are_the_strokes(on
 def test_what_comes_next_is_typed_as_this_was(tmp_path):
     file = write(tmp_path / "alle.csv", f"Strich,{HEAD}", strokes(words, 6))
     few = text(call("inspect", file))
-    assert "not as it should be: several-in-one. Next:" in few
+    assert "not as it should be: several in one. Next:" in few
     assert "clock-gap" not in few  # it has the same cause
     assert re.search(r"by the column 'Strich': unconstrain inspect \S+alle\.csv --group Strich ", few)
     shown = text(call("inspect", file, "--group", "Strich", "--state", "X,Y", "--by", "savgol", "--sort"))
@@ -552,7 +552,7 @@ def test_a_policy_alone_is_no_look_and_says_what_to_add(policy, tmp_path):
 def test_look_and_play_begin_with_a_verdict(folder, tmp_path):
     assert run("look", folder / "w[0-5].csv", "-o", tmp_path / "a.html").startswith("✔ 6 demonstrations, nothing odd")
     few = run("look", folder / "w0.csv", "-o", tmp_path / "b.html")
-    assert few.startswith("! 1 of 1 demonstration not as it should be: few-demonstrations.")
+    assert few.startswith("! 1 of 1 demonstration not as it should be: few demonstrations.")
     assert "few-demonstrations" in (tmp_path / "b.html").read_text()
     assert run("play", "-o", tmp_path / "c.html").startswith("✔ A page to draw on")
 

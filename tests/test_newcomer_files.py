@@ -306,7 +306,7 @@ def test_recorded_velocities_are_run_from_the_same_starts_and_what_is_not_run_sa
         write(tmp_path / f"w{k}.csv", f"t,x,y,{'vx,vy'[: 3 * moves.shape[1] - 1]}", np.hstack([table, moves]))
     asked = "--state", "x,y", "--action", "vx,vy" if moves.shape[1] > 1 else "vx"
     said = text(call("fit", tmp_path, *asked, *LINEAR, "-o", tmp_path / "p.npz"))
-    assert ("un from the same starts: size" in said) == (not why)
+    assert ("Run from the same starts: size" in said) == ("And run from the same starts, " in said) == (not why)
     assert ("Its size and pace over time: not run from the same starts, as " in said) == bool(why)
     assert why in said
 
@@ -454,7 +454,7 @@ def test_recordings_that_are_the_same_are_counted_and_left_out_as_said(tmp_path)
     said = "'copy' and 'w0', 'other' and 'w3' hold the same recording, which counts more than once"
     shown = text(call("inspect", *asked))
     assert shown.count(said) == 1
-    assert shown.startswith("! 2 of 6 demonstrations not as it should be: same-recording.")
+    assert shown.startswith("! 2 of 6 demonstrations not as it should be: same recording.")
     assert f"same-recording: 'copy': {said}" in shown
     assert "--leave-out copy,other -o" in shown
     assert text(call("fit", *asked, *fit)).count(said) == 1
@@ -538,7 +538,7 @@ def moving(tmp_path, way=lambda u: u, count=4, names="x,y,vx,vy", of=range(4)):
 def test_velocities_of_another_unit_or_column_are_told_with_the_command_that_takes_others(tmp_path, way, told, then):
     files = moving(tmp_path, way)
     said = text(call("inspect", *files))
-    assert "4 of 4 demonstrations not as it should be: not-velocities." in said
+    assert "4 of 4 demonstrations not as it should be: not velocities." in said
     assert told in said
     assert f" {then} -o policy.npz" in said
     shown = call("fit", *files, *LINEAR, "-o", tmp_path / "p.npz")
@@ -679,3 +679,14 @@ def test_nothing_is_saved_under_the_name_of_a_pickle(tmp_path, name):
     with pytest.raises(uc.UnconstrainError, match=r"nothing here writes pickles, .*; name it \.npz"):
         uc.save(policy, tmp_path / name)
     assert not (tmp_path / name).exists()
+
+
+def test_a_verdict_says_in_words_what_is_not_as_it_should_be(tmp_path):
+    rows = np.vstack([stroke(0), np.add(stroke(1), [2.0, 500.0, 0.0])])
+    write(tmp_path / "g.csv", "t,x,y", rows)
+    said = text(call("inspect", tmp_path / "g.csv", *READ))
+    assert "! 1 of 1 demonstration not as it should be: " in said
+    verdict = said.partition("should be: ")[2].partition(".")[0]
+    assert "jumps to another place" in verdict
+    assert "seam" not in verdict
+    assert "seam: " in said  # which options and programs go by

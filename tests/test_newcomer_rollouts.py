@@ -11,7 +11,7 @@ import unconstrain as uc
 from seen import opened
 from test_cli import call, refused, run, write
 from unconstrain.cli.informing import TOLD
-from unconstrain.evaluation.verdicts import Mark, Verdict, of_replays
+from unconstrain.evaluation.verdicts import Mark, Verdict, moves, of_replays, size_and_pace
 from unconstrain.pages.fit import policy_page
 from unconstrain.pages.replays import replayed
 
@@ -69,24 +69,33 @@ def score(folder, name):
 def judged(folder, **how):
     recipe = uc.Recipe(states=("x", "y", "z"), differentiate="savgol")
     demos = uc.prepare(uc.read(str(folder / "held_*.csv")), recipe)
-    return replayed(Verdict(Mark.GOOD, "Explains 98% of it: good."), Ovals(**how), demos, recipe, None, MM)[:2]
+    return replayed(Verdict(Mark.GOOD, "Explains 98% of it: good."), Ovals(**how), demos, recipe, None, MM)
 
 
-NEARLY = [{}, {"size": 1.1}, {"pace": 0.9}]
-OTHERWISE = [{"size": 1.4}, {"size": 0.7}, {"pace": 1.4}, {"pace": 0.7}]
+NEARLY = [({}, "it keeps"), ({"size": 1.1}, "it keeps"), ({"pace": 0.9}, "it keeps")]
+OTHERWISE = [
+    ({"size": 1.4}, "3 of 3 go round too large"),
+    ({"size": 0.7}, "3 of 3 go round too small"),
+    ({"pace": 1.4}, "3 of 3 go round too fast"),
+    ({"pace": 0.7}, "3 of 3 go round too slow"),
+]
 
 
 @pytest.mark.parametrize(
-    ("how", "near", "mark", "words"),
-    [(how, {"abs": 0.05}, Mark.GOOD, " mm from the recorded path") for how in NEARLY]
-    + [(how, {"rel": 0.1}, Mark.DOUBTFUL, "more than 20% off: ") for how in OTHERWISE],
+    ("how", "near", "mark", "words", "off"),
+    [(how, {"abs": 0.05}, Mark.GOOD, f"Run from the same starts, {words}", False) for how, words in NEARLY]
+    + [(how, {"rel": 0.1}, Mark.DOUBTFUL, f"But run from the same starts, {words}.", True) for how, words in OTHERWISE],
 )
-def test_ovals_of_another_size_or_pace_are_no_good_however_much_they_explain(folder, how, near, mark, words):
-    verdict, found = judged(folder, **how)
-    assert found["extent"] == pytest.approx(how.get("size", 1.0), **near)
-    assert found["pace"] == pytest.approx(how.get("pace", 1.0), **near)
-    assert verdict.mark is mark
-    assert words in verdict.said
+def test_ovals_of_another_size_or_pace_are_no_good_however_much_they_explain(folder, how, near, mark, words, off):
+    ran = judged(folder, **how)
+    assert ran.medians["extent"] == pytest.approx(how.get("size", 1.0), **near)
+    assert ran.medians["pace"] == pytest.approx(how.get("pace", 1.0), **near)
+    assert ran.verdict.mark is mark
+    assert ran.verdict.said == f"Explains 98% of it: good. {words.rstrip('.')}{' size and pace' * (not off)}."
+    assert ran.in_words in ran.verdict.said
+    assert f"size {ran.medians['extent']:.2f} times" in ran.in_figures
+    assert " mm from the recorded path" in ran.in_figures
+    assert ("more than 20% off: " in ran.in_figures) == off
 
 
 @pytest.mark.parametrize("size", [1.0, 1.4])
@@ -111,10 +120,10 @@ def test_the_page_of_a_fit_shows_and_says_how_large_its_ovals_are(folder, browse
 
 
 def test_a_policy_that_leaves_the_finite_numbers_does_not_pass_in_silence(folder):
-    verdict, found = judged(folder, pace=-500.0)
-    assert found is None
-    assert verdict.mark is Mark.DOUBTFUL
-    assert "But run from the same starts it leaves the finite numbers." in verdict.said
+    ran = judged(folder, pace=-500.0)
+    assert (ran.medians, ran.in_figures) == (None, "")
+    assert ran.verdict.mark is Mark.DOUBTFUL
+    assert "But run from the same starts, it leaves the finite numbers." in ran.verdict.said
 
 
 def test_a_cycle_that_shrinks_is_told_by_its_last_round(folder):
@@ -128,15 +137,17 @@ def test_a_cycle_that_shrinks_is_told_by_its_last_round(folder):
     for policy, shrinks in ((Ovals(), False), (Shrinking(), True)):
         verdict, found = replayed(Verdict(Mark.GOOD, "Good."), policy, demos, recipe, None, MM)[:2]
         assert (found["last_round"] < 0.8) == shrinks
-        assert ("last round over first of" in verdict.said) == shrinks
+        assert ("too small in the last round." in verdict.said) == shrinks
+        assert ("Its size over time." in verdict.doubt) == shrinks
         assert (verdict.mark is Mark.DOUBTFUL) == shrinks
 
 
 def test_the_last_round_is_judged_whatever_the_size_of_the_whole_is():
     for last, mark in ((0.6, Mark.DOUBTFUL), (0.9, Mark.GOOD), (np.nan, Mark.GOOD)):
-        found = of_replays(Verdict(Mark.GOOD, "Good."), np.full(3, 0.9), np.full(3, 1.0), "3 mm", np.full(3, last))
-        assert found.mark is mark
-        assert (f"last round over first {last:.2f} times the demonstrated" in found.said) == np.isfinite(last)
+        given = np.full(3, 0.9), np.full(3, 1.0), np.full(3, last)
+        assert of_replays(Verdict(Mark.GOOD, "Good."), *moves(*given)).mark is mark
+        told = size_and_pace(*given, apart="3 mm")
+        assert (f"last round over first {last:.2f} times the demonstrated" in told) == np.isfinite(last)
 
 
 def test_a_look_at_a_policy_that_moves_otherwise_begins_with_that(folder, tmp_path):
@@ -144,7 +155,7 @@ def test_a_look_at_a_policy_that_moves_otherwise_begins_with_that(folder, tmp_pa
     assert run("look", *held, "-o", tmp_path / "a.html").startswith("✔ 3 demonstrations, nothing odd")
     said = run("look", *held, folder / "slow.npz", "-o", tmp_path / "b.html")
     assert said.startswith("! 3 demonstrations, nothing odd")
-    assert "But run from the same starts: size" in " ".join(said.split())
+    assert "But run from the same starts, 2 of 3 go round too small and 3 of 3 too slow." in " ".join(said.split())
 
 
 def test_a_wrong_plane_is_named_as_the_likely_cause_of_a_bad_score(folder):
@@ -229,13 +240,16 @@ def test_a_start_far_from_all_data_is_refused_for_a_policy_without_kernels_too(f
 def test_a_score_of_recordings_far_from_all_that_was_learnt_says_so(folder, tmp_path):
     far = write(tmp_path / "far.csv", HEAD, np.add(oval(3), [0.0, 9000.0, 0.0, 0.0]))
     for recording, said in ((folder / "held_3.csv", False), (far, True)):
-        assert ("are they of another task?" in call("score", folder / "same.npz", recording).err) == said
+        assert ("another task, or other units?" in call("score", folder / "same.npz", recording).err) == said
 
 
 def test_an_export_says_what_support_is_called(folder, tmp_path):
     said = " ".join(run("export", folder / "same.npz", "-o", tmp_path / "wipe.c").split())
     assert "wipe_support()" in said
-    assert re.search(r"[Rr]un from the same starts: size \S+ times", said)  # the last word before a robot moves
+    assert re.search(
+        r"[Rr]un from the same starts, (it keeps size|\d of \d go round too )", said
+    )  # the last word before a robot moves
+    assert " times" not in said
     assert "in metres" not in said
 
 
@@ -266,35 +280,39 @@ def test_an_export_says_whether_states_are_relative_to_a_mean(folder, tmp_path):
     assert "\n- centring: none\n" in (tmp_path / "plain" / "README.md").read_text("utf-8")
 
 
+def added(sizes, paces=np.nan):
+    given = np.array(sizes), np.broadcast_to(paces, len(sizes))
+    return of_replays(Verdict(Mark.GOOD, "Good."), *moves(*given)), size_and_pace(*given, apart="3 mm")
+
+
 def test_strokes_that_are_too_large_are_not_outweighed_by_others_that_are_too_small():
-    found = of_replays(Verdict(Mark.GOOD, "Good."), np.array([0.6, 0.7, 1.0, 1.5, 1.7]), np.full(5, np.nan), "3 mm")
+    found, figures = added([0.6, 0.7, 1.0, 1.5, 1.7])
     assert found.mark is Mark.DOUBTFUL
-    assert (
+    assert found.said == "Good. But run from the same starts, 4 of 5 turn out too large or too small."
+    assert figures == (
         "size 1.00 times (0.60 to 1.70) the demonstrated (in brackets, least to most of 5 runs), typically 3 mm "
-        "from the recorded path; more than 20% off: size of 4 of 5." in found.said
+        "from the recorded path; more than 20% off: size of 4 of 5"
     )
 
 
-def added(sizes, paces=np.nan):
-    return of_replays(Verdict(Mark.GOOD, "Good."), np.array(sizes), np.broadcast_to(paces, len(sizes)), "3 mm")
-
-
 def test_one_that_is_another_movement_is_said_whatever_the_others_do():
-    found = added([1.0, 1.0, 1.0, 1.0, 1.81])
+    found, figures = added([1.0, 1.0, 1.0, 1.0, 1.81])
     assert (found.mark, found.doubt) == (Mark.DOUBTFUL, "Its size over time.")
-    assert "more than 20% off: size of 1 of 5." in found.said
-    assert added([1.0, 1.0, 1.0, 1.0, 1.3]).mark is Mark.GOOD  # as people vary
+    assert "But run from the same starts, 1 of 5 turn out too large." in found.said
+    assert "more than 20% off: size of 1 of 5" in figures
+    assert added([1.0, 1.0, 1.0, 1.0, 1.3])[0].mark is Mark.GOOD  # as people vary
 
 
 def test_what_is_poor_anyway_is_not_excepted_by_but():
-    assert "Poor. And run from" in of_replays(Verdict(Mark.BAD, "Poor."), np.array([2.0]), np.array([1.0]), "3 mm").said
+    assert "Poor. And run from" in of_replays(Verdict(Mark.BAD, "Poor."), *moves(np.array([2.0]), np.array([1.0]))).said
 
 
 def test_of_one_that_was_run_no_share_is_said():
-    found = added([0.79], 0.5)
-    said = "Good. But run from the same starts: size 0.79 times, pace 0.50 times the demonstrated, typically 3 mm from "
-    assert found.said == f"{said}the recorded path."
+    found, figures = added([0.79], 0.5)
+    assert found.said == "Good. But run from the same starts, it goes round too small and too slow."
+    assert figures == "size 0.79 times, pace 0.50 times the demonstrated, typically 3 mm from the recorded path"
     assert found.doubt == "Its size and pace over time."
+    assert added([1.0], -1.0)[0].said == "Good. But run from the same starts, it goes round the other way."
 
 
 DOOR = "t [s],x [m],y [m],z [m]"
@@ -444,35 +462,50 @@ def test_a_fit_itself_says_how_its_policy_moves(folder, tmp_path):
     page = " ".join(unescape(re.sub(r"<[^>]*>", " ", (tmp_path / "p.html").read_text("utf-8"))).split())
     assert "on a plane of its own" in found["verdict"]["trust"]
     assert all(" ".join(found["verdict"][name].split()) in page for name in ("said", "trust", "doubt", "next"))
-    told = re.search(r"un from the same starts: size (\S+) times", found["verdict"]["said"])
+    ran = (
+        r"size (\S+) times \(\S+ to \S+\), pace .*times.* the demonstrated \(in brackets, least to most of \d+ runs\), "
+    )
+    told = re.fullmatch(rf"{ran}typically \S+ mm from the recorded path.*", found["ran"])
     assert float(told[1]) == pytest.approx(found["replayed"]["extent"], abs=0.006)
-    ran = r"size \S+ times \(\S+ to \S+\), pace .*times.* the demonstrated \(in brackets, least to most of \d+ runs\)"
-    assert re.fullmatch(ran, found["ran"])
-    assert f"{found['ran']}, typically" in found["verdict"]["said"]  # ranges go with the policy, to info and to exports
+    assert page.count(f"Run from the same starts: {found['ran']}.") == page.count(f"size {told[1]} times") == 1
+    assert f"un from the same starts, {found['moves']}." in found["verdict"]["said"]
+    assert not re.search(r" times|typically", " ".join(found["verdict"].values()))  # figures stand below
+    assert " ".join(run(*asked, "--force").split()).count(f"Run from the same starts: {found['ran']}.") == 1
     notes = json.loads(run("info", tmp_path / "p.npz", "--json"))
     assert notes["from the same starts"] == found["ran"]
-    assert f"un from the same starts: {found['ran']}." in notes["verdict"]["said"]
+    assert f"un from the same starts, {found['moves']}." in notes["verdict"]["said"]
+    assert " times" not in notes["verdict"]["said"]
     doubted = {"from the same starts": "size 0.5 times", "verdict": "doubtful"}
-    uc.save(uc.load(folder / "same.npz"), tmp_path / "q.npz", doubted)
-    again = json.loads(run("info", tmp_path / "q.npz", "--json"))["verdict"]
-    assert again["mark"] == "doubtful"
-    assert "good. But run from the same starts: size 0.5 times." in again["said"]
-    assert again["doubt"].startswith("Its movement over time.")
+    for told_ in ("it goes round too small", ""):  # or an older file
+        uc.save(uc.load(folder / "same.npz"), tmp_path / "q.npz", doubted | {"run from the same starts": told_})
+        again = json.loads(run("info", tmp_path / "q.npz", "--json"))["verdict"]
+        assert again["mark"] == "doubtful"
+        told = f"good. But run from the same starts, {told_ or 'it moves otherwise than was demonstrated'}."
+        assert told in again["said"]
+        assert again["doubt"].startswith("Its movement over time.")
     start, moved = oval(3)[0, 1:], ("--steps", 5, "-o", tmp_path / "out.csv", "--force")
     start = "--start", ",".join(f"{one:.3f}" for one in start)
     assert run("rollout", tmp_path / "q.npz", *start, *moved).startswith("! Near demonstrations for all 0.08 s: suppor")
     said = " ".join(run("rollout", tmp_path / "q.npz", *start, *moved).split())
-    assert "But as 'fit' said, the policy's movement over time is in doubt: size 0.5 times. Next: Look" in said
+    told = "But as 'fit' said, run from the same starts, it moves otherwise than was demonstrated. Next: Look"
+    assert told in said
+    for moves_, other in (("it keeps size", True), ("it keeps size; guided it goes round too small", False)):
+        uc.save(uc.load(folder / "same.npz"), tmp_path / "s.npz", doubted | {"run from the same starts": moves_})
+        said = " ".join(run("info", tmp_path / "s.npz").split())
+        assert ("But its recordings are not all as they should be." in said) == other
+        assert (f"But run from the same starts, {moves_}." in said) != other
     for notes in ({}, doubted | {"verdict": "good"}):  # nobody has doubted it
         uc.save(uc.load(folder / "same.npz"), tmp_path / "r.npz", notes)
         assert run("rollout", tmp_path / "r.npz", *start, *moved).startswith("✔ Near demonstrations for all")
     run("export", tmp_path / "p.npz", "-o", tmp_path / "p.c")
-    assert found["ran"] in " ".join((tmp_path / "p.h").read_text("utf-8").replace(" * ", " ").split())
+    header = " ".join((tmp_path / "p.h").read_text("utf-8").replace(" * ", " ").split())
+    assert f"run from the same starts: {found['moves']} " in header
+    assert " times" not in header
 
 
 @pytest.mark.parametrize("trim", [(), ("--still", 10)], ids=["as it is", "trimmed"])
-def test_a_fit_doubts_what_it_learns_where_a_recording_stood_still_before_its_start(folder, tmp_path, trim):
-    turn, rng = np.r_[np.zeros(200), 0.01 * np.arange(800)], np.random.default_rng(0)
+def test_a_fit_doubts_what_it_learns_where_a_recording_stood_still_after_its_end(folder, tmp_path, trim):
+    turn, rng = np.r_[np.zeros(200), 0.01 * np.arange(600), np.full(200, 5.99)], np.random.default_rng(0)
     path = np.column_stack([80 * np.cos(turn), 40 * np.sin(turn), 20 * np.sin(turn)])
     late = np.column_stack([0.01 * np.arange(1000), path + 0.02 * rng.standard_normal(path.shape)])
     files = [write(tmp_path / "late.csv", HEAD, late), *(folder / f"same_{k}.csv" for k in range(11, 14))]
@@ -483,10 +516,10 @@ def test_a_fit_doubts_what_it_learns_where_a_recording_stood_still_before_its_st
 
 @pytest.mark.parametrize("command", ["fit", "diagnose"])
 def test_what_still_leaves_is_told_of_all_together_and_of_each_where_asked_for(tmp_path, command):
-    turn = np.r_[np.zeros(100), 0.02 * np.arange(300)]
+    turn = np.r_[0.02 * np.arange(300), np.full(100, 5.98)]
     path = np.column_stack([0.01 * np.arange(400), 80 * np.cos(turn), 40 * np.sin(turn), 20 * np.sin(turn)])
-    files = [write(tmp_path / f"{name}.csv", HEAD, rows) for name, rows in (("late", path), ("a", path[100:]))]
-    files += [write(tmp_path / f"{name}.csv", HEAD, path[110:]) for name in "bc"]
+    files = [write(tmp_path / f"{name}.csv", HEAD, rows) for name, rows in (("late", path), ("a", path[:300]))]
+    files += [write(tmp_path / f"{name}.csv", HEAD, path[:290]) for name in "bc"]
     how = command, *files, "--state", "x,y,z", "--by", "central", "--model", "affine"
     how += ("-o", tmp_path / "p.npz", "--force") if command == "fit" else ()
     assert "--still left" not in call(*how).err
@@ -516,10 +549,14 @@ def test_where_some_demonstrations_alone_are_run_it_is_said_how_many_and_why(fol
     bent = write(tmp_path / "bent.csv", HEAD, np.array(wound) * [0.1, 1, 1, 1])
     asked = ("--by", "savgol", "--model", "affine", "--learner", "direct", "-o", tmp_path / "p.npz", "--force")
     told = "for 4 of 5 demonstrations that look flat (on a line, in a plane), as what was held and short strokes do, "
-    assert f"un from the same starts: {told}" in " ".join(run("fit", *held, bent, *asked).split())
-    assert f"un from the same starts: {told}" in " ".join(run("info", tmp_path / "p.npz").split())
-    assert told in " ".join(run("score", tmp_path / "p.npz", *held, bent).split())
-    assert "un from the same starts: size" in " ".join(run("fit", *held, *asked).split())
+    said = " ".join(run("fit", *held, bent, *asked).split())
+    assert f"Run from the same starts: {told}size" in said
+    assert re.search(r"un from the same starts, [^.]*, as far as compared \(4 of 5 demonstrations\)\.", said)
+    assert f" from the same starts {told}size" in " ".join(run("info", tmp_path / "p.npz").split())
+    assert f"Run from the same starts: {told}size" in " ".join(run("score", tmp_path / "p.npz", *held, bent).split())
+    said = " ".join(run("fit", *held, *asked).split())
+    assert "Run from the same starts: size" in said
+    assert "as far as compared" not in said
 
 
 @pytest.mark.parametrize(("seconds", "enough"), [(4.5, False), (6.5, True)])
@@ -541,3 +578,50 @@ def test_what_goes_straight_past_its_middle_has_no_pace(tmp_path):
     found = json.loads(run("score", tmp_path / "p.npz", *reaches, "--plane", "0,0,1", "--json"))
     assert found["replayed"]["pace"] is None
     assert "pace" not in found["verdict"]["said"]
+
+
+def test_what_keeps_to_a_plane_that_others_cross_is_not_called_free(tmp_path):
+    files = [write(tmp_path / f"{k}.csv", HEAD, oval(k)[::4]) for k in range(3, 9)]
+    asked = ("diagnose", *files, "--state", "x,y,z", "--differentiate", "--model", "affine")
+    found, said = json.loads(run(*asked, "--json", "-o", tmp_path / "a.html")), words(run(*asked))
+    assert {one["looks"] for one in found["movements"]} == {"flat"}
+    assert all(one["free"] > 0.5 for one in found["movements"])  # as estimated from what the plates leave
+    assert (
+        "How 6 demonstrations look: 6 on a plane that others cross (as what is held, or a short free stroke)." in said
+    )
+    assert "Mean probability that a sample was free" not in said
+    assert "Of no demonstration this can be told" in (tmp_path / "a.html").read_text("utf-8")
+
+
+def test_the_first_place_to_record_is_in_the_verdict_and_the_list_fits_a_terminal(folder):
+    asked = ("diagnose", *sorted(folder.glob("held_*.csv")), "--state", "x,y,z", "--differentiate")
+    found, said = json.loads(run(*asked, "--json")), run(*asked)
+    first = found["regions"][0]
+    assert f"Next: Demonstrate around (x [mm] = {first['state'][0]:.3g}, " in words(said)
+    assert found["verdict"]["next"].endswith("The list below has more places.")
+    assert words(said).count("tilt what holds it") == 1
+    table = said.partition("largest first:\n")[2].partition("told: ")[0].splitlines()
+    assert len(table) > 3
+    assert max(map(len, table)) <= 80
+    assert "(x y z)" in table[2]
+    assert "=" not in "".join(table)
+
+
+@pytest.mark.parametrize("copies", [True, False])
+def test_of_copies_of_one_recording_no_free_or_constrained_ones_are_counted(tmp_path, copies):
+    rng, files = np.random.default_rng(0), []
+    for k in range(4):
+        times, at, rows = 0.02 * np.arange(300), rng.uniform(-90, 90, 2), []
+        for _ in times:
+            rows.append(at := at + 0.02 * np.array([-0.3 * at[0] - 2 * at[1], 2 * at[0] - 0.3 * at[1]]))
+        table = np.column_stack([times, rows + 0.1 * rng.standard_normal((300, 2))])
+        files.append(write(tmp_path / f"{k}.csv", "t,x [mm],y [mm]", table))
+    if copies:  # with as many that an affine policy seems told by them, though all are one
+        files = [write(tmp_path / f"a{k}.csv", "t,x [mm],y [mm]", table) for k in range(5)]
+    asked = ("diagnose", *files, "--state", "x,y", "--differentiate", "--model", "affine")
+    said, told = words(run(*asked)), json.loads(run(*asked, "--json"))["movements"]
+    assert ("How 5 demonstrations look: 5 not to be told (" in said) == copies
+    assert ("three demonstrations or more tell the policy: not enough" in said) == copies
+    assert ("How 4 demonstrations look: 4 free." in said) == (not copies)
+    assert ({one["looks"] for one in told} == {"untold"}) == copies
+    assert ("Mean probability that a sample was free" in said) == (not copies)

@@ -52,7 +52,7 @@ def test_lerobot_comes_back_with_its_names_rate_and_tasks(tmp_path):
     assert info["features"]["action"] == {"dtype": "float32", "shape": [3], "names": ["vx", "vy", "vz"]}
     again = uc.read(root)
     for one, other in zip(MOVEMENTS, again, strict=True):
-        recipe = uc.Recipe("observation.state", "action")
+        recipe = uc.Recipe("observation.state", "action", action_is="velocity")
         [demonstration] = uc.prepare(other, recipe)
         assert_allclose(demonstration.states, one.values[:, :3], atol=1e-6)
         assert_allclose(demonstration.actions, one.values[:, 3:], atol=1e-6)

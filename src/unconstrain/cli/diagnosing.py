@@ -56,7 +56,7 @@ def diagnose(
     say(uc.preparation.doubts(len(demonstrations), 1.0 - explained(policy, demonstrations)))
     refuse_warnings(reading["strict"])
     states, actions = recipe.states or (), recipe.actions or recipe.directions
-    judged = uc.evaluation.verdicts.of_diagnosis(found)
+    judged = uc.evaluation.verdicts.of_diagnosis(found, uc.evaluation.diagnosis.to_record(found, states, actions))
     verdict = as_noted(uc.evaluation.diagnosis.about_recordings(judged, demonstrations, recipe, policy))
     if as_json:
         named = {"states": states, "actions": actions, "verdict": verdict.to_json()}
@@ -77,26 +77,28 @@ def diagnose(
 
 
 def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequence[str], unit: str, most: int) -> None:
-    named = uc.evaluation.diagnosis.named
     for line in uc.evaluation.diagnosis.sentences(found, states, actions, unit):
         click.echo(line)
     shown = found.regions[:most]
     click.echo(f"\nThe {len(shown)} regions of largest undetermined spread, of {len(found.regions)}, largest first:")
-    head = ["demonstrate around", "in", "samples", "told", "by three", "spread", "leave free", "shown by"]
+    around, along = (" ".join(name.partition(" [")[0] for name in names) for names in (states, actions))
+    head = [f"demonstrate\naround\n({around})", "in", "told", "by\nthree", "spread",
+            f"leave free\n({along})", "shown\nby"]  # fmt: skip
     rows = [
-        [named(one.state, states), one.demonstration, str(one.samples), percent(one.together), percent(one.determined),
-         f"{one.along:.1%}", named(one.direction, actions), str(len(one.shown_by))]
+        [" ".join(f"{value:.2g}" for value in one.state), one.demonstration, percent(one.together),
+         percent(one.determined), percent(one.along), " ".join(f"{value:.2f}" for value in one.direction),
+         str(len(one.shown_by))]
         for one in shown
     ]  # fmt: skip
     print_table(head, rows)
-    click.echo("told: share of the samples there at which all demonstrations together tell the policy.")
+    click.echo("told: share of samples there at which all tell the policy, to a tenth of a typical action or to noise.")
     click.echo("by three: the same whichever two are left out, so that it hangs on no one or two.")
     click.echo("spread: how far it may be off at this state without these two, along 'leave free'; 100% is typical.")
     click.echo("shown by: demonstrations that moved along 'leave free' in this region.")
-    free = sorted(found.movements, key=lambda one: -(one.free or 0.0))
+    told = [one for one in found.movements if one.looks in uc.evaluation.diagnosis.COUNTED]
+    if not (free := sorted(told, key=lambda one: -(one.free or 0.0))):
+        return
     click.echo("\nMean probability that a sample was free, of the freest and the most constrained demonstrations:")
     ends = free if len(free) <= MOST_ROWS else [*free[: MOST_ROWS // 2], *free[-MOST_ROWS // 2 :]]
-    print_table(
-        ["demonstration", "samples", "free", "by three"],
-        [[one.name, str(one.samples), percent(one.free or 0.0), percent(one.determined)] for one in ends],
-    )
+    rows = [[one.name, str(one.samples), percent(one.free or 0.0), percent(one.determined)] for one in ends]
+    print_table(["demonstration", "samples", "free", "by three"], rows)

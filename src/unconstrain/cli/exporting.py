@@ -10,7 +10,7 @@ import click
 import unconstrain as uc
 
 from ..base.errors import SettingError
-from .informing import verdict_of
+from .informing import RAN, verdict_of
 from .printing import option_for_json, say_judged
 from .reading import fitted_policy, of_words
 from .writing import check_outputs, option_for_force
@@ -71,6 +71,7 @@ def export(
     check_outputs((output, header, ros2), (policy,), force)
     learnt, notes = fitted_policy(policy), uc.storage.load_notes(policy)
     notes["units"] = uc.Recipe.from_dict(notes.get("recipe", {})).units(notes.get("units", {}))  # as recorded, if old
+    notes.pop(RAN, None)  # figures, which the verdict puts in words
     written, then = dict[str, str](), _NEXT_ROS2
     if ros2 is not None:
         taken = learnt.export_ros2(ros2, name, messages=messages, notes=notes)

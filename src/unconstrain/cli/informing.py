@@ -24,7 +24,10 @@ LOST = "explained less by guiding"
 """Note of the share of what a policy learnt from that it explains less as it is guided."""
 
 RAN = "from the same starts"
-"""Note of size and pace of the policy's own movements over those of the demonstrations."""
+"""Note of size and pace of the policy's own movements over those of the demonstrations, in figures."""
+
+MOVES = "run from the same starts"
+"""Note of what is wrong with these movements in words, or that they keep size and pace."""
 
 MARK = "verdict"
 """Note of how ``fit`` judged it."""
@@ -85,7 +88,7 @@ def info(file: str, as_json: bool) -> None:
     A policy, guided or not, or a constraint.
     """
     held, notes = loaded(file, uc.Policy | uc.LearntConstraint | uc.Guided), uc.storage.load_notes(file)
-    inner = ("recipe", "units", "digests", MARK, HELD_BY, SHOWN, WHERE, WOUND)
+    inner = ("recipe", "units", "digests", MARK, MOVES, HELD_BY, SHOWN, WHERE, WOUND)
     rest = {name: value for name, value in notes.items() if name not in inner}
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held, notes), **rest}
     if as_json:
@@ -148,12 +151,19 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
         mark = uc.evaluation.verdicts.Mark.BAD
         return uc.evaluation.verdicts.Verdict(mark, "Not fitted: it cannot predict.", next="unconstrain fit")
     found = _explained(held, notes)
-    strays = found.mark is uc.evaluation.verdicts.Mark.GOOD and notes.get(MARK) == "doubtful"
-    run, doubt = ("But run", f"Its movement over time. {found.doubt}") if strays else ("Run", found.doubt)
-    doubt += "" if MARK in notes else " Its movement over time: not run from its starts yet; 'unconstrain score' does."
-    ran = f" {run} from the same starts: {notes[RAN]}." if isinstance(notes.get(RAN), str) else ""
-    mark = uc.evaluation.verdicts.Mark.DOUBTFUL if strays else found.mark
-    return found._replace(mark=mark, said=found.said + ran, doubt=doubt)
+    if found.mark is uc.evaluation.verdicts.Mark.GOOD and notes.get(MARK) == "doubtful":
+        doubt = f"Its movement over time. {found.doubt}"
+        return uc.evaluation.verdicts.doubted(found, _doubt(notes))._replace(doubt=doubt)
+    unrun = "" if MARK in notes else " Its movement over time: not run from its starts yet; 'unconstrain score' does."
+    ran = f" Run from the same starts, {notes[MOVES]}." if notes.get(MOVES) else ""
+    return found._replace(said=found.said + ran, doubt=found.doubt + unrun)
+
+
+def _doubt(notes: Mapping[str, Any]) -> str:
+    """What ``fit`` doubted of a policy that explains enough: how it moves, or else what it noted of recordings."""
+    moves = notes.get(MOVES) or "it moves otherwise than was demonstrated"
+    kept = all(one.startswith("it keeps") for one in moves.split("; guided "))
+    return "its recordings are not all as they should be" if kept else f"run from the same starts, {moves}"
 
 
 def _explained(held: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:
@@ -168,10 +178,9 @@ def doubted(policy: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> str:
     """What ``fit`` doubted of a policy, as the rest of a sentence; empty where it did not, or nobody noted it."""
     if notes.get(MARK) not in ("doubtful", "bad"):
         return ""
-    found, ran = _explained(policy, notes), notes.get(RAN)
-    if found.mark is not uc.evaluation.verdicts.Mark.GOOD:
+    if (found := _explained(policy, notes)).mark is not uc.evaluation.verdicts.Mark.GOOD:
         return found.said[0].lower() + found.said[1:].rstrip(".")
-    return f"the policy's movement over time is in doubt{f': {ran}' if isinstance(ran, str) else ''}"
+    return _doubt(notes)
 
 
 def _said(value: Any) -> str:

@@ -169,6 +169,7 @@ class Judged(NamedTuple):
     verdict: uc.evaluation.verdicts.Verdict
     replayed: Mapping[str, float | None] | None
     ran: str
+    moves: str
     demonstrations: int
     samples: int
     training: float
@@ -195,7 +196,7 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     if scheduler is not None:
         count = len(stream.paths)
         found = uc.evaluation.verdicts.of_explained(alone, count, told, lost=lost)
-        return Judged(found, None, "", count, 0, float("nan"), held_out, lost)
+        return Judged(found, None, "", "", count, 0, float("nan"), held_out, lost)
     say_left(demos, stream.recipe)
     usual = float((uc.stack(demos).actions ** 2).sum(axis=1).mean() ** 0.5)
     count, samples, missed = _walked(moving, stream, usual)
@@ -205,7 +206,7 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     ran = retraced(found, moving, demos, stream.recipe, None, stream.first.units, False)
     cured = ran.verdict._replace(next=there) if there and found.next == there else ran.verdict
     verdict = uc.evaluation.diagnosis.about_recordings(cured, demos, stream.recipe, moving)
-    return Judged(as_noted(verdict), ran.medians, ran.in_words, count, samples, 1.0 - missed, held_out, lost)
+    return Judged(as_noted(verdict), ran.medians, *ran[3:], count, samples, 1.0 - missed, held_out, lost)
 
 
 def as_noted(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.Verdict:
@@ -256,9 +257,10 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
     elif learner != "direct":
         _say_determined(solution, learner)
     seen = f"{judged.training:.4g} on the training data, " if known else ""
+    ran = [f"Run from the same starts: {judged.ran}."] * bool(judged.ran)
     rest = f"{judged.held_out:.4g} where held out." if isfinite(judged.held_out) else "nothing could be held out."
     click.echo(f"Share of the motion explained, where slow samples count less, as in the verdict: {seen}{rest}")
-    for note in solution.notes:
+    for note in (*ran, *solution.notes):
         click.echo(note)
     of, to = len(stream.recipe.directions), len(stream.recipe.actions or stream.recipe.directions)
     if of not in (to, 2 * to):

@@ -70,19 +70,20 @@ def score(
     verdict = verdicts.of_unit(verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0)), _times(learnt, states))
     if as_json:
         told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known, "hardly_moved": still}
-        more = {"in_planes": _known(planes), "replayed": found.medians, "verdict": verdict.to_json()}
-        click.echo(json.dumps(told | {"too_short": short} | more, indent=2))
+        more = {"too_short": short, "in_planes": _known(planes), "replayed": found.medians, "ran": found.in_figures}
+        click.echo(json.dumps(told | more | {"verdict": verdict.to_json()}, indent=2))
         return
     say_verdict(verdict)
-    _print_scores(rows, whole, {"hardly moved": still, "too short": short})
+    _print_scores(rows, whole, {"hardly moved": still, "too short": short}, found.in_figures)
 
 
-def _print_scores(rows: Sequence[dict[str, Any]], whole: dict[str, Any], left: dict[str, list[str]]) -> None:
-    """Scores of each demonstration and of all, and why others have none."""
+def _print_scores(rows: Sequence[dict[str, Any]], whole: dict[str, Any], left: dict[str, list[str]], ran: str) -> None:
+    """Scores of each demonstration and of all, why others have none, and figures of runs from their starts."""
     head = ["demonstration", "samples", "explains", "normalised inconsistency", "nPOE", "nCPE"][: len(whole) - 1]
     each = [_row(*one.values()) for one in (*rows, whole)]
     none = [[name, "", f"{why}: no score"] for why, names in left.items() for name in names]
     print_table(head, [*each[:-1], *none, each[-1]])
+    click.echo(f"Run from the same starts: {ran}." if ran else "", nl=bool(ran))
 
 
 def _row(name: str, size: int, fast: int, share: float, *rest: float | None) -> list[str]:

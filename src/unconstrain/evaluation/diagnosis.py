@@ -21,17 +21,20 @@ from .marks import ENOUGH as ENOUGH
 from .marks import SMALL as SMALL
 from .metrics import along_motion
 from .sentences import CONSTRAINED as CONSTRAINED
+from .sentences import COUNTED as COUNTED
 from .sentences import FREE as FREE
 from .sentences import about_choice as about_choice
 from .sentences import about_suspects as about_suspects
 from .sentences import in_words as in_words
+from .sentences import looks
 from .sentences import models_of as models_of
 from .sentences import sentences as sentences
+from .sentences import to_record as to_record
 from .shown import FLAT as FLAT
 from .shown import about_recordings as about_recordings
+from .shown import crossed, names_of
 from .shown import flat as flat
 from .shown import named as named
-from .shown import names_of
 from .shown import planes_of as planes_of
 
 if TYPE_CHECKING:
@@ -115,13 +118,17 @@ class Region:
 
 @dataclass(frozen=True)
 class Movement:
-    """One demonstration: its name, samples, mean probability of a free sample (None if unknown), and as in Region."""
+    """One demonstration: its name, samples, mean probability of a free sample (None if unknown), and as in Region.
+
+    It ``looks`` free, constrained, unsure, flat if it keeps to a plane that others cross, or untold; None if unknown.
+    """
 
     name: str
     samples: int
     free: float | None
     determined: float
     spread: float
+    looks: str | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,6 +269,7 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
     known = untold_at(policy, states, typical) <= SMALL
     models, d, _ = solution.weights.shape
     free = solution.free if len(solution.free) == len(states) else None
+    known &= free is None or len({one.states.tobytes() for one in demos}) >= ENOUGH  # a copy tells nothing more
     together = belief.together if free is not None and len(belief.together) == len(states) else known
     return Diagnosis(
         method=solution.method,
@@ -400,18 +408,14 @@ def _least_determined(policy: Policy, states: Array) -> tuple[Array, Array]:
 def _movements(
     demos: list[Demonstration], undetermined: Array, known: NDArray[np.bool_], free: Array | None
 ) -> tuple[Movement, ...]:
-    groups = stack(demos).groups
-    parts = [groups == index for index in range(len(demos))]
-    return tuple(
-        Movement(
-            name,
-            int(part.sum()),
-            None if free is None else float(free[part].mean()),
-            float(known[part].mean()),
-            float(np.sqrt((undetermined[part] ** 2).mean())),
-        )
-        for name, part in zip(names_of(demos), parts, strict=True)
-    )
+    groups, found = stack(demos).groups, list[Movement]()
+    for index, (name, plane) in enumerate(zip(names_of(demos), crossed(demos), strict=True)):
+        part = groups == index
+        mean, told = None if free is None else float(free[part].mean()), float(known[part].mean())
+        how = None if mean is None else looks(mean, told, plane)
+        spread = float(np.sqrt((undetermined[part] ** 2).mean()))
+        found.append(Movement(name, int(part.sum()), mean, told, spread, how))
+    return tuple(found)
 
 
 def _numbers(values: Array) -> tuple[float, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from ..base.display import counted, percent
 from ..learners import robust
-from .marks import ENOUGH, SMALL
+from .marks import ENOUGH, PARTLY, SMALL
 from .shown import named
 from .verdicts import regions_left
 
@@ -25,6 +26,11 @@ LITTLE = 0.01
 FREE, CONSTRAINED = 0.5, 0.1
 """A demonstration looks free above the first, and constrained below the second mean probability of free samples."""
 
+COUNTED = {"free": "free", "constrained": "constrained", "unsure": "either"}
+LOOKS = COUNTED | {"flat": "on a plane that others cross (as what is held, or a short free stroke)"}
+LOOKS["untold"] = "not to be told (too little else was seen there, or all was held the same way)"
+"""How demonstrations look, and how that is said; those of the first three are compared by probability."""
+
 MOST_NAMED = 8
 """So many samples that look wrong are named."""
 
@@ -34,7 +40,7 @@ def sentences(found: Diagnosis, states: Sequence[str], actions: Sequence[str], u
     return [
         _about_noise(found, f" {unit}".rstrip()),
         about_choice(found.method, found.candidates),
-        *_about_regions(found, states, actions),
+        _about_regions(found, states, actions),
         _about_freedom(found),
         *about_suspects(found.suspects),
     ]
@@ -102,20 +108,22 @@ def about_choice(method: str, candidates: Mapping[str, float]) -> str:
     return f"{said} {others} ('fit -v' lists all)."
 
 
-def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> list[str]:
-    worst = found.regions[0]
-    advice = f"demonstrate around {named(worst.state, states)} with motion along {named(worst.direction, actions)} "
-    advice += "left free: tilt what holds it, such as the plate, another way, or take another (standard deviation "
-    advice += f"there: {percent(worst.along)} of a typical action; see '{worst.demonstration}')."
+def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> str:
     if all(one.determined == 1.0 for one in found.regions):
-        return [f"Every recorded state is determined. If you record more: {advice}"]
+        return "Every recorded state is determined, as far as noise lets it be told."
     told, every, (open_, few) = found.told_together, len(found.regions), regions_left(found)
     left, hangs = (percent(max(share, 0.0)) for share in (1.0 - told, told - found.states_determined))
     where = "" if (left, open_) == ("0%", 0) else f"Not determined: {left} of the states, {open_} of {every} regions. "
     where += f"Told by one or two demonstrations alone: {hangs} of the states, {few} of {every} regions; in "
     where += f"{sum(len(one.shown_by) < ENOUGH for one in found.regions)} regions fewer than {ENOUGH} demonstrations "
-    where += f"moved along what is least known. {_least_shown(worst, states, actions)}"
-    return [where, f"What would help most: {advice}"]
+    return f"{where}moved along what is least known. {_least_shown(found.regions[0], states, actions)}"
+
+
+def to_record(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> str:
+    """Where another demonstration would help most, and how to hold it."""
+    worst = found.regions[0]
+    advice = f"Demonstrate around {named(worst.state, states)} with motion along {named(worst.direction, actions)} "
+    return f"{advice}left free: tilt what holds it, such as the plate, another way, or take another."
 
 
 def _least_shown(region: Region, states: Sequence[str], actions: Sequence[str]) -> str:
@@ -129,15 +137,21 @@ def _least_shown(region: Region, states: Sequence[str], actions: Sequence[str]) 
     return f"What was seen {where} is too little, or does not agree."
 
 
+def looks(free: float, told: float, flat: bool) -> str:
+    """How one looks by its mean probability of a free sample, the share of its samples that three tell, and a plane."""
+    if told < PARTLY:
+        return "untold"
+    return "constrained" if free < CONSTRAINED else "flat" if flat else "free" if free > FREE else "unsure"
+
+
 def _about_freedom(found: Diagnosis) -> str:
-    said = f"Free, or held by less than the noise: {percent(found.free_share)} of the samples"
+    said = "Free, or held by less than the noise as far as the policy wanted to move: "
+    said += f"{percent(found.free_share)} of the samples"
     if found.undecided_share >= LITTLE:
         said += f"; {percent(found.undecided_share)} were free or always held in the same way, which looks alike. "
         said += "Demonstrations held in another way would tell"
     if found.free is None:
         return f"{said}. That is of the samples that the policy was fitted to."
-    means = np.array([one.free for one in found.movements], dtype=np.float64)
-    free, held = int((means > FREE).sum()), int((means < CONSTRAINED).sum())
-    between = len(means) - free - held
-    rest = f"; of {between} that is not certain." if between else "."
-    return f"{said}. Of {len(means)} demonstrations, {free} look free and {held} constrained{rest}"
+    many = Counter(one.looks for one in found.movements)
+    told = ", ".join(f"{many[how]} {words}" for how, words in LOOKS.items() if many[how])
+    return f"{said}. How {counted(len(found.movements), 'demonstration')} look: {told}."

@@ -46,6 +46,17 @@ def planes_of(demonstrations: Sequence[Demonstration]) -> Array:
     return each[:, 2] if together and each[:, 2].any(axis=1).all() and not each[:, 1].any() else whole[:0]
 
 
+def crossed(demonstrations: Sequence[Demonstration]) -> list[bool]:
+    """Whether each demonstration in space keeps to a plane that others move across, as what is held does."""
+    states, actions, groups = stack(list(demonstrations))
+    found = [False] * len(demonstrations)
+    for index in range(len(found) if (states.shape[1], actions.shape[1]) == (3, 3) else 0):
+        held, others = flat(states[groups == index])[0], actions[groups != index]
+        across = ((others @ held[2]) ** 2).sum() > FLAT**2 * (others**2).sum()
+        found[index] = bool(held[2].any() and not held[1].any() and across)
+    return found
+
+
 def about_recordings(
     found: Verdict, demos: Sequence[Demonstration], recipe: Recipe, policy: Callable[[Array], Array] | None = None
 ) -> Verdict:

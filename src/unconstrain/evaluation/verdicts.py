@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Array
 from ..base.display import counted, percent
 from ..models import SUPPORTED
-from .marks import ENOUGH, FAIR, FAR_OFF, FORBIDDEN, NEARBY, OTHERWISE, PARTLY, UNITS, doubted, graded, no_better
+from .marks import ENOUGH, FAIR, FAR_OFF, FORBIDDEN, NEARBY, OTHERWISE, PARTLY, UNITS, graded, no_better
 from .marks import GOOD as GOOD
 from .marks import MOSTLY as MOSTLY
 from .marks import SMALL as SMALL
@@ -21,6 +21,7 @@ from .marks import WIDTH as WIDTH
 from .marks import Mark as Mark
 from .marks import Verdict as Verdict
 from .marks import allowed_by as allowed_by
+from .marks import doubted as doubted
 
 if TYPE_CHECKING:
     from ..constraints import LearntConstraint
@@ -220,8 +221,8 @@ def regions_left(found: Diagnosis) -> tuple[int, int]:
     return open_, sum(region.together >= PARTLY > region.determined for region in found.regions)
 
 
-def of_diagnosis(found: Diagnosis) -> Verdict:
-    """Judge whether recordings tell the unconstrained policy."""
+def of_diagnosis(found: Diagnosis, first: str = "") -> Verdict:
+    """Judge whether recordings tell the unconstrained policy; ``first`` is what to record, before the list of it."""
     share, count, (open_, few) = found.states_determined, len(found.movements), regions_left(found)
     doubt = f"{open_} of {len(found.regions)} regions, where all recordings leave a direction open: free, or "
     doubt = f"{doubt}always held the same way, cannot be told there." if open_ else "States that nobody came near."
@@ -243,13 +244,15 @@ def of_diagnosis(found: Diagnosis) -> Verdict:
     if found.noise_share > 3 * SMALL:
         mark = no_better(mark)
         said = f"{said[:-1]}, though noise is {percent(found.noise_share)} of a typical action."
-    trust = "" if mark is Mark.BAD else f"The policy at these states, to {percent(found.noise_share)} of noise."
-    trust = f"{trust}{hangs}".strip()
+    trust = f"The policy at these states, up to noise of {percent(found.noise_share)} of a typical action"
+    if open_spread := share == 1 and (worst := found.regions[0].along) > SMALL:
+        trust += f"; at the place that comes next, up to {percent(worst)}, where noise leaves more open"
+    trust = f"{f'{trust}.' * (mark is not Mark.BAD)}{hangs}".strip()
     if mark is not Mark.GOOD:
         doubt += " 'fit' and 'score' may still explain much: they judge a policy along the motion, this judges "
         doubt += "recordings across it."
-    then = "Record what the list below says, the first first." if share < 1 else "Demonstrate where nobody was."
-    return Verdict(mark, said, trust, doubt, then)
+    then = f"{first} The list below has more places.".lstrip()
+    return Verdict(mark, said, trust, doubt, then if share < 1 or open_spread else "Demonstrate where nobody was.")
 
 
 def of_constraint(
@@ -338,43 +341,60 @@ def _part(where: NDArray[np.bool_], seconds: Array) -> str:
     return f"{percent(where.mean())} of the time, first at {seconds[int(where.argmax())]:.2f} s"
 
 
-def of_replays(
-    found: Verdict, extents: Array, paces: Array, apart: str, lasts: Sequence[float] = (), of: str = ""
-) -> Verdict:
-    """Add to a verdict how a policy moves from the starts of demonstrations, held as they were.
+LAST, DIVERGES = "last round over first", ("it leaves the finite numbers", ["size and pace"])
+"""A ratio of sizes, and :func:`moves` of what has no size."""
+
+_WRONG = {"size": ("too large", "too small", ""), "pace": ("too fast", "too slow", "the other way")}
+_WRONG[LAST] = "too large in the last round", "too small in the last round", ""
+
+
+def of_replays(found: Verdict, said: str, strays: Sequence[str]) -> Verdict:
+    """Add to a verdict how a policy moves from the starts of demonstrations, held as they were: :func:`moves`."""
+    if not strays:
+        return found._replace(said=f"{found.said} Run from the same starts, {said}." if said else found.said)
+    return doubted(found, f"run from the same starts, {said}")._replace(
+        doubt=f"Its {' and '.join(strays)} over time. {found.doubt}".rstrip(),
+        next="Look at it ('unconstrain look'). More demonstrations may come nearer.",
+    )
+
+
+def moves(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> tuple[str, list[str]]:
+    """How runs move, the rest of a sentence, empty without any; and in what they stray.
 
     ``extents`` and ``paces`` are size and turns of each run over those of its demonstration, NaN where there are none,
-    and ``lasts`` the size of the last round over that of the first, over the same; ``apart`` is how far the runs stray
-    from the nearest recorded states, with its unit; ``of`` is as of :func:`size_and_pace`.
+    and ``lasts`` the size of the last round over that of the first, over the same.
     Half of them may be off by :data:`OTHERWISE` either way, whatever the mean is, and none by :data:`FAR_OFF`.
     """
-    measured = _measured(*(given := (extents, paces, lasts)))
-    if not measured:
-        return found
-    ran = f"un from the same starts: {size_and_pace(*given, of)}, typically {apart} from the recorded path"
-    off = {name: np.abs(np.log(np.maximum(ratios, 1e-9))) for name, ratios in measured.items()}
-    strays = {
-        name: int((many > np.log(OTHERWISE)).sum())
-        for name, many in off.items()
-        if np.median(many) > np.log(OTHERWISE) or many.max() > np.log(FAR_OFF)
-    }
-    if not strays:
-        return found._replace(said=f"{found.said} R{ran}.")
-    counted = ", ".join(f"{name} of {count} of {len(extents)}" for name, count in strays.items())
-    which = f"; more than {OTHERWISE - 1:.0%} off: {counted}" if len(extents) > 1 else ""
-    return _strays(found, f"r{ran}{which}", " and ".join(strays))
+    measured, many = _measured(extents, paces, lasts), len(extents)
+    goes = ("go round" if many > 1 else "goes round") if "pace" in measured else f"turn{'s' * (many == 1)} out"
+    said, strays = list[str](), list[str]()
+    for name, (ratios, off) in measured.items():
+        if np.median(off) > np.log(OTHERWISE) or off.max() > np.log(FAR_OFF):
+            wrong = ratios[off > np.log(OTHERWISE)]
+            ways = zip((wrong > 1, (wrong >= 0) & (wrong <= 1), wrong < 0), _WRONG[name], strict=True)
+            who = f"{len(wrong)} of {many} " if many > 1 else "it " * (not said)
+            said.append(who + f"{goes} " * (not said) + " or ".join(way for rows, way in ways if rows.any()))
+            strays.append(name.replace(LAST, "size"))
+    kept = " and ".join(name for name in measured if name != LAST)
+    return (" and ".join(said) if said else f"it keeps {kept}" * bool(kept)), [*dict.fromkeys(strays)]
 
 
-def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = (), of: str = "") -> str:
-    """Those of :func:`of_replays` in words: the middle ones, and their ranges; ``of`` says which, if not all."""
-    told = ", ".join(f"{name} {_times(ratios)}" for name, ratios in _measured(extents, paces, lasts).items())
-    runs = f" (in brackets, least to most of {len(extents)} runs)" if "(" in told else ""
-    return f"{of}{told} the demonstrated{runs}" if told else ""
+def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = (), of: str = "", apart: str = "") -> str:
+    """Figures of :func:`moves`, ``of`` some, if not all, and how far ``apart`` from recorded states, with its unit."""
+    measured, many = _measured(extents, paces, lasts), len(extents)
+    told = ", ".join(f"{name} {_times(ratios)}" for name, (ratios, _) in measured.items())
+    runs = f" (in brackets, least to most of {many} runs)" if "(" in told else ""
+    counts = {name: int((by > np.log(OTHERWISE)).sum()) for name, (_, by) in measured.items()}
+    off = ", ".join(f"{name} of {count} of {many}" for name, count in counts.items() if count)
+    which = f"; more than {OTHERWISE - 1:.0%} off: {off}" if many > 1 and off else ""
+    return f"{of}{told} the demonstrated{runs}, typically {apart} from the recorded path{which}" if told else ""
 
 
-def _measured(*given: Sequence[float] | Array) -> dict[str, Array]:
-    named = zip(("size", "pace", "last round over first"), map(np.asarray, given), strict=True)
-    return {name: found for name, ratios in named if len(found := ratios[np.isfinite(ratios)])}
+def _measured(*given: Sequence[float] | Array) -> dict[str, tuple[Array, Array]]:
+    """Finite ratios by name, and how far off one they are, as logarithms."""
+    named = zip(("size", "pace", LAST), map(np.asarray, given), strict=True)
+    found = {name: ratios[np.isfinite(ratios)] for name, ratios in named}
+    return {name: (one, np.abs(np.log(np.maximum(one, 1e-9)))) for name, one in found.items() if len(one)}
 
 
 def _times(ratios: Array) -> str:
@@ -388,24 +408,15 @@ def _either_way(ratio: float, times: str = "") -> str:
     return f"{abs(ratio):.2f}{times}{' the other way' if ratio < 0 else ''}"
 
 
-def of_divergence(found: Verdict) -> Verdict:
-    """Add to a verdict that a policy leaves the finite numbers where demonstrations start."""
-    return _strays(found, "run from the same starts it leaves the finite numbers", "size and pace")
-
-
-def _strays(found: Verdict, how: str, what: str) -> Verdict:
-    return doubted(found, how)._replace(
-        doubt=f"Its {what} over time. {found.doubt}".rstrip(),
-        next="Look at it ('unconstrain look'). More demonstrations may come nearer.",
-    )
-
-
 def of_early_end(found: Verdict, why: str) -> Verdict:
     """Add to a verdict on a movement that it stops, for a reason in one sentence, and what to do in another."""
     said, _, then = why.partition(". ")
     doubt = f"{found.doubt} What would have come after."
     return found._replace(mark=no_better(found.mark), said=f"{said}. {found.said}", doubt=doubt.lstrip(), next=then)
 
+
+PLAIN = {"seam": "jumps to another place", "stale": "values that repeat", "clock-gap": "gaps in time"}
+"""Codes of remarks that are no words, in words."""
 
 SAME_CAUSE = ("clock-gap", "seam", "few-demonstrations")
 """What is odd about several demonstrations in one table for no other reason than that."""
@@ -421,9 +432,10 @@ def of_surveys(surveys: Sequence[Any], needed: str = "", then: str = "unconstrai
     fewer = f"{count}: 'fit' tells what was free from {ENOUGH} or more, held in different ways." if few else ""
     warned = [found for found in surveys if {one.code for one in found.warnings} - {"clock-gap"}]
     odd = {one.code: one for found in reversed(surveys) for one in reversed(found.warnings)}
+    kept = [code for code in odd if "several-in-one" not in odd or code not in SAME_CAUSE]
+    said = f"{len(warned)} of {count} not as it should be: "
+    said += ", ".join(PLAIN.get(code, code.replace("-", " ")) for code in kept) + "."
     if several := odd.get("several-in-one"):
-        codes = ", ".join(code for code in odd if code not in SAME_CAUSE)
-        said = f"{len(warned)} of {count} not as it should be: {codes}."
         then = f"Read them one by one, by the column {several.column!r}:\n{apart} {shlex.quote(several.column)}"
         return Verdict(Mark.DOUBTFUL, said, next=then)
     guess = f"{needed} A guess, to be corrected:\n{then}" if needed else then
@@ -434,7 +446,6 @@ def of_surveys(surveys: Sequence[Any], needed: str = "", then: str = "unconstrai
         rest = " (rest is noted below)" * any(one.code == "rest" for found in surveys for one in found.notes)
         said = f"{count}, nothing odd{gaps}: ready to learn from{rest}."
         return Verdict(Mark.DOUBTFUL if few else Mark.GOOD, said, doubt=fewer, next=then)
-    said = f"{len(warned)} of {count} not as it should be: {', '.join(odd)}."
     cures = "Read the notes below; each names its cure."
     then = f"{cures} And fit needs to know more: {guess}" if needed else f"{cures} Then:\n{then}"
     return Verdict(Mark.DOUBTFUL, said, doubt=fewer, next=then)

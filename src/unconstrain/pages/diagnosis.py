@@ -46,7 +46,7 @@ def diagnosis_page(
     demos = list(demonstrations)
     return html.document(
         title,
-        verdict or verdicts.of_diagnosis(found),
+        verdict or verdicts.of_diagnosis(found, diagnosis.to_record(found, states, actions)),
         html.words("diagnosis_lead"),
         html.section("What to record next", _next(found, states, actions)),
         html.section("Where three demonstrations do not tell", _map(found, demos, states, actions)),
@@ -65,7 +65,7 @@ def unknown(
     except InvalidDataError as error:
         return [html.paragraph(f"Nothing can be said about that: {error}")]
     return [
-        html.bullets(diagnosis.sentences(found, states, actions)),
+        html.bullets([*diagnosis.sentences(found, states, actions), diagnosis.to_record(found, states, actions)]),
         _map(found, demos, states, actions),
         _next(found, states, actions),
     ]
@@ -79,7 +79,7 @@ def _tiles(found: Diagnosis, demos: list[Demonstration]) -> html.Markup:
             (percent(found.told_together), "of the recorded states told by all together"),
             (percent(found.states_determined), "by three demonstrations or more"),
             (percent(found.directions_determined), f"of {found.directions} weight directions determined"),
-            (percent(found.free_share), "of the samples free"),
+            (percent(found.free_share), "of the samples free, or held by less than the noise"),
             (percent(found.undecided_share), "of the samples free or always held in the same way"),
         ]
     )
@@ -139,17 +139,19 @@ def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> ht
 def _freedom(found: Diagnosis) -> html.Markup:
     if found.free is None:
         return html.paragraph("The policy was fitted to other demonstrations.")
-    shown = found.movements[:MOST_MOVEMENTS]
-    names = [one.name for one in shown]
+    told = [one for one in found.movements if one.looks in diagnosis.COUNTED]
+    if not (shown := told[:MOST_MOVEMENTS]):
+        return html.paragraph("Of no demonstration this can be told; the sentences above say why.")
     free = [one.free or 0.0 for one in shown]
-    picture = figures.bars(names, {"hybrid": free}, title="", label="probability of being free")
+    picture = figures.bars([one.name for one in shown], {"hybrid": free}, title="", label="probability of being free")
     picture.axes[0].set_ylim(0.0, 1.0)
     caption = html.words(
         "diagnosis_freedom",
         free=diagnosis.FREE,
         constrained=diagnosis.CONSTRAINED,
         shown=len(shown),
-        every=len(found.movements),
+        every=len(told),
+        left=len(found.movements) - len(told),
     )
     return html.picture("free", [picture], caption, labels={"hybrid": "demonstrations"})
 

@@ -78,11 +78,7 @@ def policy_page(
     judged = retraced(found, moving, demos, made, None, known)
     parts = [
         *([html.section("Guided", html.paragraph(moving.aim_.promise))] if isinstance(moving, Guided) else []),
-        *_replays(
-            judged.runs,
-            judged.verdict.said.removeprefix(f"{found.said} ").removeprefix("But ").removeprefix("And "),
-            xs,
-        ),
+        *_replays(judged.runs, judged.in_figures, xs),
         html.section("The demonstrations", _movements(moving, demos, xs)),
         *_reproduced(moving, demos, xs),
         html.section("Predicted and observed actions", _actions(policy, demos, us)),
@@ -170,7 +166,7 @@ def _drawn(tracks: list[tuple[str, Demonstration]], names: Sequence[str]) -> obj
 
 
 def _replays(runs: Sequence[Replay], said: str, names: Sequence[str]) -> list[html.Markup]:
-    """Roll-outs over the demonstrations that they start with, below what is judged of them."""
+    """Roll-outs over the demonstrations that they start with, below their sizes and paces."""
     if not runs:
         return []
     keys = ["hybrid" if one.held else "roll-out, free" for one in runs]
@@ -181,7 +177,8 @@ def _replays(runs: Sequence[Replay], said: str, names: Sequence[str]) -> list[ht
     picture = html.picture(
         "replays", [_drawn([(key, _thin(demo)) for key, demo in drawn], names)], caption, keys=shown, labels=labels
     )
-    return [html.section("From where demonstrations start", html.paragraph(f"{said[:1].upper()}{said[1:]}"), picture)]
+    figures_ = [html.paragraph(f"Run from the same starts: {said}.")] if said else []
+    return [html.section("From where demonstrations start", *figures_, picture)]
 
 
 def _reproduced(policy: Policy | Guided, demos: list[Demonstration], names: Sequence[str]) -> list[html.Markup]:

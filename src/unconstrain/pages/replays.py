@@ -62,11 +62,12 @@ class Replay(NamedTuple):
 
 
 class Replayed(NamedTuple):
-    """A verdict; of those whose constraint is known, medians, None if there are none, and words; all that were run."""
+    """A verdict; of those whose constraint is known medians, or None; all that were run; figures and words for them."""
 
     verdict: verdicts.Verdict
     medians: dict[str, float | None] | None
     runs: Sequence[Replay] = ()
+    in_figures: str = ""
     in_words: str = ""
 
 
@@ -87,7 +88,8 @@ def replayed(
     try:
         runs = replays(policy, demos, recipe, held, free)
     except DivergedError:
-        return Replayed(_advised(verdicts.of_divergence(found), found, policy, demos), None)
+        judged = _advised(verdicts.of_replays(found, *verdicts.DIVERGES), found, policy, demos)
+        return Replayed(judged, None, in_words=verdicts.DIVERGES[0])
     known = [one for one in runs if one.held]
     if not known:
         why = "not compared, as what held these recordings is not known" if runs else unlike(demos, recipe)
@@ -99,10 +101,12 @@ def replayed(
     finite = {name: values[np.isfinite(values)] for name, values in measured.items()}
     told = {name: float(np.median(values)) if len(values) else None for name, values in finite.items()}
     alike = "" if held is not None else " that look flat (on a line, in a plane), as what was held and short strokes do"
-    of = "" if len(known) == len(demos) else f"for {len(known)} of {len(demos)} demonstrations{alike}, "
-    judged = verdicts.of_replays(found, extents, paces, said, lasts, of)
-    judged = _advised(judged, found, policy, demos)
-    return Replayed(judged, told, runs, verdicts.size_and_pace(extents, paces, lasts, of))
+    (words, strays), of = verdicts.moves(extents, paces, lasts), ""
+    if len(known) < len(demos):
+        some = f"{len(known)} of {len(demos)} demonstrations"
+        words, of = f"{words}, as far as compared ({some})", f"for {some}{alike}, "
+    judged = _advised(verdicts.of_replays(found, words, strays), found, policy, demos)
+    return Replayed(judged, told, runs, verdicts.size_and_pace(extents, paces, lasts, of, said), words)
 
 
 def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Replayed:
@@ -110,12 +114,13 @@ def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Repl
     guided, alone = replayed(found, policy, *of), innermost(policy)
     if alone is policy:
         return guided
-    (plain, _, _, ran), words = replayed(found, alone, *of), guided.in_words
-    mark = max(plain.mark, guided.verdict.mark, key=[*verdicts.Mark].index)
-    more = f" {'Guided' if mark is plain.mark else 'But guided'}: {words}." if words else ""
-    then = plain.next.partition(" 'unconstrain fit --guided")[0]  # it is
-    judged = plain._replace(mark=mark, said=plain.said + more, next=then)
-    return guided._replace(verdict=judged, in_words="; guided ".join(filter(None, (ran, words))))
+    plain, words = replayed(found, alone, *of), guided.in_words
+    mark = max(plain.verdict.mark, guided.verdict.mark, key=[*verdicts.Mark].index)
+    more = f" {'Guided' if mark is plain.verdict.mark else 'But guided'}, {words}." if words else ""
+    then = plain.verdict.next.partition(" 'unconstrain fit --guided")[0]  # it is
+    judged = plain.verdict._replace(mark=mark, said=plain.verdict.said + more, next=then)
+    both = ["; guided ".join(filter(None, one)) for one in zip(plain[3:], guided[3:], strict=True)]
+    return Replayed(judged, *guided[1:3], *both)
 
 
 def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Any, demos: Any) -> verdicts.Verdict:
