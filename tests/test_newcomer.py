@@ -432,7 +432,7 @@ def test_score_and_look_read_as_told_where_files_are_not_as_those_learnt_from(tm
 
 def test_abbreviations_are_told_below_the_table(folder, policy):
     lines = run("score", policy, folder / "unseen", "--plane", "1,1").splitlines()
-    assert [line.partition(":")[0] for line in lines[-2:]] == ["nCPE", "nPOE"]
+    assert [line.partition(":")[0] for line in lines[-3:]] == ["nCPE", "nPOE", "Run from the same starts"]
     assert "nCPE:" not in run("score", policy, folder / "unseen")
 
 
