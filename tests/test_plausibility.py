@@ -20,7 +20,7 @@ from unconstrain.base.errors import SettingError
 from unconstrain.recordings.preparation import PreparationWarning, prepare, survey, survey_set, window_used
 from unconstrain.recordings.remarks import WARNINGS
 from unconstrain.recordings.signals.jumps import glitches, seams, topics
-from unconstrain.recordings.signals.stillness import is_noise, noise_share, pauses
+from unconstrain.recordings.signals.stillness import is_noise, noise_share, pauses, rest_at_ends
 
 
 def codes(recordings, recipe=None):
@@ -299,6 +299,25 @@ def test_standing_still_before_the_start_is_left_out_and_told_in_seconds(noise):
     assert uc.prepare([begun_late(0.0, noise)], recipe)[0].times[0] == 0.0
     assert not survey(begun_late(0.0, noise), recipe).notes
     assert not survey(begun_late(2.0, noise), replace(recipe, still=0.02)).notes
+
+
+@pytest.mark.parametrize("noise", [0.1, 0.3, 1.0])
+@pytest.mark.parametrize("smooth", [0.0, 0.3])
+def test_rest_before_a_start_is_found_whatever_the_speed_after_it(noise, smooth):
+    """Round a cycle of 80 mm from starts inside and outside it, of 35 to 400 mm/s, at once or smoothly."""
+    rng = np.random.default_rng(0)
+    for radius in np.linspace(15.0, 125.0, 9):
+        at, path = np.array([radius, 0.0]), list[np.ndarray]()
+        for row in range(500):
+            path.append(at)
+            velocity = at * (1.0 - at @ at / 80.0**2) + 2.2 * np.array([-at[1], at[0]])
+            at = at + 0.01 * velocity * min(1.0, 0.01 * row / smooth if smooth else 1.0)
+        for seconds in (0.0, 0.4, 0.8, 1.5):
+            values = np.vstack([np.tile(path[0], (round(100 * seconds), 1)), path])
+            first, last = rest_at_ends(values + noise * rng.standard_normal(values.shape), 0.01)
+            assert last == 0
+            assert (first > 0) == (seconds > 0)
+            assert not first or -1 <= first - round(100 * seconds) <= 30
 
 
 @pytest.mark.parametrize("window", [0.25, 4.0])

@@ -32,6 +32,10 @@ SHORTEST_STOP_S, STOP_ROWS = 0.3, 6
 LONGER = (1.0, 1.5, 2.0)
 """Multiples of that, for rest at an end, as noise hides the shorter."""
 
+HALVES, SUDDEN = 2.0, 5.0
+"""Means of both halves of a rest are nearer than so many standard errors of their difference. Who sets off suddenly is
+so many standard deviations of the noise away in half the time of the shortest stop."""
+
 LOUD, RISE, FINEST = 0.25, 0.7, 0.02
 """A stop is seen where noise is below the first share of usual movement, and begins and ends at the second share, near
 it. Noise counts as the third share at least.
@@ -108,10 +112,34 @@ def rest_at_ends(values: Array, interval: float = 0.0) -> tuple[int, int]:
     """
     known = 0.0 < interval <= SHORTEST_STOP_S / STOP_ROWS
     lengths = [round(share * SHORTEST_STOP_S / interval) for share in LONGER] if known else [max(20, len(values) // 10)]
-    first = max(_rest_at_start(values, rows, len(values)) for rows in lengths)
+    first = _standing(values, lengths[0])
     # Who comes to a goal slows down for longer than the shortest stop.
     last = max(_rest_at_start(values[::-1], rows, lengths[0]) for rows in lengths)
     return (first, last) if first + last < len(values) else (0, 0)
+
+
+def _standing(values: Array, shortest: int) -> int:
+    """Rows (T, n) at the start, so many or more, that stay at one place but for noise; 0 where noise hides movement.
+
+    Whatever the speed after it; half as many do where that is sudden. Those rows count that are near the first ones, up
+    to where the means of both halves would be farther apart than by chance.
+    """
+    least = shortest // 2
+    if len(values) < 4 * shortest or not least:
+        return 0
+    noise, place = _noise(values), np.median(values[:least], axis=0)
+    off = (np.abs(values - place) > NOISE * noise).any(axis=1)
+    gone = np.flatnonzero(off & np.append(off[1:], True))
+    left = int(gone[0]) if len(gone) else len(values)
+    usual, chance = float(np.linalg.norm(_usual(values, shortest))), 2.0 * HALVES * float(np.linalg.norm(noise))
+    if left > 3 * len(values) // 4 or chance / np.sqrt(shortest) > LOUD * usual:
+        return 0
+    for rows in range(left, least - 1, -1):
+        halves = values[: rows // 2].mean(axis=0) - values[rows // 2 : rows].mean(axis=0)
+        if np.linalg.norm(halves) <= max(chance / np.sqrt(rows), SLOW * FINEST * usual):
+            away = np.linalg.norm(values[rows : rows + least].mean(axis=0) - place)
+            return rows if rows >= shortest or away > SUDDEN * np.linalg.norm(noise) + SLOW * usual else 0
+    return 0
 
 
 def _rest_at_start(values: Array, shortest: int, soon: int) -> int:
