@@ -128,7 +128,7 @@ def _standing(values: Array, shortest: int) -> int:
     if len(values) < 4 * shortest or not least:
         return 0
     noise, place = _noise(values), np.median(values[:least], axis=0)
-    off = (np.abs(values - place) > NOISE * noise).any(axis=1)
+    off: NDArray[np.bool_] = np.asarray((np.abs(values - place) > NOISE * noise).any(axis=1))
     gone = np.flatnonzero(off & np.append(off[1:], True))
     left = int(gone[0]) if len(gone) else len(values)
     usual, chance = float(np.linalg.norm(_usual(values, shortest))), 2.0 * HALVES * float(np.linalg.norm(noise))
