@@ -389,11 +389,12 @@ def test_who_misses_more_shows_a_bias_that_is_farther_than_it_may_be_wrong_itsel
     assert bias_shown(0.05, 0.08)[0] == 0.0  # far less consistent
 
 
-def test_who_is_softer_shows_no_more_bias_than_it_is_more_consistent():
+def test_who_is_as_soft_as_direct_regression_shows_no_more_bias_than_it_is_more_consistent():
     assert bias_shown(0.05, 0.05, 0.0, np.inf)[0] == 0.0
     shown, more = bias_shown(0.05, 0.04, 0.0, np.inf)
     assert shown == pytest.approx(-10.0 * more)
     assert bias_shown(0.05, 0.049, 0.0, np.inf)[0] == 0.0  # by less than a tenth
+    assert bias_shown(0.05, 0.04, 0.0, 0.3)[0] == pytest.approx(bias_shown(0.05, 0.04)[0])  # of others, all of it
     assert bias_shown(0.05, 0.04, 0.3, 0.3)[0] == pytest.approx(bias_shown(0.05, 0.04)[0])  # who is as soft, all of it
 
 

@@ -42,8 +42,9 @@ was constrained, hard hybrids follow rounding. One whose variance is many times
 what k misses along the actions shows it only if it is the more consistent. One
 that is less consistent than k where held out may be wrong itself, by up to a
 hundred times what it misses more: it shows what is beyond that, and nothing if
-it is far less consistent. And one that is more consistent by a tenth shows up
-to ten times what k misses more, however soft both are.
+it is far less consistent. And one that is more consistent by a tenth shows it
+however soft both are; if it is as soft as direct regression, whose bias towards
+the actions held-out actions do not show, up to ten times what k misses more.
 
 Residuals have the variance ``‖π‖² (σ² / ‖u‖² + κ²)`` under any constraint:
 noise of variance σ² turns the direction of a slow action, and people vary by
@@ -69,6 +70,7 @@ from ...training import Samples
 from ..solution import Judged
 from .candidate import Candidate
 from .constants import (
+    AS_DIRECT,
     BEYOND_CHANCE,
     COMPARED_STATES,
     FAR_MORE_CONSISTENT,
@@ -290,8 +292,8 @@ class Comparison:
         Each is wrong by a multiple of what it misses more along the motion than the other.
         """
         gap, error = (each[one, other] for each in self._gaps)
-        if self._candidates[one].softness > self._candidates[other].softness:
-            return min(apart, -LEAST_HIDDEN * gap)
+        if (mine := self._candidates[one].softness) > self._candidates[other].softness:
+            return min(apart, -LEAST_HIDDEN * gap) if mine >= AS_DIRECT else apart
         if self._far_less_consistent(one, other):
             return 0.0
         chance = BEYOND_CHANCE * error if self._candidates[one].by_segments else 0.0

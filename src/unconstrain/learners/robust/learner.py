@@ -25,7 +25,7 @@ from .belief import solution, weak_prior
 from .candidate import Candidate
 from .choice import Comparison
 from .consistent import by_segments, noise_corrected
-from .constants import LEAST_EXPLAINED, LEAST_INFORMATIVE, LEAST_MISFIT, LONG
+from .constants import AS_DIRECT, LEAST_EXPLAINED, LEAST_INFORMATIVE, LEAST_MISFIT, LONG
 from .held_out import held_out_together
 from .kinematics import Jacobian, with_jacobian
 from .likelihood import free_probability, maximise
@@ -359,7 +359,7 @@ class Robust(_Maximising):
             if _trivial(views[name]):
                 break
             one = Robust().compared(views[name], training).best
-            soft = np.inf if one.softness >= 1.0 else 0.0
+            soft = np.inf if one.softness >= AS_DIRECT else 0.0
             best[name] = replace(one, name=name, softness=soft, by_segments=False)
             if name == usual:
                 coarser = {one: best[one] for one in _simplest(_compared(best, views), list(best))}
