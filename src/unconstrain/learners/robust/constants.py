@@ -199,7 +199,7 @@ Policies by segments are right or wrong for a demonstration at a time: of them o
 """
 
 AS_DIRECT = 1.0
-"""Policies of this softness and more are as soft as direct regression: the standard risk weighs as the inconsistency."""
+"""Policies of this softness or more count as direct regression: the standard risk weighs as much as the error."""
 
 SHARE_OF_JACKKNIFE = 0.5
 """Of the jackknife's variance, which explains the distance of two candidates: it is biased upwards (Efron, Stein 1981).
