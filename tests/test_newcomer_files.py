@@ -481,7 +481,7 @@ def test_rest_at_both_ends_is_told_with_the_still_that_trims_it(tmp_path, before
     assert bool(told) == bool(after)
     head = "t,x [mm],y [mm],z [mm]"
     more = [write(tmp_path / f"{k}.csv", head, rounds(before, after) * [1.0, 1.1, k, 1.0]) for k in (1, 2)]
-    noted = "nothing odd: ready to learn from (rest is noted below)."
+    noted = "nothing odd: ready to learn from (rest is noted)."
     assert (noted in text(call("inspect", path, *more, "--state", "x,y,z", "--differentiate"))) == bool(before + after)
     if told:
         kept = uc.prepare(uc.read(path), uc.Recipe(("x", "y", "z"), differentiate="savgol", still=float(told[1])))[0]

@@ -443,7 +443,7 @@ def of_surveys(surveys: Sequence[Any], needed: str = "", then: str = "unconstrai
         return Verdict(Mark.DOUBTFUL, f"{count}, nothing odd, but fit needs to know more.", doubt=fewer, next=guess)
     if not warned:
         gaps = " but gaps in time, which nothing is smoothed across" * bool(odd)
-        rest = " (rest is noted below)" * any(one.code == "rest" for found in surveys for one in found.notes)
+        rest = " (rest is noted)" * any(one.code == "rest" for found in surveys for one in found.notes)
         said = f"{count}, nothing odd{gaps}: ready to learn from{rest}."
         return Verdict(Mark.DOUBTFUL if few else Mark.GOOD, said, doubt=fewer, next=then)
     cures = "Read the notes below; each names its cure."
