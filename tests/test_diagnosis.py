@@ -343,9 +343,10 @@ def test_what_fit_and_diagnose_call_told_is_told(variance, kind, seed):
         widest = uc.LocallyLinearPolicy(None, learner="direct").fit_demonstrations(demos).variance_
         narrow = policy.variance_ != widest  # one model is too stiff, and one or two are in narrow fields
         assert told > 0.5 or narrow or missed > 0.2, "what is wrong by more may be told less"
-        assert fit.mark is not verdicts.Mark.BAD
+        little, fair = told < verdicts.PARTLY, policy.held_out_score() < verdicts.GOOD
+        assert (fit.mark is verdicts.Mark.BAD) == (little and fair)
         assert ("across" in fit.said) == (told < WELL)
-        assert whole.mark is not verdicts.Mark.BAD
+        assert little or whole.mark is not verdicts.Mark.BAD
         hangs = "whichever two are left out: it may hang on one or two" in whole.said
         assert hangs == (told >= verdicts.PARTLY > found.states_determined)
     else:

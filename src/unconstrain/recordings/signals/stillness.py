@@ -36,6 +36,9 @@ HALVES, SUDDEN = 2.0, 5.0
 """Means of both halves of a rest are nearer than so many standard errors of their difference. Who sets off suddenly is
 so many standard deviations of the noise away in half the time of the shortest stop."""
 
+SHORTER = 60
+"""Lengths of a rest that are tried, from the longest to the shortest."""
+
 LOUD, RISE, FINEST = 0.25, 0.7, 0.02
 """A stop is seen where noise is below the first share of usual movement, and begins and ends at the second share, near
 it. Noise counts as the third share at least.
@@ -128,13 +131,15 @@ def _standing(values: Array, shortest: int) -> int:
     if len(values) < 4 * shortest or not least:
         return 0
     noise, place = _noise(values), np.median(values[:least], axis=0)
-    off: NDArray[np.bool_] = np.asarray((np.abs(values - place) > NOISE * noise).any(axis=1))
+    off = np.zeros(len(values), dtype=bool)
+    for column, at, least_off in zip(values.T, place, NOISE * noise, strict=True):
+        off |= np.abs(column - at) > least_off
     gone = np.flatnonzero(off & np.append(off[1:], True))
     left = int(gone[0]) if len(gone) else len(values)
     usual, chance = float(np.linalg.norm(_usual(values, shortest))), 2.0 * HALVES * float(np.linalg.norm(noise))
     if left > 3 * len(values) // 4 or chance / np.sqrt(shortest) > LOUD * usual:
         return 0
-    for rows in range(left, least - 1, -1):
+    for rows in np.geomspace(max(left, 1), least, SHORTER).astype(int).tolist() if left >= least else []:
         halves = values[: rows // 2].mean(axis=0) - values[rows // 2 : rows].mean(axis=0)
         if np.linalg.norm(halves) <= max(chance / np.sqrt(rows), SLOW * FINEST * usual):
             away = np.linalg.norm(values[rows : rows + least].mean(axis=0) - place)
