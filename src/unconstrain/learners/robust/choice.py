@@ -292,7 +292,10 @@ class Comparison:
         Each is wrong by a multiple of what it misses more along the motion than the other.
         """
         gap, error = (each[one, other] for each in self._gaps)
-        if (mine := self._candidates[one].softness) > self._candidates[other].softness:
+        mine, its = self._candidates[one].softness, self._candidates[other].softness
+        if mine < 0.0 <= its:  # who knows the Jacobian was compared before
+            return apart
+        if mine > its:
             return min(apart, -LEAST_HIDDEN * gap) if mine >= AS_DIRECT else apart
         if self._far_less_consistent(one, other):
             return 0.0

@@ -23,7 +23,7 @@ from ..readers.clocks import usual
 from ..remarks import Remark
 from ..signals.jumps import glitches, repaired, seams
 from ..signals.smoothing import LEAST, kalman_velocities, white_noise
-from ..signals.stillness import pauses, rest_at_ends
+from ..signals.stillness import pauses, rest_at_start
 from .continuity import continuous
 from .decisions import decide
 from .plausibility.checks import examine, is_irregular
@@ -436,10 +436,8 @@ def _split(piece: _Piece, recipe: Recipe) -> list[_Piece]:
     cuts = set((np.flatnonzero(np.diff(piece.times) > _longest(piece.times, recipe.max_gap_s)) + 1).tolist())
     if recipe.seams == "cut":
         cuts |= set(seams(piece.states))
-    still = []
-    if recipe.pauses == "drop":
-        interval = _typical(piece.times) if len(piece.times) > 1 else 0.0
-        still = [(0, rest_at_ends(piece.states, interval)[0]), *pauses(piece.states)]
+    drop = recipe.pauses == "drop"
+    still = [(0, rest_at_start(piece.states, _typical(piece.times))), *pauses(piece.states)] if drop else []
     bounds = sorted(cuts | {0, len(piece.times)} | {row for pause in still for row in pause})
     return [
         piece.at(slice(start, stop))

@@ -104,21 +104,29 @@ def stops(values: Array, shortest: int) -> list[tuple[int, int]]:
     return _left(found, values, LEFT * np.ptp(values, axis=0))
 
 
+def rest_at_start(values: Array, interval: float = 0.0) -> int:
+    """Rows (T, n) before the start in which nothing moves; arguments as of :func:`rest_at_ends`."""
+    first = _standing(values, _lengths(values, interval)[0])
+    return first if first and first + _rest_at_end(values, interval) < len(values) else 0
+
+
 def rest_at_ends(values: Array, interval: float = 0.0) -> tuple[int, int]:
-    """Rows (T, n) at the start and at the end in which nothing moves, where movement starts, or ends, as suddenly.
+    """Rows (T, n) before the start, and after an end that is sudden, in which nothing moves.
 
     Parameters
     ----------
     values : ndarray, shape (T, n)
     interval : float
-        Seconds between rows; 0 where it is not known.
+        Seconds between rows; 0 or NaN where it is not known.
     """
-    known = 0.0 < interval <= SHORTEST_STOP_S / STOP_ROWS
-    lengths = [round(share * SHORTEST_STOP_S / interval) for share in LONGER] if known else [max(20, len(values) // 10)]
-    first = _standing(values, lengths[0])
-    # Who comes to a goal slows down for longer than the shortest stop.
-    last = max(_rest_at_start(values[::-1], rows, lengths[0]) for rows in lengths)
+    first, last = _standing(values, _lengths(values, interval)[0]), _rest_at_end(values, interval)
     return (first, last) if first + last < len(values) else (0, 0)
+
+
+def _lengths(values: Array, interval: float) -> list[int]:
+    """Rows that a rest has at least, from few to many, as noise hides the shorter."""
+    known = 0.0 < interval <= SHORTEST_STOP_S / STOP_ROWS
+    return [round(share * SHORTEST_STOP_S / interval) for share in LONGER] if known else [max(20, len(values) // 10)]
 
 
 def _standing(values: Array, shortest: int) -> int:
@@ -147,7 +155,13 @@ def _standing(values: Array, shortest: int) -> int:
     return 0
 
 
-def _rest_at_start(values: Array, shortest: int, soon: int) -> int:
+def _rest_at_end(values: Array, interval: float) -> int:
+    """Rows (T, n) at the end in which nothing moves, if all does soon before them: who comes to a goal slows down."""
+    lengths = _lengths(values, interval)
+    return max(_rest(values[::-1], rows, lengths[0]) for rows in lengths)
+
+
+def _rest(values: Array, shortest: int, soon: int) -> int:
     """Rows (T, n) at the start, so many or more, in which nothing moves, if soon after, too, all does; 0 of others."""
     moved, runs, _ = _slow_runs(values, shortest, 0.9)  # many slow down all the way
     stop = next((last for first, last in runs if first == 0 and last < len(values)), 0)

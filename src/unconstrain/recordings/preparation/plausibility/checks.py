@@ -279,7 +279,7 @@ def stop(subject: Subject) -> Remark | None:
 
 
 def rest(subject: Subject) -> Remark | None:
-    """Standing still before the start, and after an end that is as sudden."""
+    """Standing still before the start, and after an end that is sudden."""
     if subject.recipe.still or not subject.moves:
         return None
     interval = 0.0 if subject.stamps is None else float(np.median(np.diff(subject.stamps)))
