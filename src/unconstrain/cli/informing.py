@@ -23,6 +23,9 @@ TOLD = "determined share of states"
 LOST = "explained less by guiding"
 """Note of the share of what a policy learnt from that it explains less as it is guided."""
 
+NOISE = "missed for noise alone"
+"""Note of what noise of the recorded actions alone lets a policy miss, as a share of a typical action."""
+
 RAN = "from the same starts"
 """Note of size and pace of the policy's own movements over those of the demonstrations, in figures."""
 
@@ -88,7 +91,7 @@ def info(file: str, as_json: bool) -> None:
     A policy, guided or not, or a constraint.
     """
     held, notes = loaded(file, uc.Policy | uc.LearntConstraint | uc.Guided), uc.storage.load_notes(file)
-    inner = ("recipe", "units", "digests", MARK, MOVES, HELD_BY, SHOWN, WHERE, WOUND)
+    inner = ("recipe", "units", "digests", MARK, NOISE, MOVES, HELD_BY, SHOWN, WHERE, WOUND)
     rest = {name: value for name, value in notes.items() if name not in inner}
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held, notes), **rest}
     if as_json:
@@ -162,7 +165,7 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
 def _doubt(notes: Mapping[str, Any]) -> str:
     """What ``fit`` doubted of a policy that explains enough: how it moves, or else what it noted of recordings."""
     moves = notes.get(MOVES) or "it moves otherwise than was demonstrated"
-    kept = all(one.startswith("it keeps") for one in moves.split("; guided "))
+    kept = all(one.startswith(("it keeps", "it nearly keeps")) for one in moves.split("; guided "))
     return "its recordings are not all as they should be" if kept else f"run from the same starts, {moves}"
 
 
@@ -171,7 +174,8 @@ def _explained(held: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> uc.eval
     policy = innermost(held)
     count = len(policy.training_.split.fold_of) or uc.evaluation.diagnosis.ENOUGH
     shown = notes[TOLD] if isinstance(notes.get(TOLD), float) else None
-    return uc.evaluation.verdicts.of_explained(policy.held_out_score(), count, shown, lost=notes.get(LOST))
+    more = {"lost": notes.get(LOST), "noise": notes.get(NOISE) or 0.0}
+    return uc.evaluation.verdicts.of_explained(policy.held_out_score(), count, shown, **more)
 
 
 def doubted(policy: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> str:

@@ -175,6 +175,7 @@ class Judged(NamedTuple):
     training: float
     held_out: float
     lost: float | None = None
+    noise_alone: float | None = None
 
     def to_json(self) -> dict[str, Any]:
         """With None for what is not known."""
@@ -202,11 +203,12 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     count, samples, missed = _walked(moving, stream, usual)
     open_ = told is not None and told < uc.evaluation.verdicts.MOSTLY
     there = _least_known(policy, demos, stream.recipe) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
-    found = uc.evaluation.verdicts.of_explained(alone, count, told, there, 1.0 - missed, lost)
+    noise = uc.evaluation.metrics.missed_for_noise(policy, demos)
+    found = uc.evaluation.verdicts.of_explained(alone, count, told, there, 1.0 - missed, lost, noise)
     ran = retraced(found, moving, demos, stream.recipe, None, stream.first.units, False)
     cured = ran.verdict._replace(next=there) if there and found.next == there else ran.verdict
     verdict = uc.evaluation.diagnosis.about_recordings(cured, demos, stream.recipe, moving)
-    return Judged(as_noted(verdict), ran.medians, *ran[3:], count, samples, 1.0 - missed, held_out, lost)
+    return Judged(as_noted(verdict), ran.medians, *ran[3:], count, samples, 1.0 - missed, held_out, lost, noise)
 
 
 def as_noted(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.Verdict:

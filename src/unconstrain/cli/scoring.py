@@ -61,7 +61,8 @@ def score(
         planes = uc.evaluation.metrics.explained_in_planes(moving, demonstrations)
     known, under = learnt_from(learnt, notes, recordings), None if held is None else 1.0 - whole["ncpe"]
     seen = None if known is None else len(known)
-    judged = verdicts.of_score(whole["explains"], len(demonstrations), under, seen, notes.get(TOLD))
+    noise = uc.evaluation.metrics.missed_for_noise(moving, _fast(demonstrations) or demonstrations)
+    judged = verdicts.of_score(whole["explains"], len(demonstrations), under, seen, notes.get(TOLD), noise)
     judged = judged if whole["fast"] >= LEAST else verdicts.TOO_SLOW
     judged = verdicts.of_worst(judged, {one["demonstration"]: one["explains"] for one in rows if one["fast"] >= LEAST})
     judged = judged if held is not None else verdicts.of_planes(judged, planes, _motion(demonstrations))
@@ -119,15 +120,20 @@ def _moved(moving: Any, demonstrations: list[uc.Demonstration]) -> tuple[list[uc
 
 
 def _scores(moving: Any, held: Any, of: Sequence[uc.Demonstration], name: str) -> dict[str, Any]:
-    slow = [0.0 if one.noise is None else uc.evaluation.metrics.TURNED**2 * (one.noise**2).mean() for one in of]
-    kept = [(one.actions**2).sum(axis=1) >= least for one, least in zip(of, slow, strict=True)]
-    fast = [one[rows] for one, rows in zip(of, kept, strict=True) if rows.any()]
+    fast = _fast(of)
     count = sum(map(len, fast))
     found = {"demonstration": name, "samples": sum(map(len, of)), "fast": count}
     found |= {"explains": explained(moving, fast if count >= LEAST else of), "ninc": None}
     with suppress(InvalidDataError):  # constant actions have no variance to normalise by
         found["ninc"] = uc.ninconsistency(moving, of)
     return found if held is None else found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(moving, of, held)}
+
+
+def _fast(of: Sequence[uc.Demonstration]) -> list[uc.Demonstration]:
+    """What of each is faster than so many times its noise as turn a direction, where any is."""
+    slow = [0.0 if one.noise is None else uc.evaluation.metrics.TURNED**2 * (one.noise**2).mean() for one in of]
+    kept = [(one.actions**2).sum(axis=1) >= least for one, least in zip(of, slow, strict=True)]
+    return [one[rows] for one, rows in zip(of, kept, strict=True) if rows.any()]
 
 
 def _motion(demonstrations: Sequence[uc.Demonstration]) -> Any:

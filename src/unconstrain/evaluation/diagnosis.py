@@ -41,6 +41,11 @@ if TYPE_CHECKING:
     from ..policies import Policy
 
 
+TOGETHER, ALIKE = 0.1, 0.7
+"""Places within the first share of the extents of all, in each column, with directions of motion of at least such a
+cosine, within 45°, are one: who records there again moves through both."""
+
+
 class Place(NamedTuple):
     """Where a sample is: its demonstration, its number in it, counted from one, and its time in seconds, if known.
 
@@ -164,7 +169,7 @@ class Diagnosis:
     undecided_share : float
         Estimated share of samples that were free or always held in the same way: the data cannot tell.
     regions : tuple of Region
-        All, by decreasing undetermined spread.
+        All, by decreasing undetermined spread along their directions.
     movements : tuple of Movement
         Each demonstration.
     suspects : tuple of Place
@@ -371,11 +376,10 @@ def _regions(
     nearest = fields.weights(seen).argmax(axis=1)
     centres = enumerate(embedding.states(fields.centres))
     found = [(centre, rows) for index, centre in centres if len(rows := np.flatnonzero(nearest == index))]
-    found.sort(key=lambda one: -undetermined[one[1]].max())
     worst = [int(rows[undetermined[rows].argmax()]) for _, rows in found]
     directions, along = _least_determined(policy, states[worst])
     names, noise = names_of(demos), policy.solution_.noise
-    return tuple(
+    every = (
         Region(
             _numbers(centre),
             len(rows),
@@ -390,6 +394,19 @@ def _regions(
         )
         for (centre, rows), row, direction, size in zip(found, worst, directions, along, strict=True)
     )
+    return tuple(sorted(every, key=lambda one: -one.along))
+
+
+def places(regions: Sequence[Region]) -> list[Region]:
+    """Regions by decreasing spread, without those that one before tells of: as near as :data:`TOGETHER`, moved alike."""
+    states, ways = (np.array([getattr(one, name) for one in regions]) for name in ("state", "direction"))
+    wide = np.maximum(np.ptp(states, axis=0), 1e-300)
+    kept: list[int] = []
+    for row, (state, way) in enumerate(zip(states, ways, strict=True)):
+        near = (np.abs(states[kept] - state) <= TOGETHER * wide).all(axis=1)
+        if not (near & (np.abs(ways[kept] @ way) >= ALIKE)).any():
+            kept.append(row)
+    return [regions[row] for row in kept]
 
 
 def _moved(speeds: Array, groups: NDArray[np.intp], least: float) -> list[int]:

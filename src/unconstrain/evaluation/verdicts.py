@@ -33,6 +33,9 @@ MORE = (
 )
 """What helps against too few demonstrations."""
 
+TOO_MUCH = 1.2
+"""So many times what a policy misses are no noise, whatever an estimate of it says."""
+
 TOO_SLOW = Verdict(
     Mark.DOUBTFUL, "Too slow to be judged: all is below ten times its noise.", next="Score faster motion."
 )
@@ -40,6 +43,14 @@ TOO_SLOW = Verdict(
 
 def _explains(share: float, what: str = "held-out motion") -> str:
     return f"explains {percent(share)} of {what}" if share >= -1 else f"misses {what} by more than that motion itself"
+
+
+def _misses(share: float, noise: float) -> str:
+    """What is left of a share of motion, as one of a typical action, and how much of it noise makes, if believable."""
+    missed = np.sqrt(max(1.0 - share, 0.0))
+    said = f"misses {percent(missed)} of a typical action"
+    known = 0.005 <= noise <= TOO_MUCH * missed  # more is constraints that change at every sample, not noise
+    return f"{said} (noise in the recorded actions alone: {percent(min(noise, missed))} or more)" if known else said
 
 
 def _advice(word: str, learnt: float, spoilt: bool) -> str:
@@ -74,13 +85,15 @@ def of_explained(
     there: str = "",
     learnt: float = 0.0,
     lost: float | None = None,
+    noise: float = 0.0,
 ) -> Verdict:
     """Judge how much of held-out motion a policy explains, along the motion.
 
     ``share`` is 1 − the share left unexplained, NaN where nothing could be held out; fewer than three demonstrations
     give no verdict. ``determined`` is the share of the recorded states at which recordings tell the policy, and
     ``there`` what to record where fewer show it. ``learnt`` is the share of what was learnt from, and ``lost`` what
-    guiding takes of that, None where it is not guided: a guided policy is judged by the one in it, or worse.
+    guiding takes of that, None where it is not guided: a guided policy is judged by the one in it, or worse. ``noise``
+    is what is missed for noise of the actions alone, as a share of a typical one.
     """
     across, little = "What constraints hid: no recording shows it, so no score does.", ""
     (alone, word), (mark, _) = (graded(each, told=determined) for each in (share, share - (lost or 0.0)))
@@ -98,7 +111,7 @@ def of_explained(
         seen = f"The policy {_explains(share)}, but no" if np.isfinite(share) else "No"
         few = f"{seen} verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
         return Verdict(Mark.DOUBTFUL, few + retold, doubt=across, next=MORE)
-    missed = f"where the policy predicts, it misses {percent(np.sqrt(max(1 - share, 0)))} of a typical action"
+    missed = f"where the policy predicts, it {_misses(share, noise)}"
     advice = f"{_advice(word, learnt, mark is not alone)} {there}".rstrip()
     if little:
         advice = there or "'unconstrain diagnose' says what to record."
@@ -108,13 +121,19 @@ def of_explained(
 
 
 def of_score(
-    share: float, demonstrations: int, under: float | None = None, learnt: int | None = None, told: float | None = None
+    share: float,
+    demonstrations: int,
+    under: float | None = None,
+    learnt: int | None = None,
+    told: float | None = None,
+    noise: float = 0.0,
 ) -> Verdict:
     """Judge how much of recordings that were not learnt from a policy explains; one is enough to see it fail.
 
     ``under`` is the same under their constraint, 1 − nCPE, where that is known: then the smaller one is judged. Of
     ``learnt`` of them, where that is known, the policy learnt; ``told`` is as ``determined`` in :func:`of_explained`,
-    and makes any score doubtful where it is small: under the constraint given, too, others are not told.
+    and makes any score doubtful where it is small: under the constraint given, too, others are not told. ``noise`` is as
+    there.
     """
     mark, word = graded(share if under is None else min(share, under), told=told, under=under is not None)
     few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
@@ -134,7 +153,8 @@ def of_score(
     across += ". Only motion along the recorded actions is judged; what held these recordings, given with --plane or "
     across += "--constraint (one by one, if each was held in its own way), tells more: all directions that were free."
     said, good = f"The policy {_explains(share)}{known}{unknown}: {word}.", mark is Mark.GOOD
-    trust = "" if mark is Mark.BAD else "Movement like this, along the directions that were recorded."
+    where = f"Movement like this, along the directions that were recorded, of which it {_misses(share, noise)}."
+    trust = "" if mark is Mark.BAD else where
     then = f"Score it under other constraints.{few}" if good else "'unconstrain diagnose' says what to record."
     return Verdict(mark, said, trust, across if under is None else more, then)
 
@@ -363,7 +383,8 @@ def moves(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> tuple[st
 
     ``extents`` and ``paces`` are size and turns of each run over those of its demonstration, NaN where there are none,
     and ``lasts`` the size of the last round over that of the first, over the same.
-    Half of them may be off by :data:`OTHERWISE` either way, whatever the mean is, and none by :data:`FAR_OFF`.
+    Half of them may be off by :data:`OTHERWISE` either way, whatever the mean is, and none by :data:`FAR_OFF`; where
+    any is, size and pace are nearly kept.
     """
     measured, many = _measured(extents, paces, lasts), len(extents)
     goes = ("go round" if many > 1 else "goes round") if "pace" in measured else f"turn{'s' * (many == 1)} out"
@@ -375,8 +396,9 @@ def moves(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> tuple[st
             who = f"{len(wrong)} of {many} " if many > 1 else "it " * (not said)
             said.append(who + f"{goes} " * (not said) + " or ".join(way for rows, way in ways if rows.any()))
             strays.append(name.replace(LAST, "size"))
-    kept = " and ".join(name for name in measured if name != LAST)
-    return (" and ".join(said) if said else f"it keeps {kept}" * bool(kept)), [*dict.fromkeys(strays)]
+    kept, off_ = " and ".join(name for name in measured if name != LAST), _off(measured, many)
+    keeps = f"it nearly keeps {kept} ({off_})" if off_ else f"it keeps {kept}"
+    return (" and ".join(said) if said else keeps * bool(kept)), [*dict.fromkeys(strays)]
 
 
 def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = (), of: str = "", apart: str = "") -> str:
@@ -384,10 +406,15 @@ def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = (), of:
     measured, many = _measured(extents, paces, lasts), len(extents)
     told = ", ".join(f"{name} {_times(ratios)}" for name, (ratios, _) in measured.items())
     runs = f" (in brackets, least to most of {many} runs)" if "(" in told else ""
+    which = f"; {_off(measured, many) or f'none more than {OTHERWISE - 1:.0%} off'}" * (many > 1)
+    return f"{of}{told} the demonstrated{runs}, typically {apart} from the recorded path{which}" if told else ""
+
+
+def _off(measured: Mapping[str, tuple[Array, Array]], many: int) -> str:
+    """How many runs are off by more than :data:`OTHERWISE`, and in what; empty where none is."""
     counts = {name: int((by > np.log(OTHERWISE)).sum()) for name, (_, by) in measured.items()}
     off = ", ".join(f"{name} of {count} of {many}" for name, count in counts.items() if count)
-    which = f"; more than {OTHERWISE - 1:.0%} off: {off}" if many > 1 and off else ""
-    return f"{of}{told} the demonstrated{runs}, typically {apart} from the recorded path{which}" if told else ""
+    return f"more than {OTHERWISE - 1:.0%} off: {off}" * bool(off)
 
 
 def _measured(*given: Sequence[float] | Array) -> dict[str, tuple[Array, Array]]:

@@ -88,7 +88,7 @@ def _tiles(found: Diagnosis, demos: list[Demonstration]) -> html.Markup:
 def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], actions: Sequence[str]) -> html.Markup:
     """Two state columns, coloured by the undetermined spread."""
     recorded = stack(demos).states
-    regions = found.regions[:MOST_REGIONS]
+    regions = diagnosis.places(found.regions)[:MOST_REGIONS]
     worst = np.array([region.state for region in regions])
     if recorded.shape[1] == 1:
         recorded, worst = (np.column_stack([one, np.zeros(len(one))]) for one in (recorded, worst))
@@ -113,7 +113,8 @@ def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], ac
 
 
 def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> html.Markup:
-    shown = found.regions[:MOST_REGIONS]
+    every = diagnosis.places(found.regions)
+    shown = every[:MOST_REGIONS]
     rows = [
         [
             str(number),
@@ -132,7 +133,7 @@ def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> ht
     around, along = (", ".join(names) for names in (states, actions))
     header = ["", f"demonstrate around\n({around})", f"with motion left free along\n({along})", "recorded in"]
     header += ["spread\nalong it", "spread in\nthe region", "told\nby all", "by three", "moved\nalong it by", "samples"]
-    note = html.words("diagnosis_next", shown=len(shown), every=len(found.regions))
+    note = html.words("diagnosis_next", shown=len(shown), every=len(every), regions=len(found.regions))
     return html.table(header, rows, left=4, note=note)
 
 

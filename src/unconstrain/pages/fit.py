@@ -13,7 +13,7 @@ from ..base.arrays import Array
 from ..base.display import counted_off, innermost, listening, percent
 from ..base.errors import InvalidDataError, SettingError
 from ..constraints import Plane
-from ..evaluation import diagnosis, ncpe, ninconsistency, nupe, verdicts
+from ..evaluation import diagnosis, metrics, ncpe, ninconsistency, nupe, verdicts
 from ..learners import named
 from ..motion import Guided, rollout
 from ..recordings import Demonstration, Recipe, stack
@@ -36,6 +36,9 @@ ARROWS = 15
 
 FOLDS, MOST_REFITTED = 5, 5000
 """Demonstrations are held out in so many parts, where there are no more samples than the second."""
+
+SLIGHT = 0.1
+"""Demonstrations of less motion than this share of the usual one are compared by that."""
 
 TILT = 20.0
 """Of the new plane against the recorded motion, degrees."""
@@ -74,14 +77,15 @@ def policy_page(
     us = list(actions or (f"action {index + 1}" for index in range(d)))
     learner, held_out = named(policy.learner), _held_out(policy, demos)
     lost = diagnosis.lost_by_guiding(moving, demos)
-    found = verdicts.of_explained(policy.held_out_score(), len(demos), diagnosis.states_told(policy), lost=lost)
+    more = {"lost": lost, "noise": metrics.missed_for_noise(policy, demos)}
+    found = verdicts.of_explained(policy.held_out_score(), len(demos), diagnosis.states_told(policy), **more)
     judged = retraced(found, moving, demos, made, None, known)
     parts = [
         *([html.section("Guided", html.paragraph(moving.aim_.promise))] if isinstance(moving, Guided) else []),
         *_replays(judged.runs, judged.in_figures, xs),
         html.section("The demonstrations", _movements(moving, demos, xs)),
         *_reproduced(moving, demos, xs),
-        html.section("Predicted and observed actions", _actions(policy, demos, us)),
+        html.section("Predicted and observed actions", _actions(policy, demos, us, held_out)),
         html.section("Errors and support", _errors(policy, demos, held_out)),
     ]
     if policy.solution_.belief is not None:
@@ -97,12 +101,12 @@ def _lead(policy: Policy, learner: str, states: Sequence[str], actions: Sequence
     return html.words("fit_lead", **named, states=", ".join(states), actions=", ".join(actions))
 
 
-def _held_out(policy: Policy, demos: list[Demonstration]) -> list[float] | None:
-    """What each demonstration, with others, left unexplained while it was held out; None where that takes too long."""
+def _held_out(policy: Policy, demos: list[Demonstration]) -> list[Array] | None:
+    """What is predicted of each demonstration while it was held out with others; None where that takes too long."""
     count = min(FOLDS, len(demos))
     if count < 2 or sum(map(len, demos)) > MOST_REFITTED:
         return None
-    found, again = [float("nan")] * len(demos), copy(policy)
+    found, again = [demo.actions for demo in demos], copy(policy)
     if hasattr(again, "fields_"):  # as wide as was chosen
         again.variance = again.variance_
     for fold in counted_off(range(count), "report: learning again, each time without some demonstrations:"):
@@ -110,8 +114,16 @@ def _held_out(policy: Policy, demos: list[Demonstration]) -> list[float] | None:
         with listening(lambda *_: None):  # their own steps would look as if the policy were learnt anew
             learnt = again.fit_demonstrations(rest)
         for index in range(fold, len(demos), count):
-            found[index] = _or_nan(ninconsistency, learnt, [demos[index]])
+            found[index] = learnt(demos[index].states)
     return found
+
+
+def _worst(demos: list[Demonstration], predicted: list[Array]) -> list[int]:
+    """Numbers of demonstrations, that of which predictions explain least first; what hardly moves comes last."""
+    usual = float(np.sqrt((stack(demos).actions ** 2).sum(axis=1).mean()))
+    both = [metrics.along_motion(lambda _, at=at: at, one, usual) for one, at in zip(demos, predicted, strict=True)]
+    missed, motion = np.array(both).T
+    return np.argsort(-missed / np.maximum(motion, SLIGHT * motion.mean() + 1e-300), kind="stable").tolist()
 
 
 def _summary(policy: Policy, demos: list[Demonstration]) -> html.Markup:
@@ -219,8 +231,11 @@ def _field(policy: Policy | Guided, demos: list[Demonstration], names: Sequence[
     )
 
 
-def _actions(policy: Policy, demos: list[Demonstration], names: Sequence[str]) -> html.Markup:
-    shown = demos[:MOST_PANELS]
+def _actions(
+    policy: Policy, demos: list[Demonstration], names: Sequence[str], held_out: list[Array] | None
+) -> html.Markup:
+    order = _worst(demos, held_out or [policy(demo.states) for demo in demos])
+    shown = [demos[index] for index in (order if len(demos) > MOST_PANELS else range(len(demos)))][:MOST_PANELS]
     panels = []
     for demo in map(_thin, shown):
         predicted = policy(demo.states)
@@ -230,42 +245,38 @@ def _actions(policy: Policy, demos: list[Demonstration], names: Sequence[str]) -
     return html.picture(
         "actions",
         panels,
-        html.words("fit_actions", shown=len(shown), every=len(demos)),
+        html.words("fit_actions", shown=len(shown), every=len(demos), held_out=held_out is not None),
         keys=("observed", "hybrid", "direct"),
         labels={"observed": "observed", "hybrid": "learnt policy", "direct": "along the observed motion"},
     )
 
 
-def _errors(policy: Policy, demos: list[Demonstration], held_out: list[float] | None) -> html.Markup:
+def _errors(policy: Policy, demos: list[Demonstration], held_out: list[Array] | None) -> html.Markup:
     known = all(demo.truth is not None for demo in demos)
-    support = _support(policy, demos)
-    header = ["demonstration", "samples", "explained\nheld out", "explained\nlearnt from"]
+    support, learnt = _support(policy, demos), [policy(demo.states) for demo in demos]
+    header = ["demonstration", "samples", *["explained\nheld out"] * (held_out is not None), "explained\nlearnt from"]
     header += ["nCPE", "nUPE"] if known else []
     header += ["median\nsupport", "least\nsupport"] if support is not None else []
 
-    def cells(name: str, of: list[Demonstration], missed: float, near: Array | None) -> list[str]:
-        row = [name, str(sum(map(len, of))), *map(_share, (missed, _or_nan(ninconsistency, policy, of)))]
+    def cells(name: str, rows: Sequence[int]) -> list[str]:
+        of = [demos[row] for row in rows]
+        row = [name, str(sum(map(len, of)))]
+        row += [_share(of, np.concatenate([each[k] for k in rows])) for each in (held_out, learnt) if each is not None]
         row += [html.number(_or_nan(metric, policy, of)) for metric in (ncpe, nupe) if known]
+        near = None if support is None else np.concatenate([support[k] for k in rows])
         return row if near is None else [*row, html.number(float(np.median(near))), html.number(float(near.min()))]
 
-    shown, none = demos[:MOST_ROWS], float("nan")
-    rows = [
-        cells(
-            demo.name or f"demonstration {index + 1}",
-            [demo],
-            none if held_out is None else held_out[index],
-            None if support is None else support[index],
-        )
-        for index, demo in enumerate(shown)
-    ]
-    rows.append(cells("all", demos, none, None if support is None else np.concatenate(support)))
+    every = range(len(demos))
+    shown = every if len(demos) <= MOST_ROWS else sorted(_worst(demos, held_out or learnt)[:MOST_ROWS])
+    rows = [cells(demos[index].name or f"demonstration {index + 1}", [index]) for index in shown]
     words = {"support": support is not None, "truth": known, "held_out": held_out is not None}
     note = html.words("fit_errors", shown=len(shown), every=len(demos), **words)
-    return html.table(header, rows, note=note, rules=(len(shown),))
+    return html.table(header, [*rows, cells("all", every)], note=note, rules=(len(shown),))
 
 
-def _share(missed: float) -> str:
-    return "–" if not np.isfinite(missed) else f"{1.0 - missed:.1%}" if missed < 2.0 else "none"
+def _share(of: list[Demonstration], predicted: Array) -> str:
+    missed, motion = metrics.along_motion(lambda _: predicted, of)
+    return "–" if motion == 0.0 else f"{1.0 - missed / motion:.1%}" if missed < 2.0 * motion else "none"
 
 
 def _determined(policy: Policy) -> html.Markup:
