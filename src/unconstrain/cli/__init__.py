@@ -82,6 +82,14 @@ def main() -> None:
     unconstrain constraint *.csv -o held.npz      learn what held them
     unconstrain info policy.npz                   what it is, and of what
 
+    \b
+    Exit codes:
+      0    done, whatever the verdict says; scripts read it with --json, verdict.mark: good, doubtful or bad
+      1    a fault of this program
+      2    cannot be done; or --strict, and recordings are not as they seem
+      3    certify: nothing is guaranteed
+      130  interrupted
+
     Completion by the tab key, here for bash (or zsh, fish):
 
     \b

@@ -11,6 +11,7 @@ import unconstrain as uc
 
 from ..base.display import unit_of
 from ..base.errors import ModelFileError
+from .endings import NOT_GUARANTEED
 from .printing import option_for_json, say_judged
 from .reading import loaded
 
@@ -24,8 +25,8 @@ from .reading import loaded
 def certify(policy: str, seed: int, as_json: bool) -> None:
     """Say what is guaranteed of the motion of POLICY.
 
-    By what margin, where and under which constraints. Exits with 1 where it is not, with a start, and a plane, from
-    which it does not arrive.
+    By what margin, where and under which constraints. Where nothing is, the exit code is 3, and a start, and a plane, are
+    named from which it does not arrive.
     """
     import numpy as np
 
@@ -40,7 +41,7 @@ def certify(policy: str, seed: int, as_json: bool) -> None:
     start, normal = (None if one is None else one.tolist() for one in (found.start, found.normal))
     say_judged(_judged(policy, found), {}, as_json, holds=found.holds, start=start, normal=normal)
     if not found.holds:
-        raise SystemExit(1)
+        raise SystemExit(NOT_GUARANTEED)
 
 
 def _judged(policy: str, found: uc.motion.certificate.Certificate) -> uc.evaluation.verdicts.Verdict:
