@@ -76,14 +76,13 @@ def diagnose(
         click.echo(f"report: {report}", err=as_json)
 
 
-def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequence[str], unit: str, verbose: bool) -> None:
+def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequence[str], unit: str, all_: bool) -> None:
     for line in uc.evaluation.diagnosis.sentences(found, states, actions, unit):
         click.echo(line)
-    every = found.regions if verbose else uc.evaluation.diagnosis.places(found.regions)
-    shown = every if verbose else every[:MOST_ROWS]
-    what = f"places of largest undetermined spread, of {len(every)} ({len(found.regions)} regions, of which those near "
-    what = "regions of largest undetermined spread" if verbose else f"{what}each other and open alike are one)"
-    click.echo(f"\nThe {len(shown)} {what}, largest first:")
+    every = uc.evaluation.diagnosis.places(found.regions)
+    shown = found.regions if all_ else every[:MOST_ROWS]
+    which = f"{len(found.regions)} regions, of which those near each other and open alike are one place"
+    click.echo(f"\nThe {len(shown)} places of largest undetermined spread, of {len(every)} ({which}), largest first:")
     around, along = (" ".join(name.partition(" [")[0] for name in names) for names in (states, actions))
     head = [f"demonstrate\naround\n({around})", "in", "told", "by\nthree", "spread",
             f"leave free\n({along})", "shown\nby"]  # fmt: skip

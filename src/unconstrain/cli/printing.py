@@ -19,7 +19,7 @@ import unconstrain as uc
 from ..base.display import counted, innermost, listed, percent, unit_of
 from ..base.errors import InvalidDataError, ModelFileError, ReadError, SettingError, WriteError
 from .endings import REFUSED, ending
-from .reading import next_command, said_recipe, say_left
+from .reading import next_command, said_recipe, say_left, to_copy
 from .speaking import as_typed, meant_of
 from .terminal import plain_output
 
@@ -208,7 +208,8 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     ran = retraced(found, moving, demos, stream.recipe, None, stream.first.units, False)
     cured = ran.verdict._replace(next=there) if there and found.next == there else ran.verdict
     verdict = uc.evaluation.diagnosis.about_recordings(cured, demos, stream.recipe, moving)
-    return Judged(as_noted(verdict), ran.medians, *ran[3:], count, samples, 1.0 - missed, held_out, lost, noise)
+    verdict = to_copy(as_noted(verdict), policy=click.get_current_context().params["output"])
+    return Judged(verdict, ran.medians, *ran[3:], count, samples, 1.0 - missed, held_out, lost, noise)
 
 
 def as_noted(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.Verdict:

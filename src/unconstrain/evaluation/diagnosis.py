@@ -42,8 +42,7 @@ if TYPE_CHECKING:
 
 
 TOGETHER, ALIKE = 0.1, 0.7
-"""Places within the first share of the extents of all, in each column, with directions of motion of at least such a
-cosine, within 45°, are one: who records there again moves through both."""
+"""Within a tenth of the extents in each column, and 45° by its cosine, who records again moves through both places."""
 
 
 class Place(NamedTuple):
@@ -398,15 +397,13 @@ def _regions(
 
 
 def places(regions: Sequence[Region]) -> list[Region]:
-    """Regions by decreasing spread, without those that one before tells of: as near as :data:`TOGETHER`, moved alike."""
-    states, ways = (np.array([getattr(one, name) for one in regions]) for name in ("state", "direction"))
-    wide = np.maximum(np.ptp(states, axis=0), 1e-300)
-    kept: list[int] = []
-    for row, (state, way) in enumerate(zip(states, ways, strict=True)):
-        near = (np.abs(states[kept] - state) <= TOGETHER * wide).all(axis=1)
-        if not (near & (np.abs(ways[kept] @ way) >= ALIKE)).any():
-            kept.append(row)
-    return [regions[row] for row in kept]
+    """Regions by decreasing spread, without those that one before tells of: within :data:`TOGETHER`, moved alike."""
+    near = np.ptp([one.state for one in regions], axis=0) * TOGETHER + 1e-300
+    kept = list[Region]()
+    for one in regions:
+        by = [each for each in kept if (np.abs(np.subtract(each.state, one.state)) <= near).all()]
+        kept += [] if any(abs(np.dot(each.direction, one.direction)) >= ALIKE for each in by) else [one]
+    return kept
 
 
 def _moved(speeds: Array, groups: NDArray[np.intp], least: float) -> list[int]:

@@ -158,7 +158,8 @@ def along_motion(policy: PolicyLike, demonstrations: Demonstrations, usual: floa
     (4.0, 9.8)
     """
     demos = _listed(demonstrations)
-    return along(stack(demos).actions, _predicted(policy, demos), usual=usual, noise=_noises(demos))
+    noise = np.repeat([_noise(demo) for demo in demos], [len(demo) for demo in demos])
+    return along(stack(demos).actions, _predicted(policy, demos), usual=usual, noise=noise)
 
 
 def missed_for_noise(policy: PolicyLike, demonstrations: Demonstrations) -> float:
@@ -166,19 +167,13 @@ def missed_for_noise(policy: PolicyLike, demonstrations: Demonstrations) -> floa
 
     Root mean square, weighted as in :func:`along_motion`. It lengthens actions and turns them, which counts where
     ``policy`` moves across them.
-
-    Examples
-    --------
-    >>> demonstration = uc.Demonstration([[0.0, 0.0], [1.0, 1.0]], [[1.0, 0.0], [0.0, 1.0]], noise=0.05)
-    >>> round(uc.evaluation.metrics.missed_for_noise(lambda x: np.eye(2), demonstration), 3)
-    0.05
     """
     demos = _listed(demonstrations)
-    actions, predicted, noise = stack(demos).actions, _predicted(policy, demos), _noises(demos)
+    noise = np.repeat([_noise(demo) for demo in demos], [len(demo) for demo in demos])
+    actions, predicted = stack(demos).actions, _predicted(policy, demos)
     directions, lengths = unit_actions(actions)
-    across = ((predicted - project(action_projection(actions), predicted)) ** 2).sum(axis=1)
-    seen = np.sqrt(noise * (1.0 + across / np.maximum(lengths**2, 1e-300)))
-    missed, motion = along(actions, directions * (lengths - seen)[:, None], noise=noise)
+    turned = ((predicted - project(action_projection(actions), predicted)) ** 2).sum(axis=1) / lengths.clip(1e-150) ** 2
+    missed, motion = along(actions, actions - directions * np.sqrt(noise * (1.0 + turned))[:, None], noise=noise)
     return float(np.sqrt(missed / motion)) if motion > 0 else 0.0
 
 
@@ -338,11 +333,6 @@ def _constrained(demos: list[Demonstration], constraint: Constraint | None) -> A
         # N π rather than the observed u: noise on the actions is no error of the policy.
         return np.concatenate([project(d.truth.projections, d.truth.policy) for d in demos if d.truth is not None])
     return stack(demos).actions
-
-
-def _noises(demos: list[Demonstration]) -> Array:
-    """:func:`_noise` of each sample, (N,)."""
-    return np.repeat([_noise(demo) for demo in demos], [len(demo) for demo in demos])
 
 
 def _noise(demo: Demonstration) -> float:

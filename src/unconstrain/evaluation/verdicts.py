@@ -33,9 +33,6 @@ MORE = (
 )
 """What helps against too few demonstrations."""
 
-TOO_MUCH = 1.2
-"""So many times what a policy misses are no noise, whatever an estimate of it says."""
-
 TOO_SLOW = Verdict(
     Mark.DOUBTFUL, "Too slow to be judged: all is below ten times its noise.", next="Score faster motion."
 )
@@ -45,12 +42,12 @@ def _explains(share: float, what: str = "held-out motion") -> str:
     return f"explains {percent(share)} of {what}" if share >= -1 else f"misses {what} by more than that motion itself"
 
 
-def _misses(share: float, noise: float) -> str:
-    """What is left of a share of motion, as one of a typical action, and how much of it noise makes, if believable."""
-    missed = np.sqrt(max(1.0 - share, 0.0))
-    said = f"misses {percent(missed)} of a typical action"
-    known = 0.005 <= noise <= TOO_MUCH * missed  # more is constraints that change at every sample, not noise
-    return f"{said} (noise in the recorded actions alone: {percent(min(noise, missed))} or more)" if known else said
+def misses(share: float, noise: float) -> str:
+    """What is left of a share of motion, as one of a typical action, and what noise alone makes, if believable."""
+    said, missed = "misses {} of a typical action", float(np.sqrt(max(1.0 - share, 0.0)))
+    if 0.005 <= noise <= 1.2 * missed:  # more is constraints that change at every sample, not noise
+        said += f" (noise in the recorded actions alone: {percent(min(noise, missed))} or more)"
+    return said.format(percent(missed))
 
 
 def _advice(word: str, learnt: float, spoilt: bool) -> str:
@@ -68,7 +65,7 @@ def _advice(word: str, learnt: float, spoilt: bool) -> str:
         "in common.",
         "poor": "Look at the recordings ('unconstrain inspect'): columns, clocks or units may be wrong, or they have "
         "too little in common.",
-    }.get(word, "Score it on recordings that were held in other ways.")
+    }.get(word, "Score it on recordings that were held in other ways ('unconstrain score').")
 
 
 def of_untold(share: float) -> str:
@@ -111,7 +108,7 @@ def of_explained(
         seen = f"The policy {_explains(share)}, but no" if np.isfinite(share) else "No"
         few = f"{seen} verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
         return Verdict(Mark.DOUBTFUL, few + retold, doubt=across, next=MORE)
-    missed = f"where the policy predicts, it {_misses(share, noise)}"
+    missed = f"where the policy predicts, it {misses(share, noise)}"
     advice = f"{_advice(word, learnt, mark is not alone)} {there}".rstrip()
     if little:
         advice = there or "'unconstrain diagnose' says what to record."
@@ -121,19 +118,13 @@ def of_explained(
 
 
 def of_score(
-    share: float,
-    demonstrations: int,
-    under: float | None = None,
-    learnt: int | None = None,
-    told: float | None = None,
-    noise: float = 0.0,
+    share: float, demonstrations: int, under: float | None = None, learnt: int | None = None, told: float | None = None
 ) -> Verdict:
     """Judge how much of recordings that were not learnt from a policy explains; one is enough to see it fail.
 
     ``under`` is the same under their constraint, 1 − nCPE, where that is known: then the smaller one is judged. Of
     ``learnt`` of them, where that is known, the policy learnt; ``told`` is as ``determined`` in :func:`of_explained`,
-    and makes any score doubtful where it is small: under the constraint given, too, others are not told. ``noise`` is as
-    there.
+    and makes any score doubtful where it is small: under the constraint given, too, others are not told.
     """
     mark, word = graded(share if under is None else min(share, under), told=told, under=under is not None)
     few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
@@ -153,9 +144,9 @@ def of_score(
     across += ". Only motion along the recorded actions is judged; what held these recordings, given with --plane or "
     across += "--constraint (one by one, if each was held in its own way), tells more: all directions that were free."
     said, good = f"The policy {_explains(share)}{known}{unknown}: {word}.", mark is Mark.GOOD
-    where = f"Movement like this, along the directions that were recorded, of which it {_misses(share, noise)}."
-    trust = "" if mark is Mark.BAD else where
-    then = f"Score it under other constraints.{few}" if good else "'unconstrain diagnose' says what to record."
+    trust = "" if mark is Mark.BAD else "Movement like this, along the directions that were recorded."
+    other = "'unconstrain diagnose' says what to record."
+    then = f"Score it under other constraints ('unconstrain score').{few}" if good else other
     return Verdict(mark, said, trust, across if under is None else more, then)
 
 
@@ -294,7 +285,7 @@ def of_constraint(
         why = "each state was passed one way only, as by a free policy" if one_way else little
         then = "Record movements that cross each other, and learn it again; or name the --features."
         single = not others and not choice.several
-        then += " 'unconstrain diagnose' tells of several together which look held." * single
+        then += " 'diagnose' tells of several together which look held." * single
         said = f"Whether anything was held cannot be told{' by one demonstration alone' * single}: {why}."
         return Verdict(Mark.DOUBTFUL, said, doubt=f"That {min(ranks)} of {choice.actions} are held.", next=then)
     mark, word = graded(1.0 - missed)
@@ -305,7 +296,7 @@ def of_constraint(
         apart += f" (in some up to {max(ranks)} look so, as does a direction in which nobody moved)"
     undecided = " Positions do not decide it." if shown is False else ""
     said = f"{held}{apart}; {percent(missed)} of held-out motion is along them: {word}.{undecided}"
-    then = "Use it with 'unconstrain rollout --constraint' or 'score --constraint'."
+    then = "Use it with 'unconstrain score --constraint', or 'rollout --constraint'."
     if choice.several and not others and mark is not Mark.GOOD:
         said = f"If one constraint held all: {said}"
         then = "Learn it of each alone (--episodes, --leave-out): each may have been held otherwise, or not at all."
@@ -329,7 +320,7 @@ def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool) -> Verdict:
         keep = f"Positions may keep to {named.title}, which holds {more}; as it turns, velocities show less of it."
         return found._replace(said=f"{found.said} {keep}")
     said = f"{more} directions were held, by {named.title}. It turns on the way, so velocities alone show {rank}"
-    then = "Use it with 'unconstrain rollout --constraint', which follows the mechanism."
+    then = "Use it with 'unconstrain score --constraint', or 'rollout --constraint', which follow the mechanism."
     return found._replace(said=said + found.said.partition(" directions were held")[2], next=then)
 
 
@@ -396,9 +387,9 @@ def moves(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> tuple[st
             who = f"{len(wrong)} of {many} " if many > 1 else "it " * (not said)
             said.append(who + f"{goes} " * (not said) + " or ".join(way for rows, way in ways if rows.any()))
             strays.append(name.replace(LAST, "size"))
-    kept, off_ = " and ".join(name for name in measured if name != LAST), _off(measured, many)
-    keeps = f"it nearly keeps {kept} ({off_})" if off_ else f"it keeps {kept}"
-    return (" and ".join(said) if said else keeps * bool(kept)), [*dict.fromkeys(strays)]
+    nearly = "nearly " * any((by > np.log(OTHERWISE)).any() for _, by in measured.values())
+    kept = " and ".join(name for name in measured if name != LAST)
+    return (" and ".join(said) if said else f"it {nearly}keeps {kept}" * bool(kept)), [*dict.fromkeys(strays)]
 
 
 def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = (), of: str = "", apart: str = "") -> str:
@@ -406,15 +397,10 @@ def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = (), of:
     measured, many = _measured(extents, paces, lasts), len(extents)
     told = ", ".join(f"{name} {_times(ratios)}" for name, (ratios, _) in measured.items())
     runs = f" (in brackets, least to most of {many} runs)" if "(" in told else ""
-    which = f"; {_off(measured, many) or f'none more than {OTHERWISE - 1:.0%} off'}" * (many > 1)
-    return f"{of}{told} the demonstrated{runs}, typically {apart} from the recorded path{which}" if told else ""
-
-
-def _off(measured: Mapping[str, tuple[Array, Array]], many: int) -> str:
-    """How many runs are off by more than :data:`OTHERWISE`, and in what; empty where none is."""
     counts = {name: int((by > np.log(OTHERWISE)).sum()) for name, (_, by) in measured.items()}
     off = ", ".join(f"{name} of {count} of {many}" for name, count in counts.items() if count)
-    return f"more than {OTHERWISE - 1:.0%} off: {off}" * bool(off)
+    which = f"; {'' if off else 'none '}more than {OTHERWISE - 1:.0%} off{off and f': {off}'}" * (many > 1)
+    return f"{of}{told} the demonstrated{runs}, typically {apart} from the recorded path{which}" if told else ""
 
 
 def _measured(*given: Sequence[float] | Array) -> dict[str, tuple[Array, Array]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import is_dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,9 +36,6 @@ ARROWS = 15
 
 FOLDS, MOST_REFITTED = 5, 5000
 """Demonstrations are held out in so many parts, where there are no more samples than the second."""
-
-SLIGHT = 0.1
-"""Demonstrations of less motion than this share of the usual one are compared by that."""
 
 TILT = 20.0
 """Of the new plane against the recorded motion, degrees."""
@@ -77,8 +74,7 @@ def policy_page(
     us = list(actions or (f"action {index + 1}" for index in range(d)))
     learner, held_out = named(policy.learner), _held_out(policy, demos)
     lost = diagnosis.lost_by_guiding(moving, demos)
-    more = {"lost": lost, "noise": metrics.missed_for_noise(policy, demos)}
-    found = verdicts.of_explained(policy.held_out_score(), len(demos), diagnosis.states_told(policy), **more)
+    found = verdicts.of_explained(policy.held_out_score(), len(demos), diagnosis.states_told(policy), lost=lost)
     judged = retraced(found, moving, demos, made, None, known)
     parts = [
         *([html.section("Guided", html.paragraph(moving.aim_.promise))] if isinstance(moving, Guided) else []),
@@ -121,9 +117,8 @@ def _held_out(policy: Policy, demos: list[Demonstration]) -> list[Array] | None:
 def _worst(demos: list[Demonstration], predicted: list[Array]) -> list[int]:
     """Numbers of demonstrations, that of which predictions explain least first; what hardly moves comes last."""
     usual = float(np.sqrt((stack(demos).actions ** 2).sum(axis=1).mean()))
-    both = [metrics.along_motion(lambda _, at=at: at, one, usual) for one, at in zip(demos, predicted, strict=True)]
-    missed, motion = np.array(both).T
-    return np.argsort(-missed / np.maximum(motion, SLIGHT * motion.mean() + 1e-300), kind="stable").tolist()
+    missed, motion = np.array([_left([one], at, usual) for one, at in zip(demos, predicted, strict=True)]).T
+    return np.argsort(-missed / np.maximum(motion, 0.1 * motion.mean() + 1e-300), kind="stable").tolist()
 
 
 def _summary(policy: Policy, demos: list[Demonstration]) -> html.Markup:
@@ -231,12 +226,9 @@ def _field(policy: Policy | Guided, demos: list[Demonstration], names: Sequence[
     )
 
 
-def _actions(
-    policy: Policy, demos: list[Demonstration], names: Sequence[str], held_out: list[Array] | None
-) -> html.Markup:
-    order = _worst(demos, held_out or [policy(demo.states) for demo in demos])
-    shown = [demos[index] for index in (order if len(demos) > MOST_PANELS else range(len(demos)))][:MOST_PANELS]
-    panels = []
+def _actions(policy: Policy, demos: list[Demonstration], names: Sequence[str], held_out: Any) -> html.Markup:
+    order = _worst(demos, held_out or [policy(demo.states) for demo in demos]) if len(demos) > MOST_PANELS else [0]
+    shown, panels = [demos[index] for index in order[:MOST_PANELS]] if order[1:] else demos, []
     for demo in map(_thin, shown):
         predicted = policy(demo.states)
         along = project(action_projection(demo.actions), predicted)
@@ -274,8 +266,13 @@ def _errors(policy: Policy, demos: list[Demonstration], held_out: list[Array] | 
     return html.table(header, [*rows, cells("all", every)], note=note, rules=(len(shown),))
 
 
+def _left(of: list[Demonstration], predicted: Array, usual: float | None = None) -> tuple[float, float]:
+    """What predictions leave unexplained along the motion, and that motion."""
+    return metrics.along_motion(lambda _: predicted, of, usual)
+
+
 def _share(of: list[Demonstration], predicted: Array) -> str:
-    missed, motion = metrics.along_motion(lambda _: predicted, of)
+    missed, motion = _left(of, predicted)
     return "–" if motion == 0.0 else f"{1.0 - missed / motion:.1%}" if missed < 2.0 * motion else "none"
 
 
