@@ -149,4 +149,4 @@ def test_on_the_command_line_the_exit_code_says_it(tmp_path):
     )
     assert "guaranteed" in bad.output
     assert f"Next: unconstrain export {tmp_path / 'guided.npz'} -o policy.c" in good.output
-    assert "Next: unconstrain fit with --guided auto" in bad.output
+    assert "Next: 'unconstrain fit --guided auto'" in bad.output
