@@ -89,7 +89,7 @@ class TestMarks:
             choice = SimpleNamespace(held_out=missed, actions=2, doubts=(), lacking=(), several=True, one_way=False)
             found = verdicts.of_constraint(SimpleNamespace(rank_=1, choice_=choice))
             assert found.said.startswith("If one constraint held all: 1 of 2 directions were held;") == much
-            assert found.next.startswith("Learn it of each alone" if much else "Use it with 'unconstrain score")
+            assert found.next.startswith("Learn it of each alone" if much else "Use it with --constraint")
 
     def test_a_bad_recording_is_not_hidden_by_many_good_ones(self):
         good, usual = verdicts.of_score(0.97, 20), {f"a_{number}": 0.98 for number in range(18)}

@@ -39,7 +39,7 @@ def certify(policy: str, seed: int, as_json: bool) -> None:
         raise ModelFileError(f"{policy}: holds no policy that is fitted or guided. Learn one with 'unconstrain fit'.")
     found = uc.certify(stored, around, seed)
     start, normal = (None if one is None else one.tolist() for one in (found.start, found.normal))
-    judged = to_copy(_judged(policy, found), uc.storage.load_notes(policy), policy=policy)
+    judged = to_copy(_judged(policy, found), policy, uc.storage.load_notes(policy))
     say_judged(judged, {}, as_json, holds=found.holds, start=start, normal=normal)
     if not found.holds:
         raise SystemExit(NOT_GUARANTEED)
@@ -47,18 +47,18 @@ def certify(policy: str, seed: int, as_json: bool) -> None:
 
 def _judged(policy: str, found: uc.motion.certificate.Certificate) -> uc.evaluation.verdicts.Verdict:
     """What is guaranteed, in which units, and what may go against it; or what was found against it."""
-    notes, marks = uc.storage.load_notes(policy), uc.evaluation.verdicts.Mark
+    notes, verdicts = uc.storage.load_notes(policy), uc.evaluation.verdicts
     unit = unit_of(uc.Recipe.from_dict(notes.get("recipe", {})).labels(notes.get("units", {}))[0])
     unit = f"Lengths are in {unit or 'the unit of the states'}, and all rates per second."
     if not found.holds:
-        said = found.said.replace(" (see uc.Guided)", "")
         then = "'unconstrain fit --guided auto', or cycle, or a goal such as 0.1,0, and certify that."
-        return uc.evaluation.verdicts.Verdict(marks.BAD, f"{policy}: {said} {unit}", next=then)
+        said = f"{policy}: {found.said.replace(' (see uc.Guided)', '')} {unit}"
+        return verdicts.Verdict(verdicts.Mark.BAD, said, next=then)
     promise, away, checked = found.said.partition("A constraint that moves or is not told")
     doubt = f"{away}{checked.partition(' Checked at')[0]}"
     then = f"unconstrain export {shlex.quote(policy)} -o policy.c"
     said = f"{policy}: guaranteed. {unit}"
-    return uc.evaluation.verdicts.Verdict(marks.GOOD, said, promise.strip(), doubt, then)
+    return verdicts.Verdict(verdicts.Mark.GOOD, said, promise.strip(), doubt, then)
 
 
 def _learnt_at(policy: Any) -> Any:

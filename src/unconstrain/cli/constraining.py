@@ -18,7 +18,7 @@ from ..base.files import write
 from .informing import HELD_BY, NAMED, OF, SHOWN, WHERE, WOUND, provenance, verdict_of
 from .printing import of_option, option_for_json, print_table, refuse_warnings, say_verdict, say_written
 from .progress import shown
-from .reading import loaded, numbers, of_words, options_for_reading, prepared, said_recipe, to_copy, with_options
+from .reading import loaded, numbers, of_words, options_for_reading, prepared, said_recipe, with_options
 from .writing import check_name, check_outputs, option_for_force
 
 RESTS = 0.1
@@ -99,7 +99,7 @@ def constraint(
     check_outputs([place for name, place in outputs.items() if name], (*paths, jacobian), force)
     named = mechanism_of(demonstrations, recipe, first) if jacobian is None else None
     wound = uc.constraints.mechanisms.winding(one.actions for one in demonstrations)
-    verdict = to_copy(_judged(learnt, named, wound), policy="POLICY.npz", held=next(iter(outputs.values())))
+    verdict = _judged(learnt, named, wound)
     if not as_json:
         say_verdict(verdict)
         click.echo(f"Learnt from {said_recipe(recipe, first)}.")
@@ -410,12 +410,9 @@ def table_of(
         what = f"angle of {'normal' if {*kinds} == {'plane'} else 'axis'} to {bare(named.up)} axis"
         angles = [f"{math.degrees(math.acos(min(abs(one.axis[-1]), 1.0))):.1f}°" for one in held]
         columns[what] = [each * ("tilt" in one.margins) for each, one in zip(angles, held, strict=True)]
-        own = [0.0 if one.vague else one.radius or 0.0 for one in held]
-        columns["radius"] = [f"{size:.3g} {one.unit}" * bool(size) for size, one in zip(own, held, strict=True)]
-        at = [
-            [size and round(each / size, 3) * size for each in one.centre] for size, one in zip(own, held, strict=True)
-        ]
-        columns["centre"] = [", ".join(f"{each:.3g}" for each in one) * any(one) for one in at]
+        columns["radius"] = ["" if one.vague or not one.radius else f"{one.radius:.3g} {one.unit}" for one in held]
+        at = [", ".join(f"{each + 0.0:.3f}" for each in one.centre.round(3)) for one in held]
+        columns["centre"] = [each * bool(radius) for each, radius in zip(at, columns["radius"], strict=True)]
         columns["mechanism"] = [text for _, text in named.each] if whole else []
     shown = {head: values for head, values in columns.items() if any(values)}
     return ["demonstration", *shown], [list(row) for row in zip(names, *shown.values(), strict=True)]

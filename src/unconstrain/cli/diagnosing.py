@@ -81,8 +81,8 @@ def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequenc
         click.echo(line)
     every = uc.evaluation.diagnosis.places(found.regions)
     shown = found.regions if all_ else every[:MOST_ROWS]
-    which = f"{len(found.regions)} regions, of which those near each other and open alike are one place"
-    click.echo(f"\nThe {len(shown)} places of largest undetermined spread, of {len(every)} ({which}), largest first:")
+    count = f"{len(every)} ({len(found.regions)} regions)"
+    click.echo(f"\nThe {len(shown)} places of largest undetermined spread, of {count}, largest first:")
     around, along = (" ".join(name.partition(" [")[0] for name in names) for names in (states, actions))
     head = [f"demonstrate\naround\n({around})", "in", "told", "by\nthree", "spread",
             f"leave free\n({along})", "shown\nby"]  # fmt: skip
@@ -95,8 +95,9 @@ def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequenc
     print_table(head, rows)
     click.echo("told: share of samples there at which all tell the policy, to a tenth of a typical action or to noise.")
     click.echo("by three: the same whichever two are left out, so that it hangs on no one or two.")
-    click.echo("spread: how far it may be off there along 'leave free', whichever two demonstrations are left out: a")
-    click.echo("standard deviation, 100% as much as a typical action; up to 10%, or up to the noise, counts as told.")
+    click.echo(
+        "spread: along 'leave free' it may be off by that share of a typical action, whichever two are left out."
+    )
     click.echo("shown by: demonstrations that moved along 'leave free' in this region.")
     told = [one for one in found.movements if one.looks in uc.evaluation.diagnosis.COUNTED]
     if not (free := sorted(told, key=lambda one: -(one.free or 0.0))):

@@ -91,8 +91,7 @@ def info(file: str, as_json: bool) -> None:
     held, notes = loaded(file, uc.Policy | uc.LearntConstraint | uc.Guided), uc.storage.load_notes(file)
     inner = ("recipe", "units", "digests", MARK, NOISE, MOVES, HELD_BY, SHOWN, WHERE, WOUND)
     rest = {name: value for name, value in notes.items() if name not in inner}
-    held_ = isinstance(held, uc.LearntConstraint)
-    verdict = to_copy(verdict_of(held, notes), notes, policy="POLICY.npz" if held_ else file, held=file * held_)
+    verdict = to_copy(verdict_of(held, notes), file, notes)
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held, notes), **rest}
     if as_json:
         click.echo(json.dumps(told | {"verdict": verdict.to_json()}, indent=2))

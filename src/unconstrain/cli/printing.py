@@ -208,7 +208,7 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     ran = retraced(found, moving, demos, stream.recipe, None, stream.first.units, False)
     cured = ran.verdict._replace(next=there) if there and found.next == there else ran.verdict
     verdict = uc.evaluation.diagnosis.about_recordings(cured, demos, stream.recipe, moving)
-    verdict = to_copy(as_noted(verdict), policy=click.get_current_context().params["output"])
+    verdict = to_copy(as_noted(verdict), click.get_current_context().params["output"])
     return Judged(verdict, ran.medians, *ran[3:], count, samples, 1.0 - missed, held_out, lost, noise)
 
 

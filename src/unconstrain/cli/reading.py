@@ -290,18 +290,15 @@ def next_command(name: str, *more: str, without: Sequence[str] = ()) -> str:
     return f"unconstrain {name} {_as_pattern(context.params['files'])} {shlex.join([*told, *more])}".rstrip()
 
 
-def to_copy(verdict: Any, notes: Mapping[str, Any] | None = None, *, policy: str, held: str = "") -> Any:
-    """A verdict with commands that its Next names whole, in lines below it, on these files, or as a model notes them.
-
-    What is in capitals stands for what is not known.
-    """
+def to_copy(verdict: Any, policy: str, notes: Mapping[str, Any] | None = None) -> Any:
+    """A verdict with the commands that its Next names whole, on these files or, in capitals, such as a model notes."""
     lines, recipe = verdict.next.split("\n"), uc.Recipe.from_dict((notes or {}).get("recipe", {}))
     read = ["RECORDINGS.csv", *prepared_as(recipe)]
     roles = {role: name for role, name in reading_of(**notes or {}).roles.items() if isinstance(name, str)}
     read += [word for role, name in roles.items() for word in (f"--{role.replace('_', '-')}", name)]
     for name, to in re.findall(r"'unconstrain (\w+)(?: --guided ([\w.,]+))?", verdict.next):
         more = ["--guided", "GOAL" if "," in to else to] * bool(to) + ["-o", "guided.npz" if to else "policy.npz"]
-        more = {"fit": more, "look": [policy], "score": ["--constraint", held] * bool(held)}.get(name, [])
+        more = {"fit": more, "look": [policy]}.get(name, [])
         own = next_command(name, *more, without=["to"]) if notes is None and name != "score" else ""
         files = [policy, "NEW.csv"] if name == "score" else read
         lines.append(own or shlex.join(["unconstrain", name, *files, *more]))

@@ -91,7 +91,7 @@ def rollout(
     path, why, trouble = _as_far_as_it_goes(moving, list(start), constraint=held, task=task, obstacles=round_, **how)
     named = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))
     kept = "the plane" if plane is not None else getattr(held, "title", "")
-    verdict = to_copy(_supported(moving, path, why, round_, kept, notes), notes, policy=policy)
+    verdict = to_copy(_supported(moving, path, why, round_, kept, notes), policy, notes)
     accelerations = named.actions or tuple(f"a{name}" for name in (named.states or ())[:places])
     columns = ["t", *sum(replace(named, actions=accelerations if how["order"] == 2 else None).labels({}), ())]
     if output != "-":

@@ -68,7 +68,7 @@ def score(
     with shown("running it from the same starts"):
         found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units)
     judged = verdicts.of_unit(verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0)), _times(learnt, states))
-    verdict = to_copy(judged, notes, policy=policy)
+    verdict = to_copy(judged, policy, notes)
     if not as_json:
         _print_scores(verdict, rows, whole, {"hardly moved": still, "too short": short}, found.in_figures)
         return
@@ -83,9 +83,7 @@ def _missed(judged: Any, moving: Any, demonstrations: Sequence[uc.Demonstration]
     return judged._replace(trust=judged.trust and f"{judged.trust} It {uc.evaluation.verdicts.misses(share, noise)}.")
 
 
-def _print_scores(
-    verdict: Any, rows: Sequence[dict[str, Any]], whole: dict[str, Any], left: dict[str, list[str]], ran: str
-) -> None:
+def _print_scores(verdict: Any, rows: Any, whole: dict[str, Any], left: dict[str, list[str]], ran: str) -> None:
     """A verdict, scores of each demonstration and all, why others have none, and figures of runs from their starts."""
     say_verdict(verdict)
     head = ["demonstration", "samples", "explains", "normalised inconsistency", "nPOE", "nCPE"][: len(whole) - 1]

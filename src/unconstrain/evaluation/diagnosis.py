@@ -41,10 +41,6 @@ if TYPE_CHECKING:
     from ..policies import Policy
 
 
-TOGETHER, ALIKE = 0.1, 0.7
-"""Within a tenth of the extents in each column, and 45° by its cosine, who records again moves through both places."""
-
-
 class Place(NamedTuple):
     """Where a sample is: its demonstration, its number in it, counted from one, and its time in seconds, if known.
 
@@ -397,12 +393,11 @@ def _regions(
 
 
 def places(regions: Sequence[Region]) -> list[Region]:
-    """Regions by decreasing spread, without those that one before tells of: within :data:`TOGETHER`, moved alike."""
-    near = np.ptp([one.state for one in regions], axis=0) * TOGETHER + 1e-300
-    kept = list[Region]()
+    """Regions without those within a tenth of the extents of one before, and 45° of its direction: one tells both."""
+    near, kept = np.ptp([one.state for one in regions], axis=0) * 0.1 + 1e-300, list[Region]()
     for one in regions:
         by = [each for each in kept if (np.abs(np.subtract(each.state, one.state)) <= near).all()]
-        kept += [] if any(abs(np.dot(each.direction, one.direction)) >= ALIKE for each in by) else [one]
+        kept += [] if any(abs(np.dot(each.direction, one.direction)) >= 0.7 for each in by) else [one]
     return kept
 
 

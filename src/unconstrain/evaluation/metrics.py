@@ -163,11 +163,7 @@ def along_motion(policy: PolicyLike, demonstrations: Demonstrations, usual: floa
 
 
 def missed_for_noise(policy: PolicyLike, demonstrations: Demonstrations) -> float:
-    """What noise of the actions alone lets the best policy miss along the motion, as a share of a typical action.
-
-    Root mean square, weighted as in :func:`along_motion`. It lengthens actions and turns them, which counts where
-    ``policy`` moves across them.
-    """
+    """What noise alone lets the best policy, about ``policy``, miss along the motion; a share of a typical action."""
     demos = _listed(demonstrations)
     noise = np.repeat([_noise(demo) for demo in demos], [len(demo) for demo in demos])
     actions, predicted = stack(demos).actions, _predicted(policy, demos)

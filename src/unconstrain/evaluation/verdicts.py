@@ -44,10 +44,10 @@ def _explains(share: float, what: str = "held-out motion") -> str:
 
 def misses(share: float, noise: float) -> str:
     """What is left of a share of motion, as one of a typical action, and what noise alone makes, if believable."""
-    said, missed = "misses {} of a typical action", float(np.sqrt(max(1.0 - share, 0.0)))
-    if 0.005 <= noise <= 1.2 * missed:  # more is constraints that change at every sample, not noise
-        said += f" (noise in the recorded actions alone: {percent(min(noise, missed))} or more)"
-    return said.format(percent(missed))
+    missed = float(np.sqrt(max(1.0 - share, 0.0)))
+    known = 0.005 <= noise <= 1.2 * missed  # more is constraints that change at every sample, not noise
+    more = f" (noise in the recorded actions alone: {percent(min(noise, missed))} or more)" * known
+    return f"misses {percent(missed)} of a typical action{more}"
 
 
 def _advice(word: str, learnt: float, spoilt: bool) -> str:
@@ -89,8 +89,8 @@ def of_explained(
     ``share`` is 1 − the share left unexplained, NaN where nothing could be held out; fewer than three demonstrations
     give no verdict. ``determined`` is the share of the recorded states at which recordings tell the policy, and
     ``there`` what to record where fewer show it. ``learnt`` is the share of what was learnt from, and ``lost`` what
-    guiding takes of that, None where it is not guided: a guided policy is judged by the one in it, or worse. ``noise``
-    is what is missed for noise of the actions alone, as a share of a typical one.
+    guiding takes of that, None where it is not guided: a guided policy is judged by the one in it, or worse. What
+    is missed for ``noise`` alone is a share of a typical action.
     """
     across, little = "What constraints hid: no recording shows it, so no score does.", ""
     (alone, word), (mark, _) = (graded(each, told=determined) for each in (share, share - (lost or 0.0)))
@@ -296,7 +296,7 @@ def of_constraint(
         apart += f" (in some up to {max(ranks)} look so, as does a direction in which nobody moved)"
     undecided = " Positions do not decide it." if shown is False else ""
     said = f"{held}{apart}; {percent(missed)} of held-out motion is along them: {word}.{undecided}"
-    then = "Use it with 'unconstrain score --constraint', or 'rollout --constraint'."
+    then = "Use it with --constraint of 'rollout' or 'score'."
     if choice.several and not others and mark is not Mark.GOOD:
         said = f"If one constraint held all: {said}"
         then = "Learn it of each alone (--episodes, --leave-out): each may have been held otherwise, or not at all."
@@ -320,7 +320,7 @@ def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool) -> Verdict:
         keep = f"Positions may keep to {named.title}, which holds {more}; as it turns, velocities show less of it."
         return found._replace(said=f"{found.said} {keep}")
     said = f"{more} directions were held, by {named.title}. It turns on the way, so velocities alone show {rank}"
-    then = "Use it with 'unconstrain score --constraint', or 'rollout --constraint', which follow the mechanism."
+    then = "Use it with --constraint of 'rollout' or 'score', which follow the mechanism."
     return found._replace(said=said + found.said.partition(" directions were held")[2], next=then)
 
 
@@ -374,8 +374,7 @@ def moves(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> tuple[st
 
     ``extents`` and ``paces`` are size and turns of each run over those of its demonstration, NaN where there are none,
     and ``lasts`` the size of the last round over that of the first, over the same.
-    Half of them may be off by :data:`OTHERWISE` either way, whatever the mean is, and none by :data:`FAR_OFF`; where
-    any is, size and pace are nearly kept.
+    Half of them may be off by :data:`OTHERWISE` either way, which nearly keeps them, and none by :data:`FAR_OFF`.
     """
     measured, many = _measured(extents, paces, lasts), len(extents)
     goes = ("go round" if many > 1 else "goes round") if "pace" in measured else f"turn{'s' * (many == 1)} out"

@@ -50,7 +50,7 @@ def diagnosis_page(
         html.words("diagnosis_lead"),
         html.section("What to record next", _next(found, states, actions)),
         html.section("Where three demonstrations do not tell", _map(found, demos, states, actions)),
-        html.section("In sentences", html.bullets(diagnosis.sentences(found, states, actions)), _tiles(found, demos)),
+        html.section("In sentences", html.bullets(diagnosis.sentences(found, states, actions))),
         html.section("Free or constrained", _freedom(found)),
         html.section("How the policy was chosen", _chosen(found)),
     )
@@ -69,20 +69,6 @@ def unknown(
         _map(found, demos, states, actions),
         _next(found, states, actions),
     ]
-
-
-def _tiles(found: Diagnosis, demos: list[Demonstration]) -> html.Markup:
-    return html.tiles(
-        [
-            (str(len(demos)), f"demonstrations, {len(found.undetermined)} samples"),
-            (f"{found.noise_share:.1%}", "noise, of a typical action"),
-            (percent(found.told_together), "of the recorded states told by all together"),
-            (percent(found.states_determined), "by three demonstrations or more"),
-            (percent(found.directions_determined), f"of {found.directions} weight directions determined"),
-            (percent(found.free_share), "of the samples free, or held by less than the noise"),
-            (percent(found.undecided_share), "of the samples free or always held in the same way"),
-        ]
-    )
 
 
 def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], actions: Sequence[str]) -> html.Markup:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.display import counted_off, innermost, listening, percent
+from ..base.display import counted_off, innermost, listening
 from ..base.errors import InvalidDataError, SettingError
 from ..constraints import Plane
-from ..evaluation import diagnosis, metrics, ncpe, ninconsistency, nupe, verdicts
+from ..evaluation import diagnosis, metrics, ncpe, nupe, verdicts
 from ..learners import named
 from ..motion import Guided, rollout
 from ..recordings import Demonstration, Recipe, stack
@@ -86,7 +86,7 @@ def policy_page(
     ]
     if policy.solution_.belief is not None:
         parts.append(html.section("What the demonstrations do not tell", *unknown(policy, demos, xs, us)))
-    parts += [html.section("Numbers", _summary(policy, demos), _determined(policy))]
+    parts += [html.section("Numbers", _summary(demos), _determined(policy))]
     if is_dataclass(learner):
         parts.append(html.settings_table(learner))
     return html.document(title, verdict or judged.verdict, _lead(policy, type(learner).__name__, xs, us), *parts)
@@ -121,22 +121,9 @@ def _worst(demos: list[Demonstration], predicted: list[Array]) -> list[int]:
     return np.argsort(-missed / np.maximum(motion, 0.1 * motion.mean() + 1e-300), kind="stable").tolist()
 
 
-def _summary(policy: Policy, demos: list[Demonstration]) -> html.Markup:
-    solution = policy.solution_
-    models, d, p = solution.weights.shape
-    shape = f"{models} × {p}" if models > 1 else str(p)
-    return html.tiles(
-        [
-            (str(len(demos)), "demonstrations"),
-            (f"{sum(map(len, demos)):,}".replace(",", " "), "samples"),
-            (shape, "local models × features" if models > 1 else "features"),
-            (percent(solution.determined_share), f"of {models * d * p} weight directions determined"),
-            (
-                html.number(_or_nan(ninconsistency, policy, demos)),
-                "normalised inconsistency, in which slow samples count as much",
-            ),
-        ]
-    )
+def _summary(demos: list[Demonstration]) -> html.Markup:
+    count = f"{sum(map(len, demos)):,}".replace(",", " ")
+    return html.tiles([(str(len(demos)), "demonstrations"), (count, "samples")])
 
 
 def _movements(policy: Policy | Guided, demos: list[Demonstration], names: Sequence[str]) -> html.Markup:
