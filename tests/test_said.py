@@ -4,6 +4,7 @@ import html
 import json
 import re
 import shlex
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 import unconstrain as uc
 from test_cli import call, run, write
 from test_newcomer import text
-from unconstrain.evaluation import metrics, verdicts
+from unconstrain.evaluation import diagnosis, metrics, verdicts
 from unconstrain.evaluation.diagnosis import places
 
 TURN = np.array([[-1.0, 0.5], [-0.5, -1.0]])
@@ -105,6 +106,16 @@ def test_of_two_places_that_are_open_along_other_directions_none_is_left_out():
     )
     assert places([first, same, across, far]) == [first, across, far]
     assert places([first]) == [first]
+
+
+@pytest.mark.parametrize("along", [0.05, 0.4])
+def test_a_spread_that_noise_hides_is_not_called_low(tmp_path, along):
+    demos = uc.prepare(uc.read([*map(str, strokes(tmp_path / "a", 1e-3))]), RECIPE)
+    policy = uc.ParametricPolicy(uc.Affine(), uc.Robust()).fit_demonstrations(demos)
+    found = uc.evaluation.diagnose(policy, demos)
+    told = tuple(replace(one, determined=1.0, along=along) for one in found.regions)
+    [said] = [one for one in diagnosis.sentences(replace(found, regions=told), "xy", "xy") if one.startswith("Every")]
+    assert ("though 40% of a typical action may be off" in said) == (along > 0.1)
 
 
 # The page of a fit

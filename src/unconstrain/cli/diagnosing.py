@@ -95,9 +95,7 @@ def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequenc
     print_table(head, rows)
     click.echo("told: share of samples there at which all tell the policy, to a tenth of a typical action or to noise.")
     click.echo("by three: the same whichever two are left out, so that it hangs on no one or two.")
-    click.echo(
-        "spread: along 'leave free' it may be off by that share of a typical action, whichever two are left out."
-    )
+    click.echo("spread: how far it may be off along 'leave free', with any two left out; 100% is a typical action.")
     click.echo("shown by: demonstrations that moved along 'leave free' in this region.")
     told = [one for one in found.movements if one.looks in uc.evaluation.diagnosis.COUNTED]
     if not (free := sorted(told, key=lambda one: -(one.free or 0.0))):
