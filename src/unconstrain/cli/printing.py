@@ -213,13 +213,10 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
 
 
 def as_noted(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.Verdict:
-    """The same with what was noted: rest before a start, glitches, and units that differ; at best doubtful by these."""
+    """The same with what was noted: glitches, and units that differ; at best doubtful by these."""
     told = click.get_current_context().meta
     if jumps := [title for title, one in told.get(TITLES, {}).get("glitch", {}).items() if not one.cured]:
         verdict = uc.evaluation.verdicts.of_glitches(verdict, listed(jumps, 4))
-    if rest := [title for title, one in told.get(TITLES, {}).get("rest", {}).items() if not one.cured]:
-        said = f"Where {listed(rest, 4)} stood still at an end: rest is learnt there; --still trims it."
-        verdict = verdict._replace(doubt=f"{verdict.doubt} {said}".lstrip())
     if "not-velocities" in told.get(CODES, ()):
         return uc.evaluation.verdicts.of_units_apart(verdict, "actions are not the velocities of the states")
     return uc.evaluation.verdicts.of_units_apart(verdict) if OTHER_UNITS & {*told.get(CODES, ())} else verdict

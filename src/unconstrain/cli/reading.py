@@ -80,7 +80,9 @@ CURES = (
         "What action columns hold: velocities, states to come, or changes to the next sample.",
         "auto",
     ),
-    of_words("--pauses", "drop keep", "Rows that stand still in the middle or before the start.", "drop"),
+    of_words(
+        "--pauses", "drop keep", "Rows that stand still in the middle, before the start or after a sudden end.", "drop"
+    ),
     of_words(
         "--glitches", "auto keep repair drop", "Samples far off: repair puts a line there, auto only of few.", "auto"
     ),
