@@ -50,9 +50,6 @@ MEANINGS = {
 OF_FILES = ModelFileError, OSError, ReadError, WriteError
 """Errors that begin with the name of a file or folder."""
 
-PLACES = 20
-"""Of each demonstration, about, that are looked at for where least is known."""
-
 TITLES = "unconstrain.titles"
 """Where it is kept which recordings each code was said of."""
 
@@ -223,14 +220,10 @@ def as_noted(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.
 
 
 def _least_known(policy: uc.Policy, demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe) -> str:
-    """Where more demonstrations tell most, and the command that lists all such places."""
-    import numpy as np
-
-    demos = [one[:: max(1, len(one) // PLACES)] for one in demonstrations]
-    states, _, groups = uc.stack(demos)
-    row = int(np.linalg.norm(policy.uncertainty(states).undetermined, axis=1).argmax())
-    place = uc.evaluation.diagnosis.named(states[row].tolist(), recipe.states or ())
-    passed = f"near {place}, where '{demos[groups[row]].name}' passed"
+    """Where more demonstrations tell most, the first place of a diagnosis, and the command that lists all."""
+    worst, *_ = uc.evaluation.diagnose(policy, demonstrations).regions
+    place = uc.evaluation.diagnosis.named(worst.state, recipe.states or ())
+    passed = f"near {place}, where '{worst.demonstration}' passed"
     least = f"Record more where least is known, held in other ways: {passed}."
     return f"{least} All such places:\n{next_command('diagnose')}"
 

@@ -18,6 +18,7 @@ from ..learners import Solution, robust
 from ..models import Scale, choose_variance, cover
 from ..recordings import Demonstration, stack
 from .marks import ENOUGH as ENOUGH
+from .marks import PARTLY
 from .marks import SMALL as SMALL
 from .metrics import along_motion
 from .sentences import CONSTRAINED as CONSTRAINED
@@ -80,7 +81,9 @@ def places_of(rows: NDArray[np.intp], demonstrations: Iterable[tuple[str, Demons
 
 @dataclass(frozen=True)
 class Region:
-    """A region of state space, and the recorded state in it of largest undetermined spread.
+    """A region of state space, and the recorded state in it of which least is known.
+
+    That is the one of largest undetermined spread, of those that all demonstrations leave open if there are any.
 
     Parameters
     ----------
@@ -91,9 +94,10 @@ class Region:
     determined, together : float
         Share of these samples at which the policy is determined by whichever demonstrations are but two, and by all.
     spread : float
-        Root-mean-square undetermined standard deviation over them, as a share of the typical action.
+        Root-mean-square undetermined standard deviation over them, with whichever two demonstrations left out, as a
+        share of the typical action.
     state : tuple of float
-        Recorded state at which it is largest.
+        That recorded state.
     demonstration : str
         Demonstration of that state.
     direction : tuple of float
@@ -164,7 +168,7 @@ class Diagnosis:
     undecided_share : float
         Estimated share of samples that were free or always held in the same way: the data cannot tell.
     regions : tuple of Region
-        All, by decreasing undetermined spread along their directions.
+        First those that all demonstrations leave open; of these, and of others, by decreasing spread ``along``.
     movements : tuple of Movement
         Each demonstration.
     suspects : tuple of Place
@@ -371,7 +375,7 @@ def _regions(
     nearest = fields.weights(seen).argmax(axis=1)
     centres = enumerate(embedding.states(fields.centres))
     found = [(centre, rows) for index, centre in centres if len(rows := np.flatnonzero(nearest == index))]
-    worst = [int(rows[undetermined[rows].argmax()]) for _, rows in found]
+    worst = [int(rows[np.lexsort((undetermined[rows], ~together[rows]))[-1]]) for _, rows in found]
     directions, along = _least_determined(policy, states[worst])
     names, noise = names_of(demos), policy.solution_.noise
     every = (
@@ -389,7 +393,7 @@ def _regions(
         )
         for (centre, rows), row, direction, size in zip(found, worst, directions, along, strict=True)
     )
-    return tuple(sorted(every, key=lambda one: -one.along))
+    return tuple(sorted(every, key=lambda one: (one.together >= PARTLY, -one.along)))
 
 
 def places(regions: Sequence[Region]) -> list[Region]:
