@@ -400,7 +400,7 @@ def test_fit_says_how_the_default_learner_went(files, tmp_path):
     assert re.fullmatch(
         r"Learnt as .*: .*\. Estimated squared error of other ways to learn, as times that of this \(more is worse\): "
         r".* \('fit -v' lists all\)\. "
-        r"Noise and misfit are about \S+ on each action, in its unit, and \d+% of the samples were free.*\.",
+        r"Noise and misfit are about \S+ on each action, in its unit; 'unconstrain diagnose' says what looks free\.",
         said,
     )
 
@@ -426,7 +426,7 @@ def test_each_model_takes_each_learner(files, tmp_path, model, learner):
     said = run("fit", *files[:4], "--model", model, "--learner", learner, "-o", tmp_path / "p.npz")
     assert ("one affine model for all states" in said) == (model == "local")  # as these movements are
     assert ("The inconsistency determined" in said) == (learner in ("hybrid", "inconsistency"))
-    assert ("samples were free" in said) == (learner == "robust")
+    assert ("says what looks free" in said) == (learner == "robust")
     assert type(storage.load(tmp_path / "p.npz").learner).__name__.lower() == learner
 
 

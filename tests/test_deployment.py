@@ -254,7 +254,7 @@ def test_the_c_file_and_the_graph_of_a_polynomial_of_many_states(tmp_path):
     for width in FAR:
         at = states(7, width)
         allowed = 1e-14 * (np.abs(bent.features_(at)) @ np.abs(bent.solution_.weights[0].T))
-        [drawn] = graph.run(None, {"states": at})
+        [drawn] = graph.run(["actions"], {"states": at})
         for found in (np.stack([step(x) for x in at]), np.stack([bent.step(x) for x in at]), drawn):
             assert (np.abs(found - bent.predict(at)) <= allowed).all()
 
@@ -424,10 +424,10 @@ def test_the_onnx_graph_says_what_the_policy_says_inside_and_far_outside(policy,
         graph = session(tmp_path / "policy.onnx")
         for width in FAR:
             at = states(one.n_features_in_, width)
-            [found] = graph.run(None, {"states": at})
+            [found] = graph.run(["actions"], {"states": at})
             assert found.dtype == np.float64
             assert_same(found, one, at, width)
-            [alone] = graph.run(None, {"states": at[:1]})
+            [alone] = graph.run(["actions"], {"states": at[:1]})
             assert_same(alone, one, at[:1], width)
 
 
@@ -437,7 +437,7 @@ def test_a_graph_in_single_precision_takes_and_gives_it(policy, arm, tmp_path):
         graph = session(tmp_path / "policy.onnx")
         for width in FAR[:4]:
             at = states(one.n_features_in_, width).astype(np.float32)
-            [found] = graph.run(None, {"states": at})
+            [found] = graph.run(["actions"], {"states": at})
             expected = one(at)
             assert found.dtype == np.float32
             assert np.abs(found - expected).max() <= 1e-5 * np.abs(expected).max()
@@ -546,7 +546,7 @@ def test_a_scaler_and_a_policy_are_exported_as_one(kind, scaler, tmp_path):
     subprocess.run(command.split(), cwd=tmp_path, check=True)
     subprocess.run([tmp_path / "test"], check=True)
     one.export_onnx(tmp_path / "whole.onnx", scaler=pipeline[:-1])
-    [found] = session(tmp_path / "whole.onnx").run(None, {"states": at})
+    [found] = session(tmp_path / "whole.onnx").run(["actions"], {"states": at})
     expected = pipeline.predict(at)
     assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
     assert (form.reach > 0).all()

@@ -148,7 +148,10 @@ class TestWhatIsFound:
                 "what the model does not follow, fast parts that --window smooths, or people who vary.",
             ),
             ({"noise_share": 0.2, "noise": 1.0, "jitter": 0.1}, "Only 0.1 of it changes from sample to sample"),
-            ({"undecided_share": 0.4}, "40% were free or always held in the same way"),
+            (
+                {"undecided_share": 0.4},
+                "Of 40% the recordings cannot tell: they were free or always held in the same way",
+            ),
         ],
     )
     def test_each_finding_has_its_words(self, fitted, change, said):

@@ -103,10 +103,10 @@ def test_c_says_what_python_says(guided, single, compiler, tmp_path):
 def test_a_graph_says_what_python_says_and_takes_projections_where_they_are_given(guided, single, tmp_path):
     guided.export_onnx(tmp_path / "arrive.onnx", single=single)
     graph, kind = session(tmp_path / "arrive.onnx"), np.float32 if single else np.float64
-    [free] = graph.run(None, {"states": STATES.astype(kind)})
-    [held] = graph.run(None, {"states": STATES.astype(kind), "projections": PROJECTIONS.astype(kind)})
+    [free] = graph.run(["actions"], {"states": STATES.astype(kind)})
+    [held] = graph.run(["actions"], {"states": STATES.astype(kind), "projections": PROJECTIONS.astype(kind)})
     assert_same(free, held, guided, 1e-4 if single else 1e-12)
-    [one] = graph.run(None, {"states": STATES[:1].astype(kind), "projections": PROJECTIONS[:1].astype(kind)})
+    [one] = graph.run(["actions"], {"states": STATES[:1].astype(kind), "projections": PROJECTIONS[:1].astype(kind)})
     assert_allclose(one, held[:1], rtol=1e-5 if single else 1e-12)
 
 

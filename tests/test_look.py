@@ -105,7 +105,7 @@ def test_the_first_lines_say_what_is_there_and_what_is_odd(folder, page):
     assert text(page, "summary").startswith("4 demonstrations, ")
     said, verdict = " ".join((folder / "said.txt").read_text("utf-8").split()), text(page, "verdict")
     assert verdict.startswith("! ")
-    assert said.startswith(verdict.removesuffix(" What looks odd is listed below."))
+    assert said.startswith(verdict.removesuffix(" What is marked is listed below."))
     assert "constraint: of wipe_0, and drawn there alone" in said
     rest = page.execute_script("return [...document.getElementById('rest').children].map((one) => one.textContent)")
     assert rest[::2] == [name for name in ("Trust", "Do not trust", "Next") if f"{name}: " in said]

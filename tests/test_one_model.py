@@ -138,7 +138,7 @@ def test_the_graph_says_the_same(policy, near, far, single, tmp_path):
     graph = session(tmp_path / "one.onnx")
     for at in (near, far):
         given = at.astype(np.float32 if single else np.float64)
-        [found] = graph.run(None, {"states": given})
+        [found] = graph.run(["actions"], {"states": given})
         assert_same(found, policy(given), 1e-5 if single else 1e-12)
 
 

@@ -148,7 +148,7 @@ def test_an_exported_graph_is_in_the_units_of_the_data(tmp_path):
     runtime = pytest.importorskip("onnxruntime")
     policy, states = fitted()
     policy.export_onnx(tmp_path / "p.onnx")
-    [actions] = runtime.InferenceSession(tmp_path / "p.onnx").run(None, {"states": states})
+    [actions] = runtime.InferenceSession(tmp_path / "p.onnx").run(["actions"], {"states": states})
     assert_allclose(actions, policy(states), rtol=1e-7, atol=1e-9 * np.abs(actions).max())
 
 

@@ -433,7 +433,7 @@ def test_steps_and_graphs_say_the_same_in_the_space(kind, tmp_path):
     assert_allclose([policy.step(state) for state in same_states(states)], expected, rtol=0, atol=1e-9)
     policy.export_onnx(tmp_path / "policy.onnx")
     session = onnxruntime.InferenceSession(tmp_path / "policy.onnx")
-    [found] = session.run(None, {"states": same_states(states)})
+    [found] = session.run(["actions"], {"states": same_states(states)})
     assert_allclose(found, expected, rtol=0, atol=1e-9)
 
 

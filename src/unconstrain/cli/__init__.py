@@ -97,13 +97,15 @@ def main() -> None:
 @option_for_json
 def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     """Describe each FILE: columns, rate, gaps, zero actions."""
-    recipe, first = recipe_of(**reading), list[uc.Recording]()
+    recipe, first, labels = recipe_of(**reading), list[uc.Recording](), list[dict[str, float]]()
 
     def recordings() -> Iterator[uc.Recording]:
         paths, how = uc.readers.expand(files), reading_of(**reading)
         every = (one for path in paths for one in uc.readers.read_blocks(path, how, whole=True))
         for recording in left_in(every, reading["leave_out"]):
             first[:] = first or [recording]
+            columns = zip(recording.columns, recording.values.T, strict=True)  # such as numbers of trials
+            labels.append({name: one[0] for name, one in columns if len(one) and (one == one[0].round()).all()})
             yield recording
 
     with shown("reading"):
@@ -118,7 +120,7 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     keep_codes(remark.code for found in surveys for remark in found.warnings)
     used, needed, lacking = _used(recipe, first[0], surveys)
     left_out = [*reading["leave_out"], *dict.fromkeys([*differ, *lacking])] if differ or lacking else []
-    then = _to_fit(recipe, first[0], surveys, bool(needed and not lacking), left_out)
+    then = _to_fit(recipe, first[0], surveys, bool(needed and not lacking), left_out, labels)
     apart = next_command("inspect", "--group", without=["group"])
     verdict = uc.evaluation.verdicts.of_surveys(surveys, needed, then, apart)
     plain = [
@@ -158,14 +160,19 @@ def _used(recipe: uc.Recipe, first: uc.Recording, surveys: Sequence[Any]) -> tup
 
 
 def _to_fit(
-    recipe: uc.Recipe, first: uc.Recording, surveys: Sequence[Any], guess: bool, left_out: Sequence[str]
+    recipe: uc.Recipe, first: uc.Recording, surveys: Sequence[Any], guess: bool, left_out: Sequence[str], labels: Any
 ) -> str:
-    """The command that comes next; with what may be meant, where columns are not named or not there."""
+    """The command that comes next; with what may be meant where columns are not named, by ``labels`` of recordings."""
     states, actions = (not guess or _are_there(names, first) for names in (recipe.states, recipe.actions))
     clock = [one.column for one in surveys[0].warnings if one.code == "clock-untold" and one.column]
     states = states and not {*clock} & {*(recipe.states or ())}
     common = [name for name in first.columns if name not in clock and all(name in one.columns for one in surveys)]
+    still = [name for name in labels[0] if all(name in one for one in labels)]
+    common = [name for name in common if name not in still]
+    split = guess and any(note.code == "split" for one in surveys for note in one.notes)
+    counts = [name for name in still if split and len({one[name] for one in labels}) == len(labels)]
     more = [] if states else ["--state", ",".join(likely_states(common or first.columns))]
+    more += ["--group", counts[0]] if counts else []
     timeless = guess and first.times is None and not recipe.rate and not recipe.actions
     more += ["--rate", "HZ"] * (timeless and not clock)
     cures = _cures(surveys)
@@ -296,8 +303,8 @@ def _reported(
     from ..pages.fit import policy_page
 
     with shown("report: drawing"):
-        demos, units = stream.beginning(), stream.first.units
-        write(report, policy_page(policy, demos, Path(output).stem, stream.recipe, units, judged.verdict))
+        demos, units, title = stream.beginning(), stream.first.units, f"The policy {Path(output).stem}"
+        write(report, policy_page(policy, demos, title, stream.recipe, units, judged.verdict))
     return {"policy": output, "report": report}
 
 

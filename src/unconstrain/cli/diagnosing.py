@@ -71,8 +71,8 @@ def diagnose(
     if report is not None:
         from ..pages.diagnosis import diagnosis_page
 
-        page = diagnosis_page(found, demonstrations, Path(report).stem, *recipe.labels(first.units), verdict)
-        write(report, page)
+        title = f"Diagnosis of {Path(files[0]).name}"
+        write(report, diagnosis_page(found, demonstrations, title, *recipe.labels(first.units), verdict))
         click.echo(f"report: {report}", err=as_json)
 
 
@@ -82,8 +82,7 @@ def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequenc
     every = uc.evaluation.diagnosis.places(found.regions)
     shown = found.regions if all_ else every[:MOST_ROWS]
     count = f"{len(every)} ({len(found.regions)} regions)"
-    click.echo(f"\nThe {len(shown)} places where least is known, of {count}: those that all leave open before those that")
-    click.echo("they tell, and of each the spread largest first:")
+    click.echo(f"\nThe {len(shown)} places where least is known, of {count}; what all leave open first, largest first:")
     around, along = (" ".join(name.partition(" [")[0] for name in names) for names in (states, actions))
     head = [f"demonstrate\naround\n({around})", "in", "told", "by\nthree", "spread",
             f"leave free\n({along})", "shown\nby"]  # fmt: skip
@@ -96,8 +95,8 @@ def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequenc
     print_table(head, rows)
     click.echo("told: share of samples there at which all tell the policy, to a tenth of a typical action or to noise.")
     click.echo("by three: the same whichever two are left out, so that it hangs on no one or two.")
-    click.echo("spread: how far it may be off along 'leave free', with any two left out; 100% is a typical action. Large")
-    click.echo("  where all tell the policy, it hangs on one or two: they may be right, and others would confirm it.")
+    click.echo("spread: how far it may be off along 'leave free', with any two left out; 100% is a typical action.")
+    click.echo("  Large although all tell the policy, it hangs on one or two demonstrations, which others may confirm.")
     click.echo("shown by: demonstrations that moved along 'leave free' in this region.")
     told = [one for one in found.movements if one.looks in uc.evaluation.diagnosis.COUNTED]
     if not (free := sorted(told, key=lambda one: -(one.free or 0.0))):

@@ -11,7 +11,7 @@ import click
 import unconstrain as uc
 
 from ..base.errors import SettingError
-from .informing import RAN, verdict_of
+from .informing import MARK, MOVES, RAN, verdict_of
 from .printing import option_for_json, say_judged
 from .reading import fitted_policy, of_words
 from .writing import check_outputs, option_for_force
@@ -34,6 +34,9 @@ _NEXT_ROS2 = "colcon build, then colcon test; let it run with the robot held sti
 _UNIT = " Units: messages are in metres or radians, and 'scale' in {}/config makes them the policy's: 1.0 as written, "
 _UNIT += "1000.0 for millimetres, 100.0 for centimetres, 57.29578 for degrees."
 
+_MEANT = {"pose": "pose ({} as x, y, z; --messages joints for joints)"}
+_MEANT["joints"] = "joints (set 'joints' in its config to the robot's own names, for {}; --messages pose for a pose)"
+
 _CENTRED = " States as measured: it takes them relative to the mean of a demonstration; first subtract that."
 
 TARGETS = {
@@ -52,7 +55,7 @@ TARGETS = {
 @click.option("--ros2", type=click.Path(file_okay=False), help="Folder for a ROS 2 package with a node.")
 @click.option("--name", help="C, ROS 2: what all names begin with; by default as the file or folder is called.")
 @click.option("--float", "single", is_flag=True, help="Compute in single precision.")
-@of_words("--messages", "joints pose", "ROS 2: what states are; by default a pose where they are called x, y, z.")
+@of_words("--messages", "joints pose", "ROS 2: what states are; by default a pose where they are x, y, z or lengths.")
 @option_for_force
 @option_for_json
 def export(
@@ -72,12 +75,13 @@ def export(
     check_outputs((output, header, ros2), (policy,), force)
     learnt, notes = fitted_policy(policy), uc.storage.load_notes(policy)
     notes["units"] = uc.Recipe.from_dict(notes.get("recipe", {})).units(notes.get("units", {}))  # as recorded, if old
-    notes.pop(RAN, None)  # figures, which the verdict puts in words
+    judged = _judged(learnt, notes, ros2)
+    notes |= {MARK: f"{judged.mark.name.lower()}. {judged.said} Do not trust: {judged.doubt}", RAN: None, MOVES: None}
     written, then = dict[str, str](), _NEXT_ROS2
     if ros2 is not None:
         taken = learnt.export_ros2(ros2, name, messages=messages, notes=notes)
-        other = " (--messages pose for a pose)" * (taken == "joints" and messages is None and not as_json)
-        written |= {"messages": f"{taken}{other}", "ROS 2 package": ros2}
+        names = ", ".join(uc.Recipe.from_dict(notes.get("recipe", {})).states or ["the states"])
+        written |= {"messages": taken if as_json else _MEANT[taken].format(names), "ROS 2 package": ros2}
     if output is not None:
         target, options = TARGETS[kind], {"name": name, "single": single, "notes": notes}
         getattr(learnt, target.method)(output, **{option: options[option] for option in target.takes})
@@ -86,7 +90,9 @@ def export(
         written[target.what] = output
     if header is not None:
         written["header"] = header
-    say_judged(_judged(learnt, notes, ros2)._replace(next=then), written, as_json)
+    if judged.mark is uc.evaluation.verdicts.Mark.BAD:
+        then = f"It is not to be trusted as it is: {judged.next.rstrip('.')}. To try it all the same: {then}"
+    say_judged(judged._replace(next=then), written, as_json)
 
 
 def _judged(learnt: Any, notes: dict[str, Any], ros2: str | None) -> uc.evaluation.verdicts.Verdict:

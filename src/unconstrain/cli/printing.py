@@ -33,7 +33,7 @@ CODES = "unconstrain.codes"
 OTHER_UNITS = {"unit-differs", "clock-differs"}
 """Codes of recordings in another unit than others."""
 
-SPOILING = {*OTHER_UNITS, "missing", "refused", "same-recording"}
+SPOILING = {*OTHER_UNITS, "missing", "refused", "same-recording", "rolled-out"}
 """Codes of recordings that spoil what is learnt with others, or end it."""
 
 MEANINGS = {
@@ -214,6 +214,8 @@ def as_noted(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.
     told = click.get_current_context().meta
     if jumps := [title for title, one in told.get(TITLES, {}).get("glitch", {}).items() if not one.cured]:
         verdict = uc.evaluation.verdicts.of_glitches(verdict, listed(jumps, 4))
+    if "rolled-out" in told.get(CODES, ()):
+        return uc.evaluation.verdicts.of_units_apart(verdict, "a movement that was rolled out is learnt from")
     if "not-velocities" in told.get(CODES, ()):
         return uc.evaluation.verdicts.of_units_apart(verdict, "actions are not the velocities of the states")
     return uc.evaluation.verdicts.of_units_apart(verdict) if OTHER_UNITS & {*told.get(CODES, ())} else verdict
@@ -244,7 +246,11 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
     if getattr(policy, "features", None) == "auto":
         click.echo(f"Features of least estimated error: {uc.evaluation.diagnosis.models_of(policy)}.")
     if solution.belief is not None:
-        click.echo(_said_of_samples(solution, () if policy.scale_ else stream.recipe.labels(stream.first.units)[1]))
+        unit = "" if policy.scale_ else unit_of(stream.recipe.labels(stream.first.units)[1])
+        where = f"{unit} on each action" if unit else "on each action, in its unit"
+        risks = {name: one.risk for name, one in solution.candidates.items()}
+        said = f"Noise and misfit are about {solution.noise:.3g} {where}; 'unconstrain diagnose' says what looks free."
+        click.echo(f"{uc.evaluation.diagnosis.about_choice(solution.method, risks)} {said}")
         if known:
             _say_suspects(solution.belief.suspects, stream)
     elif learner != "direct":
@@ -295,16 +301,6 @@ def _say_suspects(rows: NDArray[np.intp], stream: uc.Stream | None) -> None:
         named = ((name.partition("/")[2], demo) for name, demo in stream.named_demonstrations())
         for line in uc.evaluation.diagnosis.about_suspects(uc.evaluation.diagnosis.places_of(rows, named)):
             click.echo(f"Note: {line}", err=True)
-
-
-def _said_of_samples(solution: uc.Solution, actions: Sequence[str]) -> str:
-    """The candidate that a robust learner took, and its estimates of noise and free samples."""
-    where = f"{unit} on each action" if (unit := unit_of(actions)) else "on each action, in its unit"
-    risks, share = {name: one.risk for name, one in solution.candidates.items()}, solution.believed.undecided_share
-    undecided = f" ({percent(share)} free or always held in the same way, which looks alike)" if share >= 0.01 else ""
-    said = f"{uc.evaluation.diagnosis.about_choice(solution.method, risks)} Noise and misfit are about "
-    said += f"{solution.noise:.3g} {where}, and {percent(solution.free_share)} of the samples were free, or "
-    return f"{said}held by less than that{undecided}."
 
 
 def explained(policy: Any, demonstrations: Sequence[uc.Demonstration]) -> float:

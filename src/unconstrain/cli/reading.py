@@ -17,7 +17,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import bare, counted, innermost
+from ..base.display import bare, counted, innermost, listed
 from ..base.errors import NOTHING_LEFT, InvalidDataError, ModelFileError, ReadError, SettingError, UnconstrainError
 from ..base.files import stem
 from .progress import Progress
@@ -232,6 +232,9 @@ def said_recipe(recipe: uc.Recipe, recording: uc.Recording) -> str:
     smoothed = ways.get(recipe.differentiate or "", "central differences")
     actions = f"their velocity ({smoothed})" if recipe.actions is None else f"{', '.join(recipe.actions)} as actions"
     radians = f", {', '.join(recipe.degrees)} in radians" if recipe.degrees else ""
+    units = recipe.units(recording.units)
+    if left := [name for name in (*(recipe.states or ()), *(recipe.actions or ())) if units.get(name, "")[:3] == "deg"]:
+        radians += f", {listed(left, 3)} left in degrees (--degrees takes them in radians)"
     return f"{states} as states and {actions}{'' if recipe.actions else ' as actions'}{radians}"
 
 
@@ -327,8 +330,8 @@ def likely_states(columns: Sequence[str]) -> tuple[str, ...]:
     for axes in ("xyz", "xy"):
         if axes in ends:
             return tuple(columns[ends.index(axes) :][: len(axes)])
-    heads = [bare(name).rstrip("0123456789") for name in columns]
-    numbered = next((head for head in heads if heads.count(head) > 1 and head not in ("", "column")), None)
+    heads = [re.sub(r"\d+", "#", bare(name)) for name in columns]
+    numbered = next((head for head in heads if heads.count(head) > 1 and head not in ("#", "column#")), None)
     family = tuple(name for name, head in zip(columns, heads, strict=True) if head == numbered)
     return family or tuple(columns[:MOST_GUESSED])
 

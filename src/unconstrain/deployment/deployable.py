@@ -88,7 +88,8 @@ class Exportable:
     ) -> None:
         """Write the policy as an ONNX graph, ``states`` (N, n) to ``actions`` (N, d), in float64 or float32.
 
-        Needs the extra ``onnx``. Parameters and errors as in :meth:`export_c`; what is said goes into the metadata.
+        A second output is the ``support`` (N,): stop where it is near 0. Needs the extra ``onnx``. Parameters and
+        errors as in :meth:`export_c`; what is said goes into the metadata.
 
         Examples
         --------
@@ -115,7 +116,7 @@ class Exportable:
         ----------
         messages : {"joints", "pose"}, optional
             Whether states are the positions of joints (``JointState`` in, ``Float64MultiArray`` out) or of a pose
-            (``PoseStamped`` in, ``TwistStamped`` out); by default of a pose where they are called x, y and z.
+            (``PoseStamped`` in, ``TwistStamped`` out); by default of a pose where they are x, y and z or three lengths.
 
         Raises
         ------

@@ -20,7 +20,7 @@ IR_VERSION = 8
 
 
 def onnx_model(form: ClosedForm, described: Description, *, single: bool) -> bytes:
-    """Serialised graph from ``states`` (N, n) to ``actions`` (N, d), of standard operators only, for any N."""
+    """Serialised graph of standard operators, from ``states`` (N, n) to ``actions`` (N, d) and ``support`` (N,)."""
     require_extra("onnx", "onnx")
     from onnx import TensorProto, checker, helper
 
@@ -28,8 +28,9 @@ def onnx_model(form: ClosedForm, described: Description, *, single: bool) -> byt
     to = "actions" if form.correction is None else "wanted"
     graph = _Graph(np.float32 if single else np.float64)
     relative = graph.add("Sub", _coordinates(graph, form), graph.constant("origin", form.origin))
+    kernels = form.exponents
+    exponents = "" if kernels is None else graph.affine(relative, kernels[:, :n].T, kernels[:, n], "exponents")
     if form.blending is not None:
-        exponents = graph.affine(relative, form.blending[:, :n].T, form.blending[:, n], "exponents")
         _blended(graph, form, relative, graph.add("Softmax", exponents, axis=-1), to)
     elif form.monomials is not None:
         _polynomial(graph, form, relative, form.monomials, to)
@@ -37,23 +38,34 @@ def onnx_model(form: ClosedForm, described: Description, *, single: bool) -> byt
         graph.affine(relative, form.maps[0, :, :n].T, form.maps[0, :, n], "map", to=to)
     if form.correction is not None:
         _corrected(graph, form.correction)
+    _supported(graph, form, relative, exponents)
     kind = TensorProto.FLOAT if single else TensorProto.DOUBLE
-    made = helper.make_graph(
-        graph.nodes,
-        "unconstrain_policy",
-        [
-            helper.make_tensor_value_info("states", kind, ["N", form.columns]),
-            *([] if form.correction is None else [helper.make_tensor_value_info("projections", kind, ["M", d, d])]),
-        ],
-        [helper.make_tensor_value_info("actions", kind, ["N", d])],
-        graph.constants,
+    taken = {"states": ["N", form.columns]} | ({} if form.correction is None else {"projections": ["M", d, d]})
+    given, told = (
+        [helper.make_tensor_value_info(name, kind, size) for name, size in of.items()]
+        for of in (taken, {"actions": ["N", d], "support": ["N"]})
     )
+    made = helper.make_graph(graph.nodes, "unconstrain_policy", given, told, graph.constants)
     model = helper.make_model(
         made, producer_name="unconstrain", opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION
     )
     helper.set_model_props(model, described.whole)
     checker.check_model(model, full_check=True)
     return bytes(model.SerializeToString())
+
+
+def _supported(graph: _Graph, form: ClosedForm, relative: str, exponents: str) -> None:
+    """The ``support`` as :meth:`~unconstrain.ClosedForm.support` has it."""
+    zero = graph.constant("none", np.array(0.0))
+    if form.precisions is None or not exponents:
+        beyond = graph.add("Sub", graph.add("Abs", relative), graph.constant("within", form.within))
+        inside = graph.add("LessOrEqual", graph.add("ReduceMax", beyond, axes=[1], keepdims=0), zero)
+        graph.add("Where", inside, graph.constant("one", np.array(1.0)), zero, to="support")
+        return
+    halves = graph.constant("halves", 0.5 * form.precisions)
+    far = graph.add("MatMul", graph.add("Mul", relative, relative), halves)
+    nearest = graph.add("Sub", graph.add("ReduceMax", exponents, axes=[1], keepdims=0), far)
+    graph.add("Exp", graph.add("Min", nearest, zero), to="support")
 
 
 def _coordinates(graph: _Graph, form: ClosedForm) -> str:

@@ -31,6 +31,13 @@ _MESSAGES = {
 _ACCELERATION = re.compile(r"(?i)accel|ddot|(^|[^a-z])(acc([^a-z]|$)|dd)|[a-z]dd[_.]?\d|/ ?s(\^|\*\*)?[2²]|/s/s")
 """What a column of accelerations is called, or its unit: ``"qdd1"``, ``"x_ddot"``, ``"acc_x"``, ``"u1 (m/s^2)"``."""
 
+_JOINT = re.compile(r"(?i)joint|axis|slide|rail|(^|[^a-z])[qj]_?\d")
+"""What a column of joints is called, also where these are lengths."""
+
+_OWN = "the names of the robot's own joints, in this order, as in its messages, such as [elbow_joint, wrist_joint]"
+_SET = {"joints": f"Set `joints` to {_OWN}. Until then the node rests. As written they are the recorded columns"}
+_SET["pose"] = "Taken as x, y and z of the pose, in the frame `frame`, are"
+
 _PLACES = {
     "package.xml": "package.xml",
     "CMakeLists.txt": "CMakeLists.txt",
@@ -56,8 +63,10 @@ def export_ros2(
     Node and loop limit the speed, stop where the support of the data ends, and stop when no state comes.
     """
     package = c_name(Path(os.path.realpath(folder)).name if name is None else name).lower()
-    coordinates = [bare(name)[-1:].lower() for name in described.states] == ["x", "y", "z"]
-    kind: Messages = messages or ("pose" if coordinates else "joints")
+    names, units = [*map(bare, described.states)], {described.units.get(name) for name in described.states}
+    lengths = len(names) == 3 and units <= {"m", "cm", "mm"} and not any(map(_JOINT.search, names))
+    places = lengths or [name[-1:].lower() for name in names] == ["x", "y", "z"]
+    kind: Messages = messages or ("pose" if places else "joints")
     _check(form, kind, described)
     fill = _words(package, form, described, kind)
     fill |= {"limit": repr(max(1e-9, speed_limit(form, policy, described)))} | _plane(form, fill)
@@ -89,7 +98,8 @@ def _words(package: str, form: ClosedForm, described: Description, kind: Message
         "depends": "\n".join(f"  <depend>{each}</depend>" for each in used),
         "find": "\n".join(f"find_package({each} REQUIRED)" for each in used),
         "targets": " ".join(f"${{{each}_TARGETS}}" for each in used),
-        "own": f"joints: [{joints}]" if kind == "joints" else "frame: base_link",
+        "own": f"joints: [{joints}]  # {_OWN}" if kind == "joints" else "frame: base_link",
+        "set": f"{_SET[kind]}: {', '.join(described.states)}.",
         "joints": joints,
         "state_message": received,
         "command_message": sent,

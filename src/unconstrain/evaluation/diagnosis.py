@@ -81,9 +81,7 @@ def places_of(rows: NDArray[np.intp], demonstrations: Iterable[tuple[str, Demons
 
 @dataclass(frozen=True)
 class Region:
-    """A region of state space, and the recorded state in it of which least is known.
-
-    That is the one of largest undetermined spread, of those that all demonstrations leave open if there are any.
+    """A region of state space, and the state in it of largest spread, of those that all leave open if there are any.
 
     Parameters
     ----------
@@ -94,8 +92,7 @@ class Region:
     determined, together : float
         Share of these samples at which the policy is determined by whichever demonstrations are but two, and by all.
     spread : float
-        Root-mean-square undetermined standard deviation over them, with whichever two demonstrations left out, as a
-        share of the typical action.
+        Root-mean-square undetermined standard deviation over them, any two left out, as a share of the typical action.
     state : tuple of float
         That recorded state.
     demonstration : str

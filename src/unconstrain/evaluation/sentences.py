@@ -147,11 +147,10 @@ def looks(free: float, told: float, flat: bool) -> str:
 
 
 def _about_freedom(found: Diagnosis) -> str:
-    said = "Free, or held by less than the noise as far as the policy wanted to move: "
-    said += f"{percent(found.free_share)} of the samples"
+    said = f"{percent(found.free_share)} of the samples look free: nothing that shows above the noise held them"
     if found.undecided_share >= LITTLE:
-        said += f"; {percent(found.undecided_share)} were free or always held in the same way, which looks alike. "
-        said += "Demonstrations held in another way would tell"
+        said += f". Of {percent(found.undecided_share)} the recordings cannot tell: they were free or always held in "
+        said += "the same way, which looks alike; demonstrations held in another way would tell"
     if found.free is None:
         return f"{said}. That is of the samples that the policy was fitted to."
     many = Counter(one.looks for one in found.movements)

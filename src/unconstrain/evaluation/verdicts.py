@@ -210,7 +210,8 @@ def of_unit(found: Verdict, times: float) -> Verdict:
 def of_units_apart(found: Verdict, said: str = "recordings are not all in one unit") -> Verdict:
     """Add to a verdict that recordings were not all in one unit, or what else is said of units."""
     then = "Do what the notes say, or leave out the recordings that they name, and begin again."
-    return doubted(found, f"{said}, as the notes say")._replace(next=then)
+    first = f"{said[0].upper()}{said[1:]}, as the notes say."
+    return found._replace(mark=no_better(found.mark), said=f"{first} {found.said}", next=then)
 
 
 def of_glitches(found: Verdict, names: str) -> Verdict:

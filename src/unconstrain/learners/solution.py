@@ -20,8 +20,7 @@ class Uncertainty(NamedTuple):
     """Standard deviations of the predicted policy, each of shape (N, d).
 
     ``from_noise`` is due to noise and misfit, ``undetermined`` to directions
-    that the data does not determine, whichever two demonstrations are left out (all together may determine them: a
-    diagnosis says where), and ``total`` to both. The policy should
+    that the data does not determine without any two demonstrations (all may), and ``total`` to both. It should
     be within 1.96 of ``total`` 95 % of the time, except where ``undetermined``
     is most of it.
 

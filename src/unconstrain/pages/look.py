@@ -44,6 +44,7 @@ MOST_NUMBERS = 50_000
 """Of the covariances of a policy's weights; of more the page does not say where recordings tell the policy."""
 
 _NEXT = "Leave out what should not be learnt from, and copy the command that learns from the rest."
+_MOVED = "Tilt the plane, and begin at the next start, to see where the policy goes; then score it on new recordings."
 
 
 class Mark(NamedTuple):
@@ -101,6 +102,8 @@ def look_page(
     learnt = _free(innermost(policy), demos)
     known = free if learnt is None else learnt
     described = None if policy is None else _described(policy, len(columns))
+    runs = described is not None and not described["trouble"]
+    then = _MOVED if runs else _NEXT if command[0] else ""
     data = {
         "columns": list(columns),
         "units": [(units or {}).get(name, "") for name in columns],
@@ -114,9 +117,8 @@ def look_page(
         "policy": described,
         "planes": (planes := diagnosis.planes_of(demos))[: len(planes) == 1].tolist(),
         "verdict": "" if verdict is None else f"{verdict.mark.value} {verdict.said}",
-        "rest": [] if verdict is None else verdict._replace(next=_NEXT if command[0] else "").rest(),
+        "rest": [] if verdict is None else verdict._replace(next=then).rest(),
     }
-    runs = policy is not None and described is not None and not described["trouble"]
     script = policy.javascript() if policy is not None and runs else "null"
     told = _told(innermost(policy)) if policy is not None and runs else "null"
     return assembled("look.html", title=escape(title), data=literal(data), policy=script, told=told)

@@ -296,8 +296,8 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
         Returns
         -------
         Uncertainty
-            Standard deviations of each action coordinate, (N, d): from noise, from what is undetermined with whichever
-            two demonstrations left out, and in total. What all together tell may so be undetermined.
+            Standard deviations of each action coordinate, (N, d): from noise, undetermined as any two
+            demonstrations are left out, and in total.
 
         Raises
         ------

@@ -104,7 +104,7 @@ class Recording(Shown):
         missing = [name for name in names if name not in self._places]
         if missing:
             said = has_no_column(self.name, missing, self.columns, self.words)
-            others = len(missing) == len(names) <= len(self.columns) and not said.endswith("?")
+            others = len(missing) == len(names) <= len(self.columns) and not said.endswith(("?", "convert it."))
             cure = " Name those of this file with states= and actions=, or all of its columns with columns=."
             raise LackingError(said + cure * others)
         return self.values[:, [self._places[name] for name in names]]

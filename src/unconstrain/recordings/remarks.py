@@ -23,6 +23,7 @@ WARNINGS = (
     "unit-differs",
     "columns-differ",
     "same-recording",
+    "rolled-out",
     "pause",
     "reversed",
     "at-rest",

@@ -44,6 +44,6 @@ def movements(
         getattr(axes, f"set_{name}lim")(middle - half, middle + half)
         getattr(axes, f"{name}axis").set_pane_color((0, 0, 0, 0))
         getattr(axes, f"{name}axis").set_major_locator(require_extra("matplotlib.ticker", "viz").MaxNLocator(4))
-    axes.set_box_aspect(size, zoom=1.25)
+    axes.set_box_aspect(size, zoom=1.25 if max(map(len, labels)) < 9 else 1.0)  # long names take room
     axes.view_init(elev=24, azim=-52)
     return made

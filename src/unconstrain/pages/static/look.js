@@ -547,7 +547,7 @@
   function sayAll() {
     const warnings = demos.flatMap((demo) => demo.marks.map((mark) => ({ demo, mark })));
     const odd = warnings.filter(({ mark }) => mark.code !== "gap" && mark.code !== "pause");
-    of("verdict").textContent = shown.verdict + (odd.length ? " What looks odd is listed below." : "");
+    of("verdict").textContent = shown.verdict + (odd.length ? " What is marked is listed below." : "");
     of("rest").append(...shown.rest.flatMap((pair) =>
       pair.map((textContent, i) => made(i ? "dd" : "dt", { textContent }))));
     of("verdict").className = /^[!✖]/.test(shown.verdict) ? "verdict warn" : "verdict";

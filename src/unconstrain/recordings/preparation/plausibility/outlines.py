@@ -15,6 +15,7 @@ class Outline(NamedTuple):
     made there (k, n); its ``title``, and the seconds between samples, NaN where not known. Of its ``turning`` columns,
     angles and orientations, several numbers stand for one place. ``made`` (k, d) is what columns of ``actions`` make of
     each step if they are velocities, per sample where the time is not known; empty where they are said not to be.
+    ``exact`` is whether columns are states and their velocities alone, which agree as in what was computed.
     """
 
     title: str
@@ -28,6 +29,7 @@ class Outline(NamedTuple):
     turning: frozenset[str] = frozenset()
     actions: tuple[str, ...] = ()
     made: Array = np.zeros((0, 0))
+    exact: bool = False
 
     @property
     def push(self) -> float:

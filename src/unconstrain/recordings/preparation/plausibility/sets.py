@@ -8,7 +8,8 @@ from collections.abc import Callable, Collection, Sequence
 import numpy as np
 
 from ....base.arrays import Array
-from ....base.display import listed, percent
+from ....base.display import listed, percent, speed_of
+from ...demonstration import Recording
 from ...remarks import Remark
 from ...signals.stillness import is_noise, noise_share
 from .actions import actions_differ
@@ -78,7 +79,27 @@ def outline(subject: Subject) -> Outline | None:
         frozenset({*recipe.angles, *map(subject.name, subject.wraps)}.union(*recipe.quaternions)),
         recipe.actions or (),
         made[at + span - 1] - np.where(at[:, None] > 0, made[at - 1], 0.0),
+        _is_computed(subject.recording),
     )
+
+
+def _is_computed(recording: Recording) -> bool:
+    """Whether columns are states and their velocities alone, which agree better than recorded ones can."""
+    names, n, times = recording.columns, len(recording.columns) // 2, recording.times
+    if times is None or len(times) < FEWEST or names[n:] != tuple(map(speed_of, names[:n])):
+        return False
+    x, v = recording.values[:, :n], recording.values[:, n:]
+    whole = x[2:] - x[:-2]
+    off = whole - np.diff(times)[1:, None] / 3 * (v[:-2] + 4 * v[1:-1] + v[2:])
+    return bool(np.median(np.abs(off).sum(axis=1)) < 1e-4 * np.median(np.abs(whole).sum(axis=1)))
+
+
+def rolled_out(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
+    """Demonstrations that were computed, as ``rollout`` does, among others that were recorded."""
+    said = "velocities agree exactly with the states, as where 'unconstrain rollout' wrote them, unlike the others': "
+    remark = Remark("rolled-out", f"{said}leave it out with leave_out=.")
+    every = [place for place, one in enumerate(outlines) if one.exact]
+    return [(place, remark) for place in every if len(every) < len(outlines)]
 
 
 def compare(outlines: Sequence[Outline | None]) -> list[tuple[Remark, ...]]:
@@ -93,7 +114,7 @@ def compare(outlines: Sequence[Outline | None]) -> list[tuple[Remark, ...]]:
         columns = columns_differ(several, {place for place, _ in units})
         against = reversed_among_others(several, {place for place, _ in (*units, *columns)})
         each = [*clock_differs(several), *actions_differ(several), *units, *smaller_than_others(several)]
-        each += [*columns, *against, *same(several)]
+        each += [*columns, *against, *same(several), *rolled_out(several)]
         for place, remark in each:
             remarks[known[place][0]].append(remark)
     return [tuple(each) for each in remarks]
