@@ -7,6 +7,7 @@ import shlex
 from dataclasses import replace
 
 import numpy as np
+import onnxruntime
 import pytest
 
 import unconstrain as uc
@@ -332,3 +333,189 @@ def test_what_inspect_proposes_runs_whatever_the_columns_are_called(tmp_path, mo
     [line] = [one.strip() for one in then.splitlines() if one.strip().removeprefix("Next: ").startswith("unconstrain ")]
     words = [PLACES.get(word, word) for word in shlex.split(line.removeprefix("Next: "))[1:]]
     assert call(*words).code == 0
+
+
+# What all leave open comes first
+
+
+def marked(tmp_path):
+    """Strokes on one side that one way alone was open on, and on the other side those of one that crossed."""
+    rng, files = np.random.default_rng(1), []
+    for k in range(9):
+        way = np.array([1.0, 0.0]) if k < 5 else np.array([np.cos(k), np.sin(k)])
+        at, seen = np.array([-1.0 if k < 5 else 1.0, 0.0]) + rng.uniform(-0.4, 0.4, 2), []
+        for _ in range(100):
+            seen.append(at + 1e-4 * rng.standard_normal(2))
+            at = at + 0.02 * np.outer(way, way) @ TURN @ at
+        times = 0.02 * np.arange(100)
+        files.append(write(tmp_path / f"d{k}.csv", "t,x,y", np.column_stack([times, seen])))
+    return files
+
+
+def test_fit_and_diagnose_name_first_what_all_recordings_leave_open(tmp_path):
+    files, asked = marked(tmp_path), ("--state", "x,y", "--by", "savgol")
+    regions = json.loads(run("diagnose", *files, *asked, "--json"))["regions"]
+    order = [(one["together"] >= 0.7, -one["along"]) for one in regions]
+    assert order == sorted(order)
+    assert sorted(order, key=lambda one: one[1]) != order  # as by the spread alone
+    x, y = regions[0]["state"]
+    assert regions[0]["together"] < 0.7
+    said = text(call("fit", *files, *asked, "-o", tmp_path / "p.npz"))
+    assert f"near (x = {x:.3g}, y = {y:.3g}), where '{regions[0]['demonstration']}' passed" in said
+
+
+def test_what_is_said_of_a_fit_holds_no_share_that_nobody_can_act_on(tmp_path):
+    files = strokes(tmp_path / "a", 1e-3)
+    assert "always held" not in text(call("fit", *files, *FREE, "-o", tmp_path / "p.npz"))
+    assert re.search(r"\d% of the samples look free: nothing", text(call("diagnose", *files, *FREE)))
+
+
+# Units
+
+
+@pytest.mark.parametrize("unit", ["mm", "m"])
+def test_a_file_that_says_another_unit_is_to_be_converted(tmp_path, unit):
+    files = strokes(tmp_path / "a", 1e-3)
+    other = files[3].read_text().replace("[m]", f"[{unit}]")
+    files[3].write_text(other)
+    ran = call("fit", *files, *FREE, "-o", tmp_path / "p.npz")
+    assert ("d3.csv has 'x [mm]', not 'x [m]' as the others" in text(ran)) == (unit == "mm")
+    assert (ran.code == 0) == (unit == "m")
+    said = text(call("inspect", *files, *FREE[:4]))
+    assert ("another unit; convert it." in said) == (unit == "mm")
+    assert "Did you mean" not in said + text(ran)
+
+
+@pytest.mark.parametrize("times", [1.0, 1e-3])
+def test_units_that_differ_are_said_before_how_much_is_explained(tmp_path, times):
+    files = strokes(tmp_path / "a", 1e-3)
+    table = np.loadtxt(files[3], delimiter=",", skiprows=1)
+    write(files[3], "t,x [m],y [m]", table * [1.0, times, times])
+    verdict = json.loads(run("fit", *files, *FREE, "-o", tmp_path / "p.npz", "--json"))["verdict"]
+    assert verdict["said"].startswith("Recordings are not all in one unit") == (times != 1.0)
+    assert verdict["mark"] != "good" or times == 1.0
+
+
+@pytest.mark.parametrize(("name", "more"), [("j{}_deg", ()), ("j{}_deg", ("--degrees", "j1_deg,j2_deg")), ("j{}", ())])
+def test_joints_that_are_left_in_degrees_are_said_to_be(tmp_path, name, more):
+    named = [name.format(k) for k in (1, 2)]
+    files = strokes(tmp_path / "a", 1e-3)
+    for one in files:
+        one.write_text(one.read_text().replace("x [m],y [m]", ",".join(named)))
+    ran = text(call("fit", *files, "--state", ",".join(named), *FREE[2:], *more, "-o", tmp_path / "p.npz"))
+    assert ("j1_deg, j2_deg left in degrees" in ran) == (name == "j{}_deg" and not more)
+
+
+# Numbers of trials
+
+
+@pytest.mark.parametrize("name", ["versuch", "t2"])
+def test_the_number_of_a_trial_is_no_state_and_tells_trials_apart(tmp_path, name):
+    tables = [np.loadtxt(one, delimiter=",", skiprows=1) for one in strokes(tmp_path / "a", 1e-3, samples=60)]
+    rows = [[k + 1 if name == "versuch" else row[1], *row, row[1] + 1] for k, one in enumerate(tables) for row in one]
+    file = write(tmp_path / "all.csv", f"{name},t,j1_deg,j2_deg,volt", rows)
+    said = text(call("inspect", file))
+    assert ("--group versuch" in said) == (name == "versuch")
+    assert "--state j1_deg,j2_deg " in said
+    held = [[*row[1:4], 0.0] for row in rows]
+    assert "--group" not in text(call("inspect", write(tmp_path / "held.csv", "t,j1_deg,j2_deg,flag", held)))
+
+
+# Roll-outs among recordings
+
+
+@pytest.mark.parametrize("others", ["recorded", "rolled out"])
+def test_a_movement_that_was_rolled_out_is_not_learnt_from_without_a_word(tmp_path, others):
+    files = strokes(tmp_path / "a", 1e-3)
+    run("fit", *files, *FREE, "-o", tmp_path / "p.npz")
+    rolled = tmp_path / "roll.csv"
+    call("rollout", tmp_path / "p.npz", "--start", "0.25,0.1", "-o", rolled)
+    table = np.loadtxt(rolled, delimiter=",", skiprows=1)
+    copies = [
+        write(tmp_path / f"r{k}.csv", "t,x [m],y [m],vx [m/s],vy [m/s]", table * [1, *[1.2 + k / 9] * 4])
+        for k in range(5)
+    ]
+    files = files if others == "recorded" else copies
+    ran = json.loads(run("fit", *files, rolled, *FREE[:4], "-o", tmp_path / "q.npz", "--json"))["verdict"]
+    assert ("A movement that was rolled out is learnt from" in ran["said"]) == (others == "recorded")
+    said = text(call("inspect", *files, rolled, *FREE[:4]))
+    assert ("--leave-out roll" in said) == (others == "recorded")
+    assert "rolled-out" not in text(call("inspect", *files, *FREE[:4]))
+
+
+# Exports
+
+
+@pytest.mark.parametrize(
+    ("names", "kind"),
+    [("tcp_along,tcp_across,tcp_up", "pose"), ("q1,q2,q3", "joints"), ("a_deg,b_deg,c_deg", "joints")],
+)
+def test_a_package_says_what_its_messages_hold_and_what_is_to_be_set(tmp_path, names, kind):
+    states = names.split(",")
+    unit = "" if "deg" in names else "mm"
+    rng, files = np.random.default_rng(0), []
+    for k in range(4):
+        path = rng.uniform(-9, 9, 3) * np.exp(-0.05 * np.arange(60))[:, None]
+        head = ",".join(f"{name} [{unit}]" if unit else name for name in states)
+        files.append(write(tmp_path / f"w{k}.csv", f"t,{head}", np.column_stack([0.05 * np.arange(60), path])))
+    run("fit", *files, "--state", names, "--by", "savgol", "--model", "affine", "-o", tmp_path / "p.npz")
+    said, readme = text(call("export", tmp_path / "p.npz", "--ros2", tmp_path / "ros")), tmp_path / "ros" / "README.md"
+    page = " ".join(readme.read_text("utf-8").split())
+    assert f"messages: {kind} (" in said
+    assert ("as x, y, z; --messages joints" in said) == (kind == "pose")
+    assert ("to the robot's own names" in said) == (kind == "joints")
+    assert ("Set `joints` to the names of the robot's own joints" in page) == (kind == "joints")
+    assert "such as [elbow_joint, wrist_joint]" in page or kind == "pose"
+
+
+def test_an_export_repeats_the_verdict_of_its_policy_and_what_to_do_first(tmp_path):
+    bad, good = marked(tmp_path), strokes(tmp_path / "b", 1e-4, held=False)
+    for files in (bad, good):
+        ways = ("--state", "x,y", "--by", "savgol") if files is bad else FREE
+        run("fit", *files, *ways, "-o", tmp_path / "p.npz", "--force")
+        mark = json.loads(run("info", tmp_path / "p.npz", "--json"))["verdict"]["mark"]
+        assert (mark == "bad") == (files is bad)
+        said = text(call("export", tmp_path / "p.npz", "--ros2", tmp_path / "r", "-o", tmp_path / "p.c", "--force"))
+        page = " ".join((tmp_path / "r" / "README.md").read_text("utf-8").split())
+        head = " ".join((tmp_path / "p.h").read_text("utf-8").replace("*", "").split())
+        assert ("It is not to be trusted as it is" in said) == (mark == "bad")
+        for one in (page, head):
+            assert f"verdict: {mark}. " in one
+            assert "Do not trust: States far from all data" in one
+            assert "run from the same starts: " not in one
+
+
+@pytest.mark.parametrize("single", [False, True])
+@pytest.mark.parametrize("model", ["local", "rbf", "quadratic"])
+def test_the_graph_gives_the_support_of_each_state(tmp_path, model, single):
+    files, rng = strokes(tmp_path / "a", 1e-3), np.random.default_rng(0)
+    run("fit", *files, *FREE[:4], "--model", model, "--learner", "direct", "-o", tmp_path / "p.npz")
+    call("export", tmp_path / "p.npz", "-o", tmp_path / "p.onnx", *["--float"] * single)
+    graph = onnxruntime.InferenceSession(tmp_path / "p.onnx", providers=["CPUExecutionProvider"])
+    states = np.vstack([rng.uniform(-0.4, 0.4, (50, 2)), [[1000.0, 1000.0]]]).astype(
+        np.float32 if single else np.float64
+    )
+    [found] = graph.run(["support"], {"states": states})
+    expected = uc.load(tmp_path / "p.npz", uc.Policy).closed_form().support(states)
+    assert found.shape == (51,)
+    assert found.dtype == states.dtype
+    np.testing.assert_allclose(found, expected, atol=1e-4 if single else 1e-9)
+    assert found[-1] == 0.0 < found.max()
+
+
+# Pages
+
+
+def test_pages_are_called_by_what_they_are_and_lead_on(tmp_path):
+    files = strokes(tmp_path / "a", 1e-3, samples=60)
+    run("fit", *files, *FREE, "-o", tmp_path / "p.npz", "--report", tmp_path / "f.html")
+    run("diagnose", *files, *FREE, "-o", tmp_path / "d.html")
+    titles = [re.search("<title>(.*?)</title>", (tmp_path / one).read_text("utf-8"))[1] for one in ("f.html", "d.html")]
+    assert titles[0].startswith("The policy p")
+    assert titles[1].startswith("Diagnosis of d0.csv")
+    for more in ((), (tmp_path / "p.npz",)):
+        run("look", *files, *more, *FREE[:4], "-o", tmp_path / "l.html", "--force")
+        page = (tmp_path / "l.html").read_text("utf-8")
+        assert ("Tilt the plane, and begin at the next start" in page) == bool(more)
+        assert ("Leave out what should not be learnt from" in page) == (not more)
+        assert "What looks odd" not in page
