@@ -382,9 +382,9 @@ def test_what_is_learnt_goes_to_a_file_that_is_called_so(files, tmp_path, comman
 @pytest.mark.parametrize(
     ("units", "more", "said"),
     [
-        (" [mm]; [mm]; [mm/s]; [mm/s]", (), " mm/s on each action, and"),
-        (" [mm]; [rad]; [mm/s]; [rad/s]", (), " on each action, in its unit, and"),
-        (" [mm]; [mm]; [mm/s]; [mm/s]", ("--scale", "1000,1000"), " on each action, in its unit, and"),
+        (" [mm]; [mm]; [mm/s]; [mm/s]", (), " mm/s on each action;"),
+        (" [mm]; [rad]; [mm/s]; [rad/s]", (), " on each action, in its unit;"),
+        (" [mm]; [mm]; [mm/s]; [mm/s]", ("--scale", "1000,1000"), " on each action, in its unit;"),
     ],
 )
 def test_fit_says_the_unit_of_noise_where_actions_have_one(files, tmp_path, units, more, said):

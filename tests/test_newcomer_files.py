@@ -533,7 +533,7 @@ def test_velocities_of_another_unit_or_column_are_told_with_the_command_that_tak
     assert f" {then} -o policy.npz" in said
     shown = call("fit", *files, *LINEAR, "-o", tmp_path / "p.npz")
     assert shown.out[0] in "!✖"
-    assert "actions are not the velocities of the states, as the notes say" in text(shown)
+    assert "Actions are not the velocities of the states, as the notes say" in text(shown)
     cured = text(call("fit", *files, *then.split(), *LINEAR, "-o", tmp_path / "q.npz"))
     assert "not-velocities" not in cured
     assert "as the notes say" not in cured
@@ -592,7 +592,8 @@ def test_a_ros_2_package_tells_its_messages_and_the_scale_of_its_unit(tmp_path, 
     files = joints(tmp_path, 1.0, ",".join([*names, "w"]))
     run("fit", *files, *options, "-o", tmp_path / "p.npz")
     said = text(call("export", tmp_path / "p.npz", "--ros2", tmp_path / "node"))
-    assert "messages: joints (--messages pose for a pose)" in said
+    kind = "pose (a [" if unit in ("[mm]", "[cm]") else "joints (set 'joints' in its config"
+    assert f"messages: {kind}" in said
     assert ("100.0 for centimetres, 57.29578 for degrees" in said) == (not unit)
     assert f"scale: {scale} " in (tmp_path / "node" / "config" / "node.yaml").read_text()
     told = json.loads(run("export", tmp_path / "p.npz", "--ros2", tmp_path / "n", "--messages", "pose", "--json"))

@@ -111,7 +111,7 @@ def meant(asked: Sequence[str], known: Iterable[str]) -> str:
 def has_no_column(name: str, missing: Sequence[str], columns: Sequence[str], words: Sequence[str] = ()) -> str:
     """Say that a recording lacks columns, which ones it has, of numbers and of words, and what may have been meant."""
     same = {bare(one): one for one in columns}
-    if all(unit_of([one]) and unit_of([same.get(bare(one), "")]) for one in missing):
+    if all("" != unit_of([one]) != unit_of([same.get(bare(one), "")]) != "" for one in missing):
         other = f"'{name}' has {same[bare(missing[0])]!r}, not {missing[0]!r} as the others or as asked for"
         return f"{other}: another unit; convert it."
     of_words = f", and of words, for group=, {listed(words)}" if words else ""

@@ -104,8 +104,9 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
         every = (one for path in paths for one in uc.readers.read_blocks(path, how, whole=True))
         for recording in left_in(every, reading["leave_out"]):
             first[:] = first or [recording]
-            columns = zip(recording.columns, recording.values.T, strict=True)  # such as numbers of trials
-            labels.append({name: one[0] for name, one in columns if len(one) and (one == one[0].round()).all()})
+            held = (recording.values == recording.values[:1].round()).all(axis=0)  # as is the number of a trial
+            head = zip(recording.columns, held, recording.values[0] if len(recording) else held, strict=True)
+            labels.append({name: value for name, kept, value in head if kept})
             yield recording
 
     with shown("reading"):
