@@ -110,7 +110,7 @@ def test_the_first_lines_say_what_is_there_and_what_is_odd(folder, page):
     rest = page.execute_script("return [...document.getElementById('rest').children].map((one) => one.textContent)")
     assert rest[::2] == [name for name in ("Trust", "Do not trust", "Next") if f"{name}: " in said]
     assert all(f"{name}: {one}" in said for name, one in zip(rest[:-2:2], rest[1:-2:2], strict=True))
-    assert rest[-1].startswith("Leave out what should not be learnt from")  # the page is open by now
+    assert rest[-1].startswith("Tilt the plane, and begin at the next start")  # the page is open by now
     near = page.execute_script("return shown.patches.map((one) => one.at)")
     drawn = np.loadtxt(folder / "wipe_0.csv", delimiter=",", skiprows=1)[:, 1:]
     assert np.abs(np.array(near)[:, None] - drawn).max(axis=2).min(axis=1).max() < 0.02
