@@ -4,7 +4,7 @@ import html
 import json
 import re
 import shlex
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -12,6 +12,8 @@ import pytest
 import unconstrain as uc
 from test_cli import call, run, write
 from test_newcomer import text
+from unconstrain.cli import main, reading
+from unconstrain.cli.informing import TOLD
 from unconstrain.evaluation import diagnosis, metrics, verdicts
 from unconstrain.evaluation.diagnosis import places
 
@@ -302,6 +304,76 @@ def test_what_comes_next_runs_as_it_is_printed(work, tmp_path, monkeypatch, comm
         words = [PLACES.get(word, word) for word in shlex.split(line)[1:]]
         ran = call(*words)
         assert ran.code in (0, 3), (line, ran.err)
+
+
+OTHER = {
+    "states": ("x", "y"),
+    "actions": ("vx", "vy"),
+    "differentiate": "kalman",
+    "window_s": 0.1,
+    "order": 2,
+    "rate": 62.5,
+    "trim": (0.5, 0.0),
+    "still": 24.0,
+    "centre": True,
+    "max_gap_s": 0.125,
+    "sort": True,
+    "angles": ("x",),
+    "degrees": ("x", "y"),
+    "quaternions": (("a", "b", "c", "d"), ("e", "f", "g", "h")),
+    "rotation_vectors": (("a", "b", "c"),),
+    "glitches": "drop",
+    "seams": "cut",
+    "pauses": "keep",
+    "action_is": "delta",
+    "group": "stroke",
+    "time": "clock",
+    "time_unit": "ms",
+    "columns": ("t", "x", "y"),
+    "topic": "/arm",
+}
+"""Of each setting that reads and prepares files a value that it does not have by default."""
+
+
+def test_every_setting_that_reads_and_prepares_has_another_value_here():
+    assert {*OTHER} == {one.name for one in fields(uc.Recipe)} | {*uc.readers.Reading().roles}
+    plain = {**vars(uc.Recipe()), **uc.readers.Reading().roles}
+    assert all(plain[name] != value for name, value in OTHER.items())
+
+
+@pytest.mark.parametrize("name", OTHER)
+def test_a_printed_command_reads_and_prepares_as_what_the_policy_was_learnt_from(work, tmp_path, name):
+    other = {"states": tuple("abcdefgh") if "quat" in name else ("x", "y"), name: OTHER[name]}
+    roles = {} if name in vars(uc.Recipe()) else {name: other.pop(name)}
+    recipe = replace(uc.Recipe(**({} if name == "actions" else {"differentiate": "savgol"})), **other)
+    uc.save(uc.load(work / "p.npz"), tmp_path / "q.npz", {"recipe": recipe.to_dict(), TOLD: 0.2, **roles})
+    [line] = [one.strip() for one in run("info", tmp_path / "q.npz").splitlines() if " diagnose REC" in one]
+    _, command, *words = shlex.split(line)
+    given = main.commands[command].make_context(command, words).params
+    assert reading.recipe_of(**given) == recipe
+    assert {**reading.reading_of(**given).roles} == {**uc.readers.Reading(**roles).roles}
+    plain = {one for one in OTHER if one not in other and one not in roles} - {"differentiate"}
+    words_of_others = {f"--{reading.OPTIONS.get(one, one).replace('_', '-')}" for one in plain}
+    assert not words_of_others & {*words}
+
+
+@pytest.mark.parametrize("more", [(), ("--window", "0.1", "--still", "0.02")], ids=["as the policy", "but for some"])
+def test_a_look_at_a_policy_copies_the_command_that_reads_as_it_did(work, tmp_path, monkeypatch, more):
+    """Strokes without a clock in one file, at 50 Hz, of which rest at an end is left out."""
+    rows = [np.loadtxt(one, delimiter=",", skiprows=1) for one in sorted((work / "in ways").iterdir())]
+    write(tmp_path / "all.csv", "n,x,y", np.vstack([np.insert(one[:, 1:], 0, k, axis=1) for k, one in enumerate(rows)]))
+    monkeypatch.chdir(tmp_path)
+    how = ("--state", "x,y", "--by", "savgol", "--rate", "50", "--still", "0.01", "--group", "n")
+    run("fit", "all.csv", *how, "-o", "p.npz")
+    run("look", "p.npz", "all.csv", *more, "-o", "look.html")
+    [line] = re.findall(r'"(unconstrain fit [^"]*)","-o policy.npz"', (tmp_path / "look.html").read_text("utf-8"))
+    words = shlex.split(line)
+    options = dict(zip(words[3::2], words[4::2], strict=True))
+    assert options == dict(zip(how[::2], how[1::2], strict=True)) | dict(zip(more[::2], more[1::2], strict=True))
+    assert len(words) == 3 + 2 * len(options)
+    run(*words[1:], "-o", "again.npz")
+    stored = [uc.storage.load_notes(one)["recipe"] for one in ("p.npz", "again.npz")]
+    assert stored[1] == stored[0] | ({"window_s": 0.1, "still": 0.02} if more else {})
 
 
 ODD = {
