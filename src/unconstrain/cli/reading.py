@@ -302,12 +302,19 @@ def next_command(name: str, *more: str, without: Sequence[str] = ()) -> str:
     return f"unconstrain {name} {_as_pattern(context.params['files'])} {shlex.join([*told, *more])}".rstrip()
 
 
-def to_copy(verdict: Any, policy: str, notes: Mapping[str, Any] | None = None) -> Any:
-    """A verdict with the commands that its Next names whole, on these files or, in capitals, such as a model notes."""
+def to_copy(verdict: Any, policy: str, notes: Mapping[str, Any] | None = None, states: Sequence[str] = ()) -> Any:
+    """A verdict with the commands that its Next names whole, on these files or, in capitals, such as a model notes.
+
+    ``states`` are their names with units, where a goal may have to be given.
+    """
     lines, known = verdict.next.split("\n"), notes or {}
-    read = ["RECORDINGS.csv", *as_options(uc.Recipe.from_dict(known.get("recipe", {})), reading_of(**known))]
+    recipe = uc.Recipe.from_dict(known.get("recipe", {}))
+    read = ["RECORDINGS.csv", *as_options(recipe, reading_of(**known))]
+    states = states or recipe.labels(known.get("units", {}))[0]
     for name, to in re.findall(r"'unconstrain (\w+)(?: --guided ([\w.,]+))?", verdict.next):
-        more = ["--guided", "GOAL" if "," in to else to] * bool(to) + ["-o", "guided.npz" if to else "policy.npz"]
+        if to == "GOAL":
+            lines[0] += f" GOAL: {counted(len(states), 'number')}, of {', '.join(states)}." if states else ""
+        more = ["--guided", to] * bool(to) + ["-o", "guided.npz" if to else "policy.npz"]
         more = {"fit": more, "look": [policy]}.get(name, [])
         own = next_command(name, *more, without=["to"]) if notes is None and name != "score" else ""
         files = [policy, "NEW.csv"] if name == "score" else read

@@ -66,7 +66,8 @@ def score(
     judged = verdicts.of_worst(judged, {one["demonstration"]: one["explains"] for one in rows if one["fast"] >= LEAST})
     judged = judged if held is not None else verdicts.of_planes(judged, planes, _motion(demonstrations))
     with shown("running it from the same starts"):
-        found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units)
+        of = demonstrations, recipe, held, recordings[0].units
+        found = replayed(judged, moving, *of, starts="the starts of these recordings")
     judged = verdicts.of_unit(verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0)), _times(learnt, states))
     verdict = to_copy(judged, policy, notes)
     if not as_json:
