@@ -59,8 +59,9 @@ def _judged(policy: str, stored: Any, found: uc.motion.certificate.Certificate) 
         said = f"{policy}: {found.said.replace(' (see uc.Guided)', '')} {unit}"
         return verdicts.Verdict(verdicts.Mark.BAD, said, next=then)
     promise, away, checked = found.said.partition("A constraint that moves or is not told")
-    far = "" if notes.get(LOST) is None else f": {explained_by(stored, notes).said}"
-    far = f"That it moves as demonstrated is not guaranteed{far or ': the score says how near it keeps.'}"
+    far = "'unconstrain score' says how near it keeps to recordings."
+    far = far if notes.get(LOST) is None else explained_by(stored, notes).said.replace("The", "the", 1)
+    far = f"That it moves as demonstrated is not guaranteed: {far}"
     doubt = f"{away}{checked.partition(' Checked at')[0]} {far}".lstrip()
     then = f"unconstrain export {shlex.quote(policy)} -o policy.c"
     said = f"{policy}: guaranteed. {unit}"
