@@ -300,7 +300,7 @@ def test_what_comes_next_runs_as_it_is_printed(work, tmp_path, monkeypatch, comm
     assert named <= {line.split()[1] for line in copied}
     for line in copied:
         there = [name for name in PLACES if name in line]
-        assert len(there) <= 1
+        assert len({*there} - {"GOAL"}) <= 1
         words = [PLACES.get(word, word) for word in shlex.split(line)[1:]]
         ran = call(*words)
         assert ran.code in (0, 3), (line, ran.err)
@@ -374,6 +374,70 @@ def test_a_look_at_a_policy_copies_the_command_that_reads_as_it_did(work, tmp_pa
     run(*words[1:], "-o", "again.npz")
     stored = [uc.storage.load_notes(one)["recipe"] for one in ("p.npz", "again.npz")]
     assert stored[1] == stored[0] | ({"window_s": 0.1, "still": 0.02} if more else {})
+
+
+# What a guided policy is said to be
+
+
+@pytest.mark.parametrize(("off", "kept"), [(0, True), (1, True), (2, False)])
+def test_size_is_nearly_kept_where_a_quarter_is_off_at_most(off, kept):
+    said, strays = verdicts.moves(np.r_[np.full(off, 1.3), np.ones(6 - off)], np.ones(6))
+    assert (not strays) == kept
+    assert said == ("it keeps size and pace", "it nearly keeps size and pace", "2 of 6 go round too large")[off]
+
+
+@pytest.fixture(scope="module")
+def rounds(tmp_path_factory):
+    """Files of rounds on ovals with a dent, and a policy of them, guided or not."""
+    place, now = tmp_path_factory.mktemp("rounds"), 0.02 * np.arange(400)
+    for k in range(4):
+        angle = 3.0 * now + k
+        at = np.column_stack([0.3 * np.cos(angle), 0.2 * np.sin(angle) * (1 + 0.5 * np.cos(angle))]) * (1 + 0.02 * k)
+        write(place / f"d{k}.csv", "t,x [m],y [m]", np.column_stack([now, at]))
+    for name, more in (("p.npz", ()), ("g.npz", ("--guided", "cycle"))):
+        run("fit", place / "*.csv", "--state", "x,y", "--by", "savgol", *more, "-o", place / name)
+    return place
+
+
+def test_a_guided_policy_is_headed_by_what_is_in_its_file(rounds):
+    alone, guided = (json.loads(run("info", rounds / name, "--json")) for name in ("p.npz", "g.npz"))
+    assert guided["explained held out"] < alone["explained held out"] - 0.005
+    said, share = guided["verdict"]["said"], f"{guided['explained held out']:.0%}"
+    assert f"The guided policy explains {share} of held-out motion" in said
+    assert "Unguided it explains " in said
+    assert "uided" not in alone["verdict"]["said"]
+    missed = [round(100 * np.sqrt(1 - one["explained held out"])) for one in (alone, guided)]
+    assert f"it misses {missed[1]}% of a typical action" in guided["verdict"]["trust"] or not guided["verdict"]["trust"]
+    assert missed[1] > missed[0]
+    certified = text(call("certify", rounds / "g.npz"))
+    assert re.search(rf"is not guaranteed: .*he guided policy explains {share} of held-out motion", certified)
+    assert not re.search(r"by V|\bV\b", certified)
+
+
+def test_certify_proposes_the_guide_that_the_demonstrations_allow(rounds, work, tmp_path):
+    assert uc.storage.load_notes(rounds / "p.npz")["can be guided to"] == "auto"
+    assert "fit --guided auto'" in text(call("certify", rounds / "p.npz"))
+    assert "movements go on, as on a cycle" in text(call("certify", rounds / "p.npz"))
+    apart = tmp_path / "apart"  # reaches to places of their own
+    apart.mkdir()
+    for k, one in enumerate(sorted((work / "in ways").iterdir())):
+        rows = np.loadtxt(one, delimiter=",", skiprows=1)
+        write(
+            apart / one.name,
+            "t,x [mm],y [mm],z [mm]",
+            np.column_stack([rows + np.array([0, 0.5 * k, 0]), 0.3 * rows[:, 1]]),
+        )
+    run("fit", apart, "--state", "x,y,z", "--by", "savgol", "--still", "0.001", "-o", tmp_path / "p.npz")
+    said = text(call("certify", tmp_path / "p.npz"))
+    if "guaranteed:" in said or "nothing is" in said:
+        assert "GOAL: 3 numbers, of x [mm], y [mm], z [mm]." in said
+        assert "--still 0.001 --guided GOAL -o guided.npz" in said
+        assert "--guided auto" not in said
+
+
+def test_a_score_says_on_which_recordings_it_ran(rounds):
+    assert "un from the starts of these recordings, " in text(call("score", rounds / "p.npz", rounds / "d1.csv"))
+    assert "un from the same starts, " in text(call("info", rounds / "p.npz"))
 
 
 ODD = {

@@ -282,7 +282,7 @@ def fit(
         say_fit(moving, stream, judged, learner, verbose)
     refuse_warnings(reading["strict"])
     found = {TOLD: told, LOST: judged.lost, NOISE: judged.noise_alone, MARK: judged.verdict.mark.name.lower()}
-    found |= {RAN: judged.ran or None, MOVES: judged.moves or None, GUIDE: judged.guides}
+    found |= {RAN: judged.ran or None, MOVES: judged.moves or None} | ({GUIDE: judged.guides} if to is None else {})
     uc.save(moving, output, provenance(paths, stream.recipe, stream.first, **reading) | found)
     say_written(_reported(moving, stream, report, output, judged), judged.to_json() if as_json else None)
 

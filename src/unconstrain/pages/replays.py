@@ -144,7 +144,7 @@ def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Any, de
     return judged._replace(next=" ".join(filter(None, (judged.next, *more))))
 
 
-def guides(policy: Policy, demos: Sequence[Demonstration]) -> str:
+def guides(policy: Policy | Guided, demos: Sequence[Demonstration]) -> str:
     """What ``--guided`` takes: auto, as demonstrations show goal or cycle; cycle; goal, to be given; or nothing."""
     n = demos[0].states.shape[1]
     if demos[0].space != spaces.Euclidean(n) or demos[0].actions.shape[1] != n:
@@ -154,11 +154,9 @@ def guides(policy: Policy, demos: Sequence[Demonstration]) -> str:
             Guided.goes_round(demos, policy=lambda states: np.asarray(policy(states)))  # without proposing a goal
         except (SettingError, InvalidDataError) as error:
             with suppress(SettingError, InvalidDataError):
-                return (
-                    "cycle"
-                    if "orbit=" in str(error) and Guided(policy, orbit="shown", demonstrations=demos)
-                    else "goal"
-                )
+                if "orbit=" in str(error):
+                    Guided(policy, orbit="shown", demonstrations=demos)
+                    return "cycle"
             return "goal"
     return "goal" if any(str(one.message).startswith("goal: ") for one in doubts) else "auto"
 
