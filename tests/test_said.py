@@ -435,9 +435,9 @@ def test_certify_proposes_the_guide_that_the_demonstrations_allow(rounds, work, 
         assert "--guided auto" not in said
 
 
-def test_a_score_says_on_which_recordings_it_ran(rounds):
-    assert "un from the starts of these recordings, " in text(call("score", rounds / "p.npz", rounds / "d1.csv"))
-    assert "un from the same starts, " in text(call("info", rounds / "p.npz"))
+def test_a_score_says_on_which_recordings_it_ran(work):
+    assert "un from the starts of these recordings, " in text(call("score", work / "p.npz", work / "in ways"))
+    assert "un from the same starts, " in text(call("info", work / "p.npz"))
 
 
 ODD = {

@@ -48,7 +48,7 @@ def certify(policy: str, seed: int, as_json: bool) -> None:
 
 def _judged(policy: str, stored: Any, found: uc.motion.certificate.Certificate) -> uc.evaluation.verdicts.Verdict:
     """What is guaranteed, in which units, and what may go against it; or what was found against it."""
-    from ..pages.replays import GUIDES
+    from ..pages.fit import GUIDES
 
     notes, verdicts = uc.storage.load_notes(policy), uc.evaluation.verdicts
     unit = unit_of(uc.Recipe.from_dict(notes.get("recipe", {})).labels(notes.get("units", {}))[0])

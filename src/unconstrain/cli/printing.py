@@ -189,7 +189,7 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
 
     ``told`` is the share of the recorded states at which recordings tell the policy, None where not known.
     """
-    from ..pages.replays import guides, retraced
+    from ..pages.fit import guides, retraced
 
     policy = innermost(moving)
     demos = stream.beginning() if scheduler is None or moving is not policy else []

@@ -20,7 +20,9 @@ from ..recordings import Demonstration, Recipe, stack
 from ..risks import action_projection, project
 from . import figures, html
 from .diagnosis import unknown
+from .replays import GUIDES as GUIDES
 from .replays import Replay
+from .replays import guides as guides
 from .replays import replayed as replayed
 from .replays import retraced as retraced
 
