@@ -102,7 +102,8 @@ def test_where_most_movements_end_is_told_and_that_they_end_nowhere():
     def seldom(states):
         return np.where(states[:, :1] > 1.0, two_goals(states / 2.0), inwards(states))
 
-    assert "movements do not end in one place" in uc.certify(lambda x: cycle(x) + 1e-3 * x**2, AROUND).said
+    assert "movements go on, as on a cycle" in uc.certify(lambda x: cycle(x) + 1e-3 * x**2, AROUND).said
+    assert "movements do not end in one place" in uc.certify(lambda x: -0.1 * np.sin(9.0 * x), AROUND).said
     assert re.search(r"of 60 movements ([1-9]|1\d) do not end at \(0\.3", uc.certify(seldom, AROUND).said)
 
 
@@ -137,6 +138,7 @@ def test_on_the_command_line_the_exit_code_says_it(tmp_path):
     )
     assert (good.exit_code, bad.exit_code, wrong.exit_code) == (0, 3, 2)
     assert good.output.startswith("✔")
+    flat = " ".join(bad.output.split())
     assert "From every state, movements arrive: free at (0.3" in " ".join(good.output.split())
     assert "Do not trust: A constraint that moves or is not told, or an obstacle," in good.output
     assert bad.output.startswith("✖")
@@ -149,4 +151,7 @@ def test_on_the_command_line_the_exit_code_says_it(tmp_path):
     )
     assert "guaranteed" in bad.output
     assert f"Next: unconstrain export {tmp_path / 'guided.npz'} -o policy.c" in good.output
-    assert "Next: 'unconstrain fit --guided auto'" in bad.output
+    assert "Next: 'unconstrain fit --guided cycle', if it is to go round, or 'unconstrain fit --guided GOAL'" in flat
+    assert all(f"--guided {to} -o guided.npz" in bad.output for to in ("cycle", "GOAL"))
+    assert not re.search(r"by V|V falls|as V", good.output)
+    assert "That it moves as demonstrated is not guaranteed: 'unconstrain score'" in " ".join(good.output.split())

@@ -12,6 +12,7 @@ from scipy.optimize import check_grad, minimize
 
 import unconstrain as uc
 from recorded import needs_data
+from unconstrain.base.display import percent
 from unconstrain.base.errors import InvalidDataError, ModelFileError, SettingError
 from unconstrain.cli import main
 from unconstrain.constraints.known import Plane, SwitchingLine
@@ -310,8 +311,9 @@ def test_commands_make_a_guided_policy_and_take_it(commands):
     learn = "fit", "FILES", "--state", "x,y,z", "--differentiate", "--model", "affine"
     said = commands(*learn, "--guided", "auto", "-o", "HERE/p.npz", "--report", "HERE/p.html")
     assert re.search(r"Guided: .* free at \(0\.[23]\d*, -0\.[12]\d*, (0\.1|0\.09)", said)  # not where planes stop it
-    assert "--guided" not in said.partition("Guided:")[0]
-    assert "a velocity is added with which V falls, a bowl with its bottom at the goal" in said.partition("Guided:")[2]
+    verdict, _, promise = said.partition("Guided:")
+    assert "'unconstrain fit --guided" not in verdict
+    assert "a velocity is added that leads down a bowl, fitted to the demonstrations, with its bottom" in promise
     assert "From every state, movements arrive" in commands("certify", "HERE/p.npz")
     assert "From every state, movements arrive" in flat(commands("info", "HERE/p.npz"))
     far = commands("rollout", "HERE/p.npz", "--start", "30,-20,10", "--steps", 1000)
@@ -413,9 +415,9 @@ def test_fit_and_info_judge_the_policy_as_it_is_guided(tmp_path, starts, least, 
     assert_allclose(known["explained held out"], found["held_out"], atol=1e-4)
     for one in (found, known):
         assert one["verdict"]["mark"] == mark
-        assert one["verdict"]["said"].startswith(alone["verdict"]["said"])
-        how = "But guided, it explains" if mark == "bad" else "Guided, it explains"
-        assert f" {how} " in one["verdict"]["said"]
+        share = percent(found["held_out"])
+        assert one["verdict"]["said"].startswith(f"The guided policy explains {share} of held-out motion: ")
+        assert f" Unguided it explains {percent(alone['held_out'])}, and misses " in one["verdict"]["said"]
 
 
 @pytest.mark.parametrize(("start", "mark"), [(1.05, "good"), (1.4, "doubtful")])
@@ -434,14 +436,14 @@ def test_guides_that_retrace_what_they_were_fitted_to_make_no_doubtful_fit_a_goo
     ]
     alone, guided, known = [json.loads(one.stdout)["verdict"] for one in ran]
     assert [one["mark"] for one in (alone, guided, known)] == [mark] * 3
-    told = "Guided, it explains as much of the demonstrations it was fitted to; that says nothing of new starts. "
-    assert told in guided["said"]
+    assert "Unguided it explains about as much; what guiding takes is of what it was fitted to" in guided["said"]
     moves = "4 of 4 go round too small in the last round" if mark == "doubtful" else "it keeps size and pace"
-    assert f"un from the same starts, {moves}. Guided, it keeps size and pace." in guided["said"]
-    assert f"un from the same starts, {moves}; guided it keeps size and pace." in known["said"]
+    unguided = "But unguided" if mark == "doubtful" else "Unguided"
+    assert f"Run from the same starts, it keeps size and pace. {unguided}, {moves}." in guided["said"]
+    assert f"un from the same starts, it keeps size and pace; unguided {moves}." in known["said"]
     figures = json.loads(ran[1].stdout)["ran"]
     assert re.search(
-        r"size .* recorded path.*; guided size 1\.0\d times .* recorded path; none more than 20% off$", figures
+        r"^size 1\.0\d times .* recorded path; none more than 20% off; unguided size .* recorded path", figures
     )
     assert "uided" not in alone["said"]
     assert "--guided" not in guided["next"]  # it is
@@ -543,8 +545,8 @@ def test_who_winds_down_to_several_places_is_told_of_both_options_and_the_verdic
     ran = CliRunner().invoke(main, [*learn, "--guided", "auto"])
     said = flat(ran.output)
     assert ran.exit_code == 2
-    assert "in one place; pass --guided its place, such as --guided 0.1,0, or --guided cycle" in said
-    for name, show, advised in (("apart", demos, "--guided 0.1,0'"), ("one", runs, "--guided auto'")):
+    assert "in one place; pass --guided its place, a number for each state, or --guided cycle" in said
+    for name, show, advised in (("apart", demos, "--guided GOAL'"), ("one", runs, "--guided auto'")):
         folder = tmp_path / name
         folder.mkdir()
         assert CliRunner().invoke(main, stopped(folder, show, 50)).exit_code == 0

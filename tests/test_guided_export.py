@@ -130,7 +130,8 @@ def test_a_stored_one_is_exported_by_command(guided, tmp_path):
     comments = [(tmp_path / name).read_text("utf-8") for name in places]
     for said in (*comments, run("info", stored), run("certify", stored)):
         plain = " ".join(re.sub(r"^( \*|#|-) ", "", said, flags=re.MULTILINE).split())
-        assert "that it is told of (by 'under' with its projection; 'step' knows of none)" in plain
+        told = "'unconstrain rollout' tells it; exported, 'under' takes its projection, and 'step' knows of none"
+        assert f"that it is told of ({told})" in plain
         step = f"With steps of up to {guided.dt_:.3g} s, to which twice any delay counts, the cycle is wider"
         assert (step in plain) == isinstance(guided.aim_, Orbit)
 

@@ -286,8 +286,8 @@ def test_a_goal_that_few_came_near_and_still_in_motion_is_doubted(tmp_path, seco
     recipe = uc.Recipe(states=("x", "y"), differentiate="savgol")
     with warnings.catch_warnings(action="ignore"):
         demos = uc.prepare(uc.read(sorted(tmp_path.glob("w*.csv"))), recipe)
-    advice = replays._guide(uc.load(tmp_path / "p.npz", uc.Guided).policy, demos)  # where a policy strays
-    assert advice == (replays.GUIDE_TO.format("") if doubted else replays.GUIDE)
+    advice = replays.guides(uc.load(tmp_path / "p.npz", uc.Guided).policy, demos)  # where a policy strays
+    assert advice == ("goal" if doubted else "auto")
 
 
 @pytest.mark.parametrize(

@@ -489,7 +489,7 @@ def test_a_fit_itself_says_how_its_policy_moves(folder, tmp_path):
     said = " ".join(run("rollout", tmp_path / "q.npz", *start, *moved).split())
     told = "But as 'fit' said, run from the same starts, it moves otherwise than was demonstrated. Next: Look"
     assert told in said
-    for moves_, other in (("it keeps size", True), ("it keeps size; guided it goes round too small", False)):
+    for moves_, other in (("it keeps size", True), ("it keeps size; unguided it goes round too small", False)):
         uc.save(uc.load(folder / "same.npz"), tmp_path / "s.npz", doubted | {"run from the same starts": moves_})
         said = " ".join(run("info", tmp_path / "s.npz").split())
         assert ("But its recordings are not all as they should be." in said) == other

@@ -22,7 +22,7 @@ from .converting import convert, example
 from .diagnosing import diagnose
 from .exporting import export
 from .fitting import alpha_of, default_learner, guide_of, guided, learn, learner_of, options_for_model, policy_of
-from .informing import LOST, MARK, MOVES, NOISE, RAN, TOLD, info, provenance
+from .informing import GUIDE, LOST, MARK, MOVES, NOISE, RAN, TOLD, info, provenance
 from .looking import look, play
 from .printing import (
     SPOILING,
@@ -290,7 +290,7 @@ def fit(
         say_fit(moving, stream, judged, learner, verbose)
     refuse_warnings(reading["strict"])
     found = {TOLD: told, LOST: judged.lost, NOISE: judged.noise_alone, MARK: judged.verdict.mark.name.lower()}
-    found |= {RAN: judged.ran or None, MOVES: judged.moves or None}
+    found |= {RAN: judged.ran or None, MOVES: judged.moves or None} | ({GUIDE: judged.guides} if to is None else {})
     uc.save(moving, output, provenance(paths, stream.recipe, stream.first, **reading) | found)
     say_written(_reported(moving, stream, report, output, judged), judged.to_json() if as_json else None)
 

@@ -12,6 +12,7 @@ import unconstrain as uc
 from ..base.display import unit_of
 from ..base.errors import ModelFileError
 from .endings import NOT_GUARANTEED
+from .informing import GUIDE, LOST, explained_by
 from .printing import option_for_json, say_judged
 from .reading import loaded, to_copy
 
@@ -39,23 +40,29 @@ def certify(policy: str, seed: int, as_json: bool) -> None:
         raise ModelFileError(f"{policy}: holds no policy that is fitted or guided. Learn one with 'unconstrain fit'.")
     found = uc.certify(stored, around, seed)
     start, normal = (None if one is None else one.tolist() for one in (found.start, found.normal))
-    judged = to_copy(_judged(policy, found), policy, uc.storage.load_notes(policy))
+    judged = to_copy(_judged(policy, stored, found), policy, uc.storage.load_notes(policy))
     say_judged(judged, {}, as_json, holds=found.holds, start=start, normal=normal)
     if not found.holds:
         raise SystemExit(NOT_GUARANTEED)
 
 
-def _judged(policy: str, found: uc.motion.certificate.Certificate) -> uc.evaluation.verdicts.Verdict:
+def _judged(policy: str, stored: Any, found: uc.motion.certificate.Certificate) -> uc.evaluation.verdicts.Verdict:
     """What is guaranteed, in which units, and what may go against it; or what was found against it."""
+    from ..pages.fit import GUIDES
+
     notes, verdicts = uc.storage.load_notes(policy), uc.evaluation.verdicts
     unit = unit_of(uc.Recipe.from_dict(notes.get("recipe", {})).labels(notes.get("units", {}))[0])
     unit = f"Lengths are in {unit or 'the unit of the states'}, and all rates per second."
     if not found.holds:
-        then = "'unconstrain fit --guided auto', or cycle, or a goal such as 0.1,0, and certify that."
+        then = GUIDES[notes.get(GUIDE, "cycle")]  # where it is not known, whatever it may be
+        then = f"{then} Then certify that." if then else "Its states, such as angles, allow no guide: score it."
         said = f"{policy}: {found.said.replace(' (see uc.Guided)', '')} {unit}"
         return verdicts.Verdict(verdicts.Mark.BAD, said, next=then)
     promise, away, checked = found.said.partition("A constraint that moves or is not told")
-    doubt = f"{away}{checked.partition(' Checked at')[0]}"
+    far = "'unconstrain score' says how near it keeps to recordings."
+    far = far if notes.get(LOST) is None else explained_by(stored, notes).said.replace("The", "the", 1)
+    far = f"That it moves as demonstrated is not guaranteed: {far}"
+    doubt = f"{away}{checked.partition(' Checked at')[0]} {far}".lstrip()
     then = f"unconstrain export {shlex.quote(policy)} -o policy.c"
     said = f"{policy}: guaranteed. {unit}"
     return verdicts.Verdict(verdicts.Mark.GOOD, said, promise.strip(), doubt, then)

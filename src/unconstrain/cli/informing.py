@@ -30,6 +30,9 @@ RAN = "from the same starts"
 MOVES = "run from the same starts"
 """Note of what is wrong with these movements in words, or that they keep size and pace."""
 
+GUIDE = "can be guided to"
+"""Note of what ``--guided`` takes: auto, cycle or goal; empty where there is none, as of angles."""
+
 MARK = "verdict"
 """Note of how ``fit`` judged it."""
 
@@ -89,7 +92,7 @@ def info(file: str, as_json: bool) -> None:
     A policy, guided or not, or a constraint.
     """
     held, notes = loaded(file, uc.Policy | uc.LearntConstraint | uc.Guided), uc.storage.load_notes(file)
-    inner = ("recipe", "units", "digests", MARK, NOISE, MOVES, HELD_BY, SHOWN, WHERE, WOUND)
+    inner = ("recipe", "units", "digests", GUIDE, MARK, NOISE, MOVES, HELD_BY, SHOWN, WHERE, WOUND)
     rest = {name: value for name, value in notes.items() if name not in inner}
     verdict = to_copy(verdict_of(held, notes), file, notes)
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held, notes), **rest}
@@ -152,7 +155,7 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
     if not hasattr(innermost(held), "solution_"):
         mark = uc.evaluation.verdicts.Mark.BAD
         return uc.evaluation.verdicts.Verdict(mark, "Not fitted: it cannot predict.", next="'unconstrain fit'")
-    found = _explained(held, notes)
+    found = explained_by(held, notes)
     if found.mark is uc.evaluation.verdicts.Mark.GOOD and notes.get(MARK) == "doubtful":
         doubt = f"Its movement over time. {found.doubt}"
         return uc.evaluation.verdicts.doubted(found, _doubt(notes))._replace(doubt=doubt)
@@ -164,11 +167,11 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
 def _doubt(notes: Mapping[str, Any]) -> str:
     """What ``fit`` doubted of a policy that explains enough: how it moves, or else what it noted of recordings."""
     moves = notes.get(MOVES) or "it moves otherwise than was demonstrated"
-    kept = all(one.startswith(("it keeps", "it nearly keeps")) for one in moves.split("; guided "))
+    kept = all(one.startswith(("it keeps", "it nearly keeps")) for one in moves.split("; unguided "))
     return "its recordings are not all as they should be" if kept else f"run from the same starts, {moves}"
 
 
-def _explained(held: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:
+def explained_by(held: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:
     """How much a policy explains where held out, and whether recordings tell it."""
     policy = innermost(held)
     count = len(policy.training_.split.fold_of) or uc.evaluation.diagnosis.ENOUGH
@@ -181,7 +184,7 @@ def doubted(policy: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> str:
     """What ``fit`` doubted of a policy, as the rest of a sentence; empty where it did not, or nobody noted it."""
     if notes.get(MARK) not in ("doubtful", "bad"):
         return ""
-    if (found := _explained(policy, notes)).mark is not uc.evaluation.verdicts.Mark.GOOD:
+    if (found := explained_by(policy, notes)).mark is not uc.evaluation.verdicts.Mark.GOOD:
         return found.said[0].lower() + found.said[1:].rstrip(".")
     return _doubt(notes)
 

@@ -19,7 +19,7 @@ from ..base.files import write
 from .constraining import arm_of, known_arms, said_elsewhere
 from .informing import OF, TOLD, learnt_from
 from .printing import option_for_json, refuse_warnings, say_judged, say_verdict, say_written
-from .reading import options_for_reading, prepared, prepared_as, reading_of, typed
+from .reading import as_options, options_for_reading, prepared, reading_of, typed
 from .speaking import as_typed
 from .writing import check_outputs, option_for_force
 
@@ -173,7 +173,7 @@ def _page(seen: Seen, surveys: Sequence[Any], verdict: uc.evaluation.verdicts.Ve
         f"A look at {Path(seen.paths[0]).name}{f' and {more} more' if more else ''}",
         units=seen.recipe.units(seen.recordings[0].units),
         marks=[[one._replace(message=as_typed(one.message)) for one in marks_of(*each)] for each in found],
-        command=_to_fit(seen.paths, seen.recipe, seen.roles),
+        command=_to_fit(seen),
         policy=seen.policy,
         constraint=seen.constraint if seen.held else None,
         held=seen.held,
@@ -246,13 +246,10 @@ def _model(path: str | Path) -> Any:
     return None
 
 
-def _to_fit(paths: Sequence[str | Path], recipe: uc.Recipe, roles: Mapping[str, Any]) -> tuple[str, str]:
+def _to_fit(seen: Seen) -> tuple[str, str]:
     """What to type to learn from these files as they were read, before and after what is left out."""
-    context = click.get_current_context()
-    told = ["unconstrain", "fit", *map(str, paths), *([] if context.params["state"] else prepared_as(recipe))]
-    given = typed("files", "output", "force", "leave_out", "rrd", "robot", "tip")
-    for option in context.command.params:
-        role = roles.get(option.name or "")
-        if isinstance(role, str) and option.opts[0] not in given:
-            told += [option.opts[0], role]
-    return shlex.join([*told, *given]), "-o policy.npz"
+    given, known = typed("files", "output", "force", "leave_out", "rrd", "robot", "tip"), list[str]()
+    if seen.notes or "--state" not in given:
+        acting = ("--by", "--action") if {"--by", "--action", "--differentiate"} & {*given} else ()
+        known = as_options(seen.recipe, uc.readers.Reading(**seen.roles), [*given, *acting])
+    return shlex.join(["unconstrain", "fit", *map(str, seen.paths), *known, *given]), "-o policy.npz"

@@ -173,6 +173,7 @@ class Judged(NamedTuple):
     held_out: float
     lost: float | None = None
     noise_alone: float | None = None
+    guides: str | None = None
 
     def to_json(self) -> dict[str, Any]:
         """With None for what is not known."""
@@ -185,7 +186,7 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
 
     ``told`` is the share of the recorded states at which recordings tell the policy, None where not known.
     """
-    from ..pages.fit import retraced
+    from ..pages.fit import guides, retraced
 
     policy = innermost(moving)
     demos = stream.beginning() if scheduler is None or moving is not policy else []
@@ -204,9 +205,11 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     found = uc.evaluation.verdicts.of_explained(alone, count, told, there, 1.0 - missed, lost, noise)
     ran = retraced(found, moving, demos, stream.recipe, None, stream.first.units, False)
     cured = ran.verdict._replace(next=there) if there and found.next == there else ran.verdict
+    to = guides(policy, demos) if moving is policy else None
     verdict = uc.evaluation.diagnosis.about_recordings(cured, demos, stream.recipe, moving)
-    verdict = to_copy(as_noted(verdict), click.get_current_context().params["output"])
-    return Judged(verdict, ran.medians, *ran[3:], count, samples, 1.0 - missed, held_out, lost, noise)
+    states = stream.recipe.labels(stream.first.units)[0]
+    verdict = to_copy(as_noted(verdict), click.get_current_context().params["output"], None, states)
+    return Judged(verdict, ran.medians, *ran[3:], count, samples, 1.0 - missed, held_out, lost, noise, to)
 
 
 def as_noted(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.Verdict:

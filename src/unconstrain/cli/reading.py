@@ -112,7 +112,9 @@ READING = (
     click.option("--differentiate", is_flag=True, help="Take the velocity of the state as the action."),
     of_words("--by", "savgol kalman central", "How to differentiate, savgol by default; implies --differentiate."),
     click.option("--window", type=float, help="Smoothing window of savgol, seconds; 0.25 by default."),
+    click.option("--order", type=click.IntRange(2, 3), default=3, help="Degree of the polynomial of savgol."),
     click.option("--still", type=float, help="Trim what is slower than this at start and end, unit of the actions."),
+    click.option("--trim", type=numbers, metavar="A,B", help="Seconds to leave out at the start and at the end."),
     click.option("--rate", type=float, help="Resample to this many samples a second; without time stamps, their rate."),
     click.option("--centre", is_flag=True, help="States relative to the mean of each demonstration."),
     *CURES,
@@ -145,6 +147,14 @@ def _without_broken(command: Callable[..., Any]) -> Callable[..., Any]:
         return command(*args, files=files, leave_out=leave_out, **given)
 
     return begun
+
+
+AS_CALLED = ("order", "trim", "sort", "glitches", "seams", "pauses", "action_is")
+"""Settings of a recipe whose options are called as they are, and take what they take."""
+
+OPTIONS = {"states": "state", "actions": "action", "differentiate": "by", "window_s": "window", "max_gap_s": "max-gap"}
+OPTIONS |= {"angles": "angle", "quaternions": "quaternion", "rotation_vectors": "rotation-vector"}
+"""Those whose options are called otherwise."""
 
 
 def recipe_of(
@@ -180,7 +190,7 @@ def recipe_of(
         quaternions=groups_of_names(quaternions),
         rotation_vectors=groups_of_names(rotation_vectors),
         max_gap_s=max_gap,
-        **{name: others[name] for name in ("sort", "glitches", "seams", "pauses", "action_is") if name in others},
+        **{name: others[name] for name in AS_CALLED if name in others},
     )
     return recipe if window is None else replace(recipe, window_s=window)
 
@@ -295,14 +305,19 @@ def next_command(name: str, *more: str, without: Sequence[str] = ()) -> str:
     return f"unconstrain {name} {_as_pattern(context.params['files'])} {shlex.join([*told, *more])}".rstrip()
 
 
-def to_copy(verdict: Any, policy: str, notes: Mapping[str, Any] | None = None) -> Any:
-    """A verdict with the commands that its Next names whole, on these files or, in capitals, such as a model notes."""
-    lines, recipe = verdict.next.split("\n"), uc.Recipe.from_dict((notes or {}).get("recipe", {}))
-    read = ["RECORDINGS.csv", *prepared_as(recipe)]
-    roles = {role: name for role, name in reading_of(**notes or {}).roles.items() if isinstance(name, str)}
-    read += [word for role, name in roles.items() for word in (f"--{role.replace('_', '-')}", name)]
+def to_copy(verdict: Any, policy: str, notes: Mapping[str, Any] | None = None, states: Sequence[str] = ()) -> Any:
+    """A verdict with the commands that its Next names whole, on these files or, in capitals, such as a model notes.
+
+    ``states`` are their names with units, where a goal may have to be given.
+    """
+    lines, known = verdict.next.split("\n"), notes or {}
+    recipe = uc.Recipe.from_dict(known.get("recipe", {}))
+    read = ["RECORDINGS.csv", *as_options(recipe, reading_of(**known))]
+    states = states or recipe.labels(known.get("units", {}))[0]
     for name, to in re.findall(r"'unconstrain (\w+)(?: --guided ([\w.,]+))?", verdict.next):
-        more = ["--guided", "GOAL" if "," in to else to] * bool(to) + ["-o", "guided.npz" if to else "policy.npz"]
+        if to == "GOAL":
+            lines[0] += f" GOAL: {counted(len(states), 'number')}, of {', '.join(states)}." if states else ""
+        more = ["--guided", to] * bool(to) + ["-o", "guided.npz" if to else "policy.npz"]
         more = {"fit": more, "look": [policy]}.get(name, [])
         own = next_command(name, *more, without=["to"]) if notes is None and name != "score" else ""
         files = [policy, "NEW.csv"] if name == "score" else read
@@ -310,10 +325,17 @@ def to_copy(verdict: Any, policy: str, notes: Mapping[str, Any] | None = None) -
     return verdict._replace(next="\n".join(dict.fromkeys(lines)))
 
 
-def prepared_as(recipe: uc.Recipe) -> list[str]:
-    """Options that name the states of a recipe, and say what the actions are."""
-    by = ["--by", recipe.differentiate or ""] if recipe.actions is None else ["--action", ",".join(recipe.actions)]
-    return ["--state", ",".join(recipe.states), *by] if recipe.states else []
+def as_options(recipe: uc.Recipe, how: uc.readers.Reading, without: Sequence[str] = ()) -> list[str]:
+    """Options that read and prepare files as these say, but for some; what is so by default needs none."""
+    settings, plain, told = vars(recipe) | how.roles, vars(uc.Recipe()) | uc.readers.Reading().roles, list[str]()
+    if not recipe.angles and not re.search("deg|[°º]", ",".join([*(recipe.states or ()), *(recipe.actions or ())])):
+        settings["degrees"] = recipe.degrees or None  # nothing looks like degrees
+    for name in [name for name, value in settings.items() if value != plain[name]]:
+        option, value = f"--{OPTIONS.get(name, name).replace('_', '-')}", settings[name]
+        for one in value if name in ("quaternions", "rotation_vectors") else [value]:
+            text = ",".join(map(str, one)) or "none" if isinstance(one, tuple) else str(one).removesuffix(".0")
+            told += [] if option in without else [option] if one is True else [option, text]
+    return told
 
 
 def _as_pattern(files: Sequence[str]) -> str:

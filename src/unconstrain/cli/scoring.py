@@ -23,6 +23,9 @@ from .reading import fitted_policy, options_for_reading, prepared, to_copy
 LEAST, ENOUGH = 5, 5.0
 """Samples that it takes to tell noise, and standard deviations of it that are enough in half a usual action."""
 
+HERE = "the starts of these recordings"
+"""Where a policy is run from, in words: ``fit`` runs it from those that it learnt from."""
+
 
 @click.command(epilog="\b\nExample:\n  unconstrain score wipe.npz other.csv --plane 0,0.3,1 --json")
 @click.argument("policy", type=click.Path())
@@ -66,7 +69,7 @@ def score(
     judged = verdicts.of_worst(judged, {one["demonstration"]: one["explains"] for one in rows if one["fast"] >= LEAST})
     judged = judged if held is not None else verdicts.of_planes(judged, planes, _motion(demonstrations))
     with shown("running it from the same starts"):
-        found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units)
+        found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units, starts=HERE)
     judged = verdicts.of_unit(verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0)), _times(learnt, states))
     verdict = to_copy(judged, policy, notes)
     if not as_json:

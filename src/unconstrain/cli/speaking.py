@@ -24,10 +24,10 @@ OBJECTS = {
     "a LocallyLinearPolicy": "--model local",
     "fewer features, or Folds(2)": "--folds 2",
     "a smaller dt": "a smaller --dt",
-    "goal=, or orbit='shown' for a cycle": "--guided its place, such as --guided 0.1,0, or --guided cycle",
+    "goal=, or orbit='shown' for a cycle": "--guided its place, a number for each state, or --guided cycle",
     "fit each by itself": "fit each by itself (its file alone, or --episodes with its name)",
     "guide the policy (uc.Guided)": "fit with --guided auto",
-    "give it with goal=": "give it with --guided, such as --guided 0.1,0",
+    "give it with goal=": "give it with --guided, a number for each state",
     "Take Hybrid()": "Take --learner hybrid",
     "the warnings of a survey": "what 'unconstrain inspect' warns of",
 }

@@ -21,8 +21,8 @@ about half of an action is across the motion; if all of that is wrong, as much i
 OTHERWISE = 1.2
 """Size or pace of a roll-out over that demonstrated, or the inverse, from which on it is another movement."""
 
-FAR_OFF = 1.5
-"""Those of a single roll-out from which on not even the others speak for the policy."""
+FEW, FAR_OFF = 0.25, 1.5
+"""Share of roll-outs that may be that far off, and how far a single one, so that the others speak for the policy."""
 
 FORBIDDEN = 0.05
 """Share of recorded motion that a constraint given would not allow, from which on it is likely another."""
@@ -84,7 +84,8 @@ class Verdict(NamedTuple):
 def graded(
     share: float, good: float = GOOD, fair: float = FAIR, told: float | None = None, under: bool = False
 ) -> tuple[Mark, str]:
-    """The mark of a share, and a word for it; where recordings tell too little of a policy, in what they do."""
+    """The mark of a share, in whole percents as said, and a word for it; where recordings tell too little, in what."""
+    share = round(share, 2)
     mark, word = (Mark.GOOD, "good") if share >= good else (Mark.DOUBTFUL, "fair")
     if share < fair:
         return Mark.BAD, "poor"

@@ -94,11 +94,9 @@ def _about_rest(
         place = named(demos[row].states[-1], states)
         said = f"The policy rests near {place}, where '{names[row]}' came to rest and others move on: likely something "
         found = found._replace(doubt=f"{said}stopped it. {found.doubt}".rstrip())
-        if goal or any((speed >= slow).mean() < LONG for speed in speeds):
+        if goal or 2 * len(rests) > len(demos) or any((speed >= slow).mean() < LONG for speed in speeds):
             return found
         return found._replace(next=f"--still {slow} leaves out rest at an end. {found.next}".rstrip())
-    if found.mark is Mark.BAD and not goal and len(rests) >= max(ENOUGH, len(demos) / 2):
-        found = found._replace(next=f"--still {slow} leaves out rest at an end, as in most of these. {found.next}")
     if found.mark is Mark.GOOD or goal or not kept:
         return found
     few = listed([f"'{names[row]}'" for row, _ in kept], 4)

@@ -89,7 +89,7 @@ def _guided(policy: Guided, states: Array, normals: Array) -> Certificate:
         wrong = ~(spare >= -1e-9)
     if wrong.any() or not closed:
         at = int(wrong.argmax())
-        why = "V is not least at one place alone" if not closed else "V does not fall as it has to"
+        why = "what guides it leads to more than one place" if not closed else "what guides it does not lead nearer"
         return _against(f"not guaranteed: {why}", states[at], normals[at])
     return Certificate(True, f"{aim.promise} Checked at {len(states)} states, a third of them free.")
 
@@ -171,6 +171,8 @@ def _refuted(policy: Callable[[Array], Array], starts: Array, normals: Array, ne
     runs = rollout(stopped, starts[free[:, 0]], STEPS, dt, method="euler")
     space = getattr(policy, "space_", spaces.Euclidean(starts.shape[1]))  # ends that are turns apart may be one place
     last = np.stack([run.states[-1] for run in runs])
+    late = np.stack([run.states[-STEPS // 4 :] for run in runs])
+    on = np.linalg.norm(np.ptp(late, axis=1), axis=1)[np.linalg.norm(last - middle, axis=1) < far] > near
     goal = last[0] + np.median(space.difference(last, last[:1]), axis=0)
     units = normals / np.where(free, 1.0, np.linalg.norm(normals, axis=1, keepdims=True))
     starts = starts - units * np.vecdot(units, starts - goal)[:, None]
@@ -182,6 +184,7 @@ def _refuted(policy: Callable[[Array], Array], starts: Array, normals: Array, ne
     at = int(away.argmax())
     said = f"of {len(starts)} movements {away.sum()} do not end at ({_listed(goal)})"
     said = said if 2 * away.sum() <= len(away) else "movements do not end in one place"
+    said = said if 2 * on.sum() <= len(on) else "movements go on, as on a cycle, and nothing keeps them to it"
     said = f"not guaranteed (see uc.Guided): {said}; one is at ({_listed(ends[at])}) after {STEPS * dt:.3g} s"
     return _against(said, starts[at], units[at])
 

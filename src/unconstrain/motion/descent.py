@@ -46,10 +46,10 @@ class Descent(Shown):
         """What is added, when that is right, and what is guaranteed, in words."""
         goal = ", ".join(f"{each:.4g}" for each in self.potential.goal)
         return (
-            "Where the policy does not lead to the goal, a velocity is added with which V falls, a bowl with its "
-            "bottom at the goal, fitted to the demonstrations. Right where every movement is to end there; ways from "
+            "Where the policy does not lead to the goal, a velocity is added that leads down a bowl, fitted to "
+            "the demonstrations, with its bottom at the goal. Right where every movement is to end there; ways from "
             f"new starts are not learnt. From every state, movements arrive: free at ({goal}), and under any flat "
-            f"constraint that it is told of ({TOLD}) where it is nearest to that, as V measures. Every step of up to "
+            f"constraint that it is told of ({TOLD}) where the bowl is lowest on it. Every step of up to "
             f"{self.dt:.3g} s leads nearer, at {0.75 * self.pace:.3g} a second or faster, and slower only near the "
             "end. A constraint that moves or is not told, or an obstacle, may lead away."
         )

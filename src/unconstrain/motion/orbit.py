@@ -87,15 +87,15 @@ class Orbit(Shown):
         """What is added, when that is right, and what is guaranteed, in words."""
         middle = ", ".join(f"{each:.4g}" for each in self.potential.goal)
         return (
-            "Where the policy does not lead to the cycle, and round, a velocity is added that does, by V, a bowl with "
-            "the cycle on its wall, fitted to the demonstrations. Right where every movement is to go round; ways from "
-            f"new starts are not learnt. A closed convex surface, round or oval, attracts, typically {self.radius:.4g} "
-            f"off its middle ({middle}), from every state but that, free and under any flat constraint that it is told "
-            f"of ({TOLD}): the distance from it shrinks at rates of {PULL * self.rate:.4g} to {RUSH * self.rate:.4g} "
-            f"per second. A plane through its inside cuts it in one cycle, on which the pace is within {STRAY:.0%} of "
-            f"the one learnt wherever the plane lets it turn. With steps of up to {self.dt:.3g} s, to which twice any "
-            "delay counts, the cycle is wider by a few hundredths, with longer ones by more. A constraint that moves "
-            "or is not told, or an obstacle, may lead off it."
+            "Where the policy does not lead to the cycle, and round it, a velocity is added that does. Right where "
+            "every movement is to go round; ways from new starts are not learnt. A closed surface without dents that "
+            f"the cycle lies on, fitted to the demonstrations and typically {self.radius:.4g} off its middle "
+            f"({middle}), attracts from every state but that middle, free and under any flat constraint that it is "
+            f"told of ({TOLD}): the distance from it shrinks at rates of {PULL * self.rate:.4g} to "
+            f"{RUSH * self.rate:.4g} per second. A plane through its inside cuts it in one cycle, on which the pace is "
+            f"within {STRAY:.0%} of the one learnt wherever the plane lets it turn. With steps of up to "
+            f"{self.dt:.3g} s, to which twice any delay counts, the cycle is wider by a few hundredths, with longer "
+            "ones by more. A constraint that moves or is not told, or an obstacle, may lead off it."
         )
 
     def correction(self) -> Correction:

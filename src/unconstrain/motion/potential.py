@@ -20,7 +20,7 @@ PACE = 0.05
 On 15 of LASA's shapes 0.02 and 0.05 cost the same, and with 0.02 not all starts had arrived in four times the time.
 """
 
-TOLD = "by 'under' with its projection; 'step' knows of none"
+TOLD = "'unconstrain rollout' tells it; exported, 'under' takes its projection, and 'step' knows of none"
 """How a guided policy is told of a constraint, for which alone anything is promised on it."""
 
 STEEPNESS, STEEPEST = 1e-5, 6e-7

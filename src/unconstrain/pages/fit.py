@@ -20,7 +20,9 @@ from ..recordings import Demonstration, Recipe, stack
 from ..risks import action_projection, project
 from . import figures, html
 from .diagnosis import unknown
+from .replays import GUIDES as GUIDES
 from .replays import Replay
+from .replays import guides as guides
 from .replays import replayed as replayed
 from .replays import retraced as retraced
 
@@ -233,7 +235,12 @@ def _actions(policy: Policy, demos: list[Demonstration], names: Sequence[str], h
 def _errors(policy: Policy, demos: list[Demonstration], held_out: list[Array] | None) -> html.Markup:
     known = all(demo.truth is not None for demo in demos)
     support, learnt = _support(policy, demos), [policy(demo.states) for demo in demos]
-    header = ["demonstration", "samples", *["explained\nheld out"] * (held_out is not None), "explained\nlearnt from"]
+    header = [
+        "demonstration",
+        "samples",
+        *["explained, a\nfifth held out"] * (held_out is not None),
+        "explained\nlearnt from",
+    ]
     header += ["nCPE", "nUPE"] if known else []
     header += ["median\nsupport", "least\nsupport"] if support is not None else []
 

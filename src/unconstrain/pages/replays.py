@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -25,9 +26,14 @@ if TYPE_CHECKING:
 MOST, STEPS = 20, 1000
 """Demonstrations, and steps of each, that are run at most: seconds."""
 
-GUIDE = "'unconstrain fit --guided auto' keeps it to the goal or the cycle that was shown, from anywhere."
-GUIDE_TO = "'unconstrain fit --guided 0.1,0' with the place of its goal{} keeps it there, from anywhere."
-"""The latter where demonstrations do not show one, and perhaps a cycle."""
+GUIDES = {
+    "auto": "'unconstrain fit --guided auto' keeps it to the goal or the cycle that was shown, from anywhere.",
+    "cycle": "'unconstrain fit --guided cycle', if it is to go round, or 'unconstrain fit --guided GOAL' with the "
+    "place of its goal, if it is to end there, keeps it to that, from anywhere.",
+    "goal": "'unconstrain fit --guided GOAL' with the place of its goal keeps it there, from anywhere.",
+    "": "",
+}
+"""What is said of each of :func:`guides`."""
 
 MODELS = {"auto": "", "Affine": "So may a --model that bends: 'local', or 'auto', which tries several."}
 """What else may cure a policy of some features, by what they are called; of others :data:`ANOTHER`."""
@@ -79,16 +85,17 @@ def replayed(
     held: Any,
     units: Mapping[str, str],
     free: bool = True,
+    starts: str = "the same starts",
 ) -> Replayed:
     """Add to a verdict how a policy moves from where demonstrations start, under what held them as far as it is known.
 
     ``held`` is their constraint, or None; ``units`` are those of columns. Those whose constraint is not known are run
-    ``free``, or not at all.
+    ``free``, or not at all. ``starts`` are those of which demonstrations, in words.
     """
     try:
         runs = replays(policy, demos, recipe, held, free)
     except DivergedError:
-        judged = _advised(verdicts.of_replays(found, *verdicts.DIVERGES), found, policy, demos)
+        judged = _advised(verdicts.of_replays(found, *verdicts.DIVERGES, starts), found, policy, demos)
         return Replayed(judged, None, in_words=verdicts.DIVERGES[0])
     known = [one for one in runs if one.held]
     if not known:
@@ -105,7 +112,7 @@ def replayed(
     if len(known) < len(demos):
         some = f"{len(known)} of {len(demos)} demonstrations"
         words, of = f"{words}, as far as compared ({some})", f"for {some}{alike}, "
-    judged = _advised(verdicts.of_replays(found, words, strays), found, policy, demos)
+    judged = _advised(verdicts.of_replays(found, words, strays, starts), found, policy, demos)
     return Replayed(judged, told, runs, verdicts.size_and_pace(extents, paces, lasts, of, said), words)
 
 
@@ -114,13 +121,17 @@ def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Repl
     guided, alone = replayed(found, policy, *of), innermost(policy)
     if alone is policy:
         return guided
-    plain, words = replayed(found, alone, *of), guided.in_words
-    mark = max(plain.verdict.mark, guided.verdict.mark, key=[*verdicts.Mark].index)
-    more = f" {'Guided' if mark is plain.verdict.mark else 'But guided'}, {words}." if words else ""
-    then = plain.verdict.next.partition(" 'unconstrain fit --guided")[0]  # it is
-    judged = plain.verdict._replace(mark=mark, said=plain.verdict.said + more, next=then)
-    both = ["; guided ".join(filter(None, one)) for one in zip(plain[3:], guided[3:], strict=True)]
-    return Replayed(judged, *guided[1:3], *both)
+    plain = replayed(found, alone, *of)
+    order = [*verdicts.Mark].index
+    judged = max(guided.verdict, plain.verdict, key=lambda one: order(one.mark))  # the first, where both are as good
+    if judged is plain.verdict and guided.in_words:
+        judged = judged._replace(said=f"{found.said} Run from the same starts, {guided.in_words}.")
+    but = "But unguided" if judged.mark is not guided.verdict.mark else "Unguided"
+    more = f" {but}, {plain.in_words}." if plain.in_words else ""
+    worse = order(guided.verdict.mark) > order(plain.verdict.mark)
+    then = verdicts.UNGUIDED if worse else judged.next.partition(" 'unconstrain fit --guided")[0]  # it is
+    both = ["; unguided ".join(filter(None, one)) for one in zip(guided[3:], plain[3:], strict=True)]
+    return Replayed(judged._replace(said=judged.said + more, next=then), *guided[1:3], *both)
 
 
 def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Any, demos: Any) -> verdicts.Verdict:
@@ -129,18 +140,25 @@ def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Any, de
         return judged
     features = getattr(innermost(policy), "features", None)
     model = MODELS.get(features if isinstance(features, str) else type(features).__name__, ANOTHER)
-    more = model, _guide(policy, demos) if innermost(policy) is policy else ""
+    more = model, GUIDES[guides(policy, demos)] if innermost(policy) is policy else ""
     return judged._replace(next=" ".join(filter(None, (judged.next, *more))))
 
 
-def _guide(policy: Policy | Guided, demos: Sequence[Demonstration]) -> str:
-    """What keeps a policy to where demonstrations lead, if they show it, or to what is given."""
+def guides(policy: Policy | Guided, demos: Sequence[Demonstration]) -> str:
+    """What ``--guided`` takes: auto, as demonstrations show goal or cycle; cycle; goal, to be given; or nothing."""
+    n = demos[0].states.shape[1]
+    if demos[0].space != spaces.Euclidean(n) or demos[0].actions.shape[1] != n:
+        return ""
     with warnings.catch_warnings(action="always", record=True) as doubts:
         try:
             Guided.goes_round(demos, policy=lambda states: np.asarray(policy(states)))  # without proposing a goal
         except (SettingError, InvalidDataError) as error:
-            return GUIDE_TO.format(", or '--guided cycle'," if "orbit=" in str(error) else "")
-    return GUIDE_TO.format("") if any(str(one.message).startswith("goal: ") for one in doubts) else GUIDE
+            with suppress(SettingError, InvalidDataError):
+                if "orbit=" in str(error):
+                    Guided(policy, orbit="shown", demonstrations=demos)
+                    return "cycle"
+            return "goal"
+    return "goal" if any(str(one.message).startswith("goal: ") for one in doubts) else "auto"
 
 
 def replays(
