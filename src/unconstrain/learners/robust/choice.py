@@ -58,6 +58,7 @@ demonstrations say little.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import combinations
 
@@ -122,6 +123,12 @@ class Comparison:
         self._leverage = np.max([leverage(one) for one in dict.fromkeys(self._views)], axis=0)
         self._noise, self._variation = self._variances(noise)
 
+    def beside(self, other: Comparison) -> Comparison:
+        """The candidates that both compare, each learnt twice."""
+        learnt = {one.name: (one, other._samples) for one in other._candidates}
+        both = [replace(one, otherwise=learnt[one.name]) for one in self._candidates if one.name in learnt]
+        return Comparison(both, self.noise, self._samples)
+
     def judged(self) -> dict[str, Judged]:
         """Figures of each candidate, by name, as shares of the mean squared action."""
         unit = max(self._samples.energy, 1e-300)
@@ -167,7 +174,20 @@ class Comparison:
 
     @cached_property
     def risks(self) -> Array:
-        """Estimated squared error, shape (K,), up to what all have in common."""
+        """Estimated squared error, shape (K,), up to what all have in common.
+
+        Where candidates were learnt with other samples held out, too, the geometric mean of both estimates.
+        """
+        twice = [(one, *one.otherwise) for one in self._candidates if one.otherwise is not None]
+        if len(twice) < len(self._candidates):
+            return self._risks
+        again = [replace(other, softness=one.softness, by_segments=one.by_segments) for one, other, _ in twice]
+        both = self._risks, Comparison(again, self.noise, [samples for *_, samples in twice])._risks
+        tiny = TINY * self._samples.energy + 1e-300
+        return np.asarray(np.sqrt(np.prod([np.maximum(risks, tiny) for risks in both], axis=0)))
+
+    @cached_property
+    def _risks(self) -> Array:
         along, aside = self._missed
         more = aside - aside[np.nan_to_num(along + aside, nan=np.inf).argmin()]
         unresolved = LEAST_MISFIT**2 * self._samples.energy

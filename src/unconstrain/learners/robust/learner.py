@@ -26,7 +26,7 @@ from .candidate import Candidate
 from .choice import Comparison
 from .consistent import by_segments, noise_corrected
 from .constants import AS_DIRECT, LEAST_EXPLAINED, LEAST_INFORMATIVE, LEAST_MISFIT, LONG
-from .held_out import held_out_together
+from .held_out import held_out_otherwise, held_out_together
 from .kinematics import Jacobian, with_jacobian
 from .likelihood import free_probability, maximise
 from .noise import beyond_misfit, hides_sphere, most_noise, noise_of_each
@@ -310,6 +310,10 @@ class Robust(_Maximising):
     def compared(self, samples: Samples, training: Training) -> Comparison:
         """All candidates; those that use the Jacobian if they are as consistent as the best that does not, or more."""
         _say_if_long(samples)
+        found, other = self._compared(samples, training), held_out_otherwise(samples)
+        return found if other is None else found.beside(self._compared(other, training))
+
+    def _compared(self, samples: Samples, training: Training) -> Comparison:
         corrected, most = noise_corrected(samples), most_noise(samples)
         noise = noise_of_each(samples.actions, samples.groups, most, samples.noise)
         learnt = [*softened(samples), corrected, noise_corrected(samples, worth=1.0)]
