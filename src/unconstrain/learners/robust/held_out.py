@@ -2,8 +2,8 @@
 
 A policy that is wrong under a new constraint still looks consistent on a demonstration that is held out, as long as
 others under the same constraint stay. So demonstrations that were held in like directions are in one fold. Where
-demonstrations are not told apart, neighbours are: they say nearly the same. A heap of rows is held out in two ways, since neither tells
-demonstrations for sure.
+demonstrations are not told apart, neighbours are: they say nearly the same. A heap of rows is held out in two ways, as
+neither of them tells demonstrations for sure.
 """
 
 from dataclasses import replace
