@@ -364,7 +364,7 @@ class Robust(_Maximising):
                 break
             one = Robust().compared(views[name], training).best
             soft = np.inf if one.softness >= AS_DIRECT else 0.0
-            best[name] = replace(one, name=name, softness=soft, by_segments=False)
+            best[name] = replace(one, name=name, softness=soft, by_segments=False, jackknife=1.0)
             if name == usual:
                 coarser = {one: best[one] for one in _simplest(_compared(best, views), list(best))}
                 best = {name: best[name]}
