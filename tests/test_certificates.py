@@ -125,7 +125,7 @@ def test_ends_a_full_turn_apart_are_one_place(tmp_path):
     assert uc.certify(halves, np.array([[2.0], [8.0]])).start is not None
     uc.save(back, tmp_path / "turning.npz")
     told = CliRunner().invoke(main, ["certify", str(tmp_path / "turning.npz")])
-    assert told.exit_code == 1
+    assert told.exit_code == 3
     assert "movements end in one place" in " ".join(told.output.split())
 
 
@@ -135,7 +135,7 @@ def test_on_the_command_line_the_exit_code_says_it(tmp_path):
     good, bad, wrong = (
         CliRunner().invoke(main, ["certify", str(tmp_path / name)]) for name in ("guided.npz", "plain.npz", "none.npz")
     )
-    assert (good.exit_code, bad.exit_code, wrong.exit_code) == (0, 1, 2)
+    assert (good.exit_code, bad.exit_code, wrong.exit_code) == (0, 3, 2)
     assert good.output.startswith("✔")
     assert "From every state, movements arrive: free at (0.3" in " ".join(good.output.split())
     assert "Do not trust: A constraint that moves or is not told, or an obstacle," in good.output
@@ -149,4 +149,4 @@ def test_on_the_command_line_the_exit_code_says_it(tmp_path):
     )
     assert "guaranteed" in bad.output
     assert f"Next: unconstrain export {tmp_path / 'guided.npz'} -o policy.c" in good.output
-    assert "Next: unconstrain fit with --guided auto" in bad.output
+    assert "Next: 'unconstrain fit --guided auto'" in bad.output

@@ -5,6 +5,7 @@ import re
 import shlex
 import shutil
 import warnings
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -472,22 +473,24 @@ def rounds(before, after, noise=0.2):
 
 
 @pytest.mark.parametrize(("before", "after"), [(0.6, 0.7), (0.6, 0.0), (0.0, 0.7), (0.0, 0.0)])
-def test_rest_at_both_ends_is_told_with_the_still_that_trims_it(tmp_path, before, after):
+def test_rest_at_both_ends_is_left_out_and_told(tmp_path, before, after):
     path = write(tmp_path / "r.csv", "t,x [mm],y [mm],z [mm]", rounds(before, after))
     said = text(call("inspect", path, "--state", "x,y,z", "--differentiate"))
     assert ("before it starts" in said) == bool(before)
     assert ("at its end" in said) == bool(after)
-    told = re.search(r"rest: .* learnt as rest there; --still (\S+) trims it\.", said)
-    assert bool(told) == bool(after)
+    assert ("left out (--pauses keep where that is its goal)." in said) == bool(after)
     head = "t,x [mm],y [mm],z [mm]"
     more = [write(tmp_path / f"{k}.csv", head, rounds(before, after) * [1.0, 1.1, k, 1.0]) for k in (1, 2)]
     noted = "nothing odd: ready to learn from (rest is noted)."
     assert (noted in text(call("inspect", path, *more, "--state", "x,y,z", "--differentiate"))) == bool(before + after)
-    if told:
-        kept = uc.prepare(uc.read(path), uc.Recipe(("x", "y", "z"), differentiate="savgol", still=float(told[1])))[0]
-        assert abs(len(kept) - 250) <= 20
-        again = text(call("inspect", path, "--state", "x,y,z", "--differentiate", "--still", told[1]))
-        assert "rest: " not in again
+    asked = uc.Recipe(("x", "y", "z"), differentiate="savgol")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        [moving], [all_] = (uc.prepare(uc.read(path), replace(asked, pauses=pauses)) for pauses in ("drop", "keep"))
+    assert abs(len(moving) - 250) <= 20
+    assert len(all_) == round(250 + 50 * (before + after))
+    kept = text(call("inspect", path, "--state", "x,y,z", "--differentiate", "--pauses", "keep"))
+    assert ("learnt as rest there." in kept) == bool(before + after)
 
 
 def test_a_goal_that_is_come_to_slowly_is_no_rest_at_the_end(tmp_path):
@@ -497,19 +500,6 @@ def test_a_goal_that_is_come_to_slowly_is_no_rest_at_the_end(tmp_path):
         table[:, 1:] += 0.2 * np.random.default_rng(0).standard_normal((300, 3))
         path = write(tmp_path / "r.csv", "t,x,y,z", table)
         assert "rest: " not in text(call("inspect", path, "--state", "x,y,z", "--differentiate"))
-
-
-@pytest.mark.parametrize(
-    ("noise", "told"),
-    [
-        (0.2, r"--still 2\d trims it\."),
-        (2.0, r"--still 2\d\d trims it, and movement as slow as that; with a longer --window noise is slower\."),
-    ],
-)
-def test_rest_that_noise_makes_as_fast_as_movement_is_told_so(tmp_path, noise, told):
-    path = write(tmp_path / "r.csv", "t,x,y,z", rounds(0.6, 0.7, noise))
-    said = text(call("inspect", path, "--state", "x,y,z", "--differentiate"))
-    assert re.search(rf"learnt as rest there; {told}", said)
 
 
 # Units, columns and signs of actions, and of joints

@@ -175,7 +175,7 @@ def local():
 
 def test_a_movement_stops_where_nothing_was_demonstrated_and_says_when_where_and_why():
     policy = local()
-    with pytest.warns(UserWarning, match=r"rollout stops after .* s at \(.*support below 0.001.*least support of 0"):
+    with pytest.warns(UserWarning, match=r"rollout stops after .* s at \(.*support below 0.001.*least_support=0"):
         run = uc.rollout(policy, [0.3, 0.1], 400, 0.02)
     whole = uc.rollout(policy, [0.3, 0.1], 400, 0.02, least_support=0.0)
     far = policy.support(whole.states) < 1e-3

@@ -222,6 +222,11 @@ def test_a_closed_form_in_other_units_is_the_same_policy():
     assert Scale(np.ones(2), np.ones(2)).is_one
 
 
+def _but_commands(said):
+    """What was printed, without what may be typed next, which names the options that were given."""
+    return [line for line in said.splitlines() if not line.startswith("    unconstrain ")]
+
+
 def test_the_command_line_scales_and_says_so(tmp_path):
     files = []
     for one in in_units(turning(), MM):
@@ -232,7 +237,7 @@ def test_the_command_line_scales_and_says_so(tmp_path):
     assert "As one count 1000 of x, 1000 of y, 1 of yaw, 1000 of vx" in done
     assert_array_equal(uc.load(output).scale_.states, MM)
     told = run("fit", *files, "-o", output, "--force", *plain, "--scale", "1000,1000,1")
-    assert told == done
+    assert _but_commands(told) == _but_commands(done)
     unscaled = call("fit", *files, "-o", output, "--force", *plain)
     assert "As one" not in unscaled.out
     assert "mixed-units: 'd0', column 'yaw': " in unscaled.err

@@ -78,7 +78,7 @@ class TestMarks:
         assert (little.mark, little.said[:40]) == (Mark.DOUBTFUL, "Whether anything was held cannot be told")
         assert verdicts.of_constraint(held(1), held(1), wound=True) == sure
         assert verdicts.of_constraint(held(1), wound=False).mark is Mark.GOOD  # several tell it together
-        assert "'unconstrain diagnose' tells of several together which look held." in alike.next
+        assert "'diagnose' tells of several together which look held." in alike.next
         assert "by one demonstration alone" in alike.said
         assert "alone" not in little.said + little.next
         both = verdicts.of_constraint(alone, alone, shown=True)
@@ -89,7 +89,7 @@ class TestMarks:
             choice = SimpleNamespace(held_out=missed, actions=2, doubts=(), lacking=(), several=True, one_way=False)
             found = verdicts.of_constraint(SimpleNamespace(rank_=1, choice_=choice))
             assert found.said.startswith("If one constraint held all: 1 of 2 directions were held;") == much
-            assert found.next.startswith("Learn it of each alone" if much else "Use it with 'unconstrain rollout")
+            assert found.next.startswith("Learn it of each alone" if much else "Use it with --constraint")
 
     def test_a_bad_recording_is_not_hidden_by_many_good_ones(self):
         good, usual = verdicts.of_score(0.97, 20), {f"a_{number}": 0.98 for number in range(18)}

@@ -22,7 +22,7 @@ from .converting import convert, example
 from .diagnosing import diagnose
 from .exporting import export
 from .fitting import alpha_of, default_learner, guide_of, guided, learn, learner_of, options_for_model, policy_of
-from .informing import LOST, MARK, MOVES, RAN, TOLD, info, provenance
+from .informing import LOST, MARK, MOVES, NOISE, RAN, TOLD, info, provenance
 from .looking import look, play
 from .printing import (
     SPOILING,
@@ -81,6 +81,9 @@ def main() -> None:
     unconstrain export policy.npz -o policy.c     take it to a robot
     unconstrain constraint *.csv -o held.npz      learn what held them
     unconstrain info policy.npz                   what it is, and of what
+
+    Exit codes: 0 done, whatever the verdict says (scripts read verdict.mark of --json); 1 a fault of this program; 2 it
+    cannot be done, or --strict and recordings are not as they seem; 3 certify guarantees nothing; 130 interrupted.
 
     Completion by the tab key, here for bash (or zsh, fish):
 
@@ -278,8 +281,8 @@ def fit(
     if not as_json:
         say_fit(moving, stream, judged, learner, verbose)
     refuse_warnings(reading["strict"])
-    found = {TOLD: told, LOST: judged.lost, RAN: judged.ran or None, MOVES: judged.moves or None}
-    found[MARK] = judged.verdict.mark.name.lower()
+    found = {TOLD: told, LOST: judged.lost, NOISE: judged.noise_alone, MARK: judged.verdict.mark.name.lower()}
+    found |= {RAN: judged.ran or None, MOVES: judged.moves or None}
     uc.save(moving, output, provenance(paths, stream.recipe, stream.first, **reading) | found)
     say_written(_reported(moving, stream, report, output, judged), judged.to_json() if as_json else None)
 

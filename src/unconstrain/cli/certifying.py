@@ -11,8 +11,9 @@ import unconstrain as uc
 
 from ..base.display import unit_of
 from ..base.errors import ModelFileError
+from .endings import NOT_GUARANTEED
 from .printing import option_for_json, say_judged
-from .reading import loaded
+from .reading import loaded, to_copy
 
 
 @click.command(epilog="\b\nExample:\n  unconstrain certify guided.npz")
@@ -24,8 +25,8 @@ from .reading import loaded
 def certify(policy: str, seed: int, as_json: bool) -> None:
     """Say what is guaranteed of the motion of POLICY.
 
-    By what margin, where and under which constraints. Exits with 1 where it is not, with a start, and a plane, from
-    which it does not arrive.
+    By what margin, where and under which constraints. Where nothing is, the exit code is 3, with a start, and a
+    plane, from which it does not arrive.
     """
     import numpy as np
 
@@ -38,24 +39,26 @@ def certify(policy: str, seed: int, as_json: bool) -> None:
         raise ModelFileError(f"{policy}: holds no policy that is fitted or guided. Learn one with 'unconstrain fit'.")
     found = uc.certify(stored, around, seed)
     start, normal = (None if one is None else one.tolist() for one in (found.start, found.normal))
-    say_judged(_judged(policy, found), {}, as_json, holds=found.holds, start=start, normal=normal)
+    judged = to_copy(_judged(policy, found), policy, uc.storage.load_notes(policy))
+    say_judged(judged, {}, as_json, holds=found.holds, start=start, normal=normal)
     if not found.holds:
-        raise SystemExit(1)
+        raise SystemExit(NOT_GUARANTEED)
 
 
 def _judged(policy: str, found: uc.motion.certificate.Certificate) -> uc.evaluation.verdicts.Verdict:
     """What is guaranteed, in which units, and what may go against it; or what was found against it."""
-    notes, marks = uc.storage.load_notes(policy), uc.evaluation.verdicts.Mark
+    notes, verdicts = uc.storage.load_notes(policy), uc.evaluation.verdicts
     unit = unit_of(uc.Recipe.from_dict(notes.get("recipe", {})).labels(notes.get("units", {}))[0])
     unit = f"Lengths are in {unit or 'the unit of the states'}, and all rates per second."
     if not found.holds:
-        then = "unconstrain fit with --guided auto, cycle, or a goal such as 0.1,0, and certify that"
-        return uc.evaluation.verdicts.Verdict(marks.BAD, f"{policy}: {found.said} {unit}", next=then)
+        then = "'unconstrain fit --guided auto', or cycle, or a goal such as 0.1,0, and certify that."
+        said = f"{policy}: {found.said.replace(' (see uc.Guided)', '')} {unit}"
+        return verdicts.Verdict(verdicts.Mark.BAD, said, next=then)
     promise, away, checked = found.said.partition("A constraint that moves or is not told")
     doubt = f"{away}{checked.partition(' Checked at')[0]}"
     then = f"unconstrain export {shlex.quote(policy)} -o policy.c"
     said = f"{policy}: guaranteed. {unit}"
-    return uc.evaluation.verdicts.Verdict(marks.GOOD, said, promise.strip(), doubt, then)
+    return verdicts.Verdict(verdicts.Mark.GOOD, said, promise.strip(), doubt, then)
 
 
 def _learnt_at(policy: Any) -> Any:

@@ -411,6 +411,8 @@ def table_of(
         angles = [f"{math.degrees(math.acos(min(abs(one.axis[-1]), 1.0))):.1f}°" for one in held]
         columns[what] = [each * ("tilt" in one.margins) for each, one in zip(angles, held, strict=True)]
         columns["radius"] = ["" if one.vague or not one.radius else f"{one.radius:.3g} {one.unit}" for one in held]
+        at = [", ".join(f"{each + 0.0:.3f}" for each in one.centre.round(3)) for one in held]
+        columns["centre"] = [each * bool(radius) for each, radius in zip(at, columns["radius"], strict=True)]
         columns["mechanism"] = [text for _, text in named.each] if whole else []
     shown = {head: values for head, values in columns.items() if any(values)}
     return ["demonstration", *shown], [list(row) for row in zip(names, *shown.values(), strict=True)]

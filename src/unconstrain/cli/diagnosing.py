@@ -67,7 +67,7 @@ def diagnose(
         click.echo(f"{', '.join(counts)}; {said_recipe(recipe, first)}.")
         say_scale(policy, recipe)
         unit = "" if policy.scale_ else unit_of(recipe.labels(first.units)[1])
-        _say(found, states, actions, unit, len(found.regions) if verbose else MOST_ROWS)
+        _say(found, states, actions, unit, verbose)
     if report is not None:
         from ..pages.diagnosis import diagnosis_page
 
@@ -76,11 +76,13 @@ def diagnose(
         click.echo(f"report: {report}", err=as_json)
 
 
-def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequence[str], unit: str, most: int) -> None:
+def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequence[str], unit: str, all_: bool) -> None:
     for line in uc.evaluation.diagnosis.sentences(found, states, actions, unit):
         click.echo(line)
-    shown = found.regions[:most]
-    click.echo(f"\nThe {len(shown)} regions of largest undetermined spread, of {len(found.regions)}, largest first:")
+    every = uc.evaluation.diagnosis.places(found.regions)
+    shown = found.regions if all_ else every[:MOST_ROWS]
+    count = f"{len(every)} ({len(found.regions)} regions)"
+    click.echo(f"\nThe {len(shown)} places of largest undetermined spread, of {count}, largest first:")
     around, along = (" ".join(name.partition(" [")[0] for name in names) for names in (states, actions))
     head = [f"demonstrate\naround\n({around})", "in", "told", "by\nthree", "spread",
             f"leave free\n({along})", "shown\nby"]  # fmt: skip
@@ -93,7 +95,7 @@ def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequenc
     print_table(head, rows)
     click.echo("told: share of samples there at which all tell the policy, to a tenth of a typical action or to noise.")
     click.echo("by three: the same whichever two are left out, so that it hangs on no one or two.")
-    click.echo("spread: how far it may be off at this state without these two, along 'leave free'; 100% is typical.")
+    click.echo("spread: how far it may be off along 'leave free', with any two left out; 100% is a typical action.")
     click.echo("shown by: demonstrations that moved along 'leave free' in this region.")
     told = [one for one in found.movements if one.looks in uc.evaluation.diagnosis.COUNTED]
     if not (free := sorted(told, key=lambda one: -(one.free or 0.0))):

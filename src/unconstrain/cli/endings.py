@@ -10,8 +10,8 @@ from typing import Any
 
 from ..base.errors import UnconstrainError
 
-REFUSED, FAULT, INTERRUPTED = 2, 1, 130
-"""Exit codes: what was asked cannot be done; a fault of this program; as shells say of Ctrl-C."""
+REFUSED, FAULT, NOT_GUARANTEED, INTERRUPTED = 2, 1, 3, 130
+"""Exit codes: what was asked cannot be done; a fault of this program; ``certify`` says no; as shells say of Ctrl-C."""
 
 _NOTHING = "What is not named above was not written, and nothing is half written."
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -26,7 +27,7 @@ class Target(NamedTuple):
 
 
 _NEXT_C = "Stop the robot where {name}_support() is near 0. "
-_NEXT_C += "Let it test itself where it will run: cc -std=c99 -D{NAME}_SELF_TEST {file} -lm -o test && ./test"
+_NEXT_C += "Let it test itself where it will run:\ncc -std=c99 -D{NAME}_SELF_TEST {file} -lm -o test && ./test"
 _NEXT_ONNX = "Run it on a recorded state, and compare with 'policy.predict'."
 _NEXT_ROS2 = "colcon build, then colcon test; let it run with the robot held still first."
 
@@ -81,7 +82,7 @@ def export(
         target, options = TARGETS[kind], {"name": name, "single": single, "notes": notes}
         getattr(learnt, target.method)(output, **{option: options[option] for option in target.takes})
         called = name or Path(output).stem
-        then = target.next.format(NAME=called.upper(), name=called, file=Path(output).name)
+        then = target.next.format(NAME=called.upper(), name=called, file=shlex.quote(output))
         written[target.what] = output
     if header is not None:
         written["header"] = header

@@ -15,10 +15,11 @@ import unconstrain as uc
 
 from ..base.display import innermost, percent, unit_of
 from .printing import print_table, say_verdict
-from .reading import loaded, reading_of
+from .reading import loaded, reading_of, to_copy
 
-TOLD = "determined share of states"
-"""Note of the share of the recorded states at which recordings tell the policy in every direction."""
+TOLD, NOISE = "determined share of states", "missed for noise alone"
+"""Notes of shares: of the recorded states at which recordings tell the policy in every direction, and of what noise of
+the actions lets a policy miss of a typical one."""
 
 LOST = "explained less by guiding"
 """Note of the share of what a policy learnt from that it explains less as it is guided."""
@@ -88,13 +89,14 @@ def info(file: str, as_json: bool) -> None:
     A policy, guided or not, or a constraint.
     """
     held, notes = loaded(file, uc.Policy | uc.LearntConstraint | uc.Guided), uc.storage.load_notes(file)
-    inner = ("recipe", "units", "digests", MARK, MOVES, HELD_BY, SHOWN, WHERE, WOUND)
+    inner = ("recipe", "units", "digests", MARK, NOISE, MOVES, HELD_BY, SHOWN, WHERE, WOUND)
     rest = {name: value for name, value in notes.items() if name not in inner}
+    verdict = to_copy(verdict_of(held, notes), file, notes)
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held, notes), **rest}
     if as_json:
-        click.echo(json.dumps(told | {"verdict": verdict_of(held, notes).to_json()}, indent=2))
+        click.echo(json.dumps(told | {"verdict": verdict.to_json()}, indent=2))
         return
-    say_verdict(verdict_of(held, notes))
+    say_verdict(verdict)
     kind = {uc.LearntConstraint: "a learnt constraint", uc.Guided: "a guided policy"}.get(type(held), "a policy")
     told["holds"] = f"{kind}: {told.pop('model')}" if "model" in told else kind
     if told.get("noise") and isinstance(innermost(held), uc.Policy) and not innermost(held).scale_:
@@ -149,7 +151,7 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
         return uc.evaluation.verdicts.of_mechanism(found, held.rank_, named, sure=True) if named else found
     if not hasattr(innermost(held), "solution_"):
         mark = uc.evaluation.verdicts.Mark.BAD
-        return uc.evaluation.verdicts.Verdict(mark, "Not fitted: it cannot predict.", next="unconstrain fit")
+        return uc.evaluation.verdicts.Verdict(mark, "Not fitted: it cannot predict.", next="'unconstrain fit'")
     found = _explained(held, notes)
     if found.mark is uc.evaluation.verdicts.Mark.GOOD and notes.get(MARK) == "doubtful":
         doubt = f"Its movement over time. {found.doubt}"
@@ -162,7 +164,7 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
 def _doubt(notes: Mapping[str, Any]) -> str:
     """What ``fit`` doubted of a policy that explains enough: how it moves, or else what it noted of recordings."""
     moves = notes.get(MOVES) or "it moves otherwise than was demonstrated"
-    kept = all(one.startswith("it keeps") for one in moves.split("; guided "))
+    kept = all(one.startswith(("it keeps", "it nearly keeps")) for one in moves.split("; guided "))
     return "its recordings are not all as they should be" if kept else f"run from the same starts, {moves}"
 
 
@@ -171,7 +173,8 @@ def _explained(held: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> uc.eval
     policy = innermost(held)
     count = len(policy.training_.split.fold_of) or uc.evaluation.diagnosis.ENOUGH
     shown = notes[TOLD] if isinstance(notes.get(TOLD), float) else None
-    return uc.evaluation.verdicts.of_explained(policy.held_out_score(), count, shown, lost=notes.get(LOST))
+    more: dict[str, Any] = {"lost": notes.get(LOST), "noise": notes.get(NOISE) or 0.0}
+    return uc.evaluation.verdicts.of_explained(policy.held_out_score(), count, shown, **more)
 
 
 def doubted(policy: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> str:

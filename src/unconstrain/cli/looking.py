@@ -19,7 +19,7 @@ from ..base.files import write
 from .constraining import arm_of, known_arms, said_elsewhere
 from .informing import OF, TOLD, learnt_from
 from .printing import option_for_json, refuse_warnings, say_judged, say_verdict, say_written
-from .reading import options_for_reading, prepared, reading_of, typed
+from .reading import options_for_reading, prepared, prepared_as, reading_of, typed
 from .speaking import as_typed
 from .writing import check_outputs, option_for_force
 
@@ -249,11 +249,7 @@ def _model(path: str | Path) -> Any:
 def _to_fit(paths: Sequence[str | Path], recipe: uc.Recipe, roles: Mapping[str, Any]) -> tuple[str, str]:
     """What to type to learn from these files as they were read, before and after what is left out."""
     context = click.get_current_context()
-    told = ["unconstrain", "fit", *map(str, paths)]
-    if not context.params["state"]:
-        told += ["--state", ",".join(recipe.states or ())]
-        by = ["--by", recipe.differentiate or ""]
-        told += by if recipe.actions is None else ["--action", ",".join(recipe.actions)]
+    told = ["unconstrain", "fit", *map(str, paths), *([] if context.params["state"] else prepared_as(recipe))]
     given = typed("files", "output", "force", "leave_out", "rrd", "robot", "tip")
     for option in context.command.params:
         role = roles.get(option.name or "")

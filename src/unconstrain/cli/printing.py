@@ -19,7 +19,7 @@ import unconstrain as uc
 from ..base.display import counted, innermost, listed, percent, unit_of
 from ..base.errors import InvalidDataError, ModelFileError, ReadError, SettingError, WriteError
 from .endings import REFUSED, ending
-from .reading import next_command, said_recipe, say_left
+from .reading import next_command, said_recipe, say_left, to_copy
 from .speaking import as_typed, meant_of
 from .terminal import plain_output
 
@@ -175,6 +175,7 @@ class Judged(NamedTuple):
     training: float
     held_out: float
     lost: float | None = None
+    noise_alone: float | None = None
 
     def to_json(self) -> dict[str, Any]:
         """With None for what is not known."""
@@ -202,21 +203,20 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     count, samples, missed = _walked(moving, stream, usual)
     open_ = told is not None and told < uc.evaluation.verdicts.MOSTLY
     there = _least_known(policy, demos, stream.recipe) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
-    found = uc.evaluation.verdicts.of_explained(alone, count, told, there, 1.0 - missed, lost)
+    noise = uc.evaluation.metrics.missed_for_noise(policy, demos)
+    found = uc.evaluation.verdicts.of_explained(alone, count, told, there, 1.0 - missed, lost, noise)
     ran = retraced(found, moving, demos, stream.recipe, None, stream.first.units, False)
     cured = ran.verdict._replace(next=there) if there and found.next == there else ran.verdict
     verdict = uc.evaluation.diagnosis.about_recordings(cured, demos, stream.recipe, moving)
-    return Judged(as_noted(verdict), ran.medians, *ran[3:], count, samples, 1.0 - missed, held_out, lost)
+    verdict = to_copy(as_noted(verdict), click.get_current_context().params["output"])
+    return Judged(verdict, ran.medians, *ran[3:], count, samples, 1.0 - missed, held_out, lost, noise)
 
 
 def as_noted(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.Verdict:
-    """The same with what was noted: rest before a start, glitches, and units that differ; at best doubtful by these."""
+    """The same with what was noted: glitches, and units that differ; at best doubtful by these."""
     told = click.get_current_context().meta
     if jumps := [title for title, one in told.get(TITLES, {}).get("glitch", {}).items() if not one.cured]:
         verdict = uc.evaluation.verdicts.of_glitches(verdict, listed(jumps, 4))
-    if rest := [title for title, one in told.get(TITLES, {}).get("rest", {}).items() if not one.cured]:
-        said = f"Where {listed(rest, 4)} stood still at an end: rest is learnt there; --still trims it."
-        verdict = verdict._replace(doubt=f"{verdict.doubt} {said}".lstrip())
     if "not-velocities" in told.get(CODES, ()):
         return uc.evaluation.verdicts.of_units_apart(verdict, "actions are not the velocities of the states")
     return uc.evaluation.verdicts.of_units_apart(verdict) if OTHER_UNITS & {*told.get(CODES, ())} else verdict

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import shlex
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -79,7 +80,9 @@ CURES = (
         "What action columns hold: velocities, states to come, or changes to the next sample.",
         "auto",
     ),
-    of_words("--pauses", "drop keep", "Rows that stand still in the middle or before the start.", "drop"),
+    of_words(
+        "--pauses", "drop keep", "Rows that stand still in the middle, before the start or after a sudden end.", "drop"
+    ),
     of_words(
         "--glitches", "auto keep repair drop", "Samples far off: repair puts a line there, auto only of few.", "auto"
     ),
@@ -287,6 +290,27 @@ def next_command(name: str, *more: str, without: Sequence[str] = ()) -> str:
     others = [one.name or "" for one in context.command.params if one.name not in known]
     told = typed("files", "output", "report", "force", "verbose", "as_json", "strict", *others, *without)
     return f"unconstrain {name} {_as_pattern(context.params['files'])} {shlex.join([*told, *more])}".rstrip()
+
+
+def to_copy(verdict: Any, policy: str, notes: Mapping[str, Any] | None = None) -> Any:
+    """A verdict with the commands that its Next names whole, on these files or, in capitals, such as a model notes."""
+    lines, recipe = verdict.next.split("\n"), uc.Recipe.from_dict((notes or {}).get("recipe", {}))
+    read = ["RECORDINGS.csv", *prepared_as(recipe)]
+    roles = {role: name for role, name in reading_of(**notes or {}).roles.items() if isinstance(name, str)}
+    read += [word for role, name in roles.items() for word in (f"--{role.replace('_', '-')}", name)]
+    for name, to in re.findall(r"'unconstrain (\w+)(?: --guided ([\w.,]+))?", verdict.next):
+        more = ["--guided", "GOAL" if "," in to else to] * bool(to) + ["-o", "guided.npz" if to else "policy.npz"]
+        more = {"fit": more, "look": [policy]}.get(name, [])
+        own = next_command(name, *more, without=["to"]) if notes is None and name != "score" else ""
+        files = [policy, "NEW.csv"] if name == "score" else read
+        lines.append(own or shlex.join(["unconstrain", name, *files, *more]))
+    return verdict._replace(next="\n".join(dict.fromkeys(lines)))
+
+
+def prepared_as(recipe: uc.Recipe) -> list[str]:
+    """Options that name the states of a recipe, and say what the actions are."""
+    by = ["--by", recipe.differentiate or ""] if recipe.actions is None else ["--action", ",".join(recipe.actions)]
+    return ["--state", ",".join(recipe.states), *by] if recipe.states else []
 
 
 def _as_pattern(files: Sequence[str]) -> str:

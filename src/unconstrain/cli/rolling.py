@@ -20,8 +20,9 @@ from ..base.files import write
 from .constraining import held_of, options_for_held
 from .informing import TOLD, doubted
 from .printing import doubt_degrees, of_option, option_for_json, say_verdict, say_written, show_warning
-from .reading import fitted_policy, numbers, of_words
+from .reading import fitted_policy, numbers, of_words, to_copy
 from .scoring import support_of
+from .speaking import as_typed
 from .writing import check_outputs, option_for_force
 
 
@@ -90,7 +91,7 @@ def rollout(
     path, why, trouble = _as_far_as_it_goes(moving, list(start), constraint=held, task=task, obstacles=round_, **how)
     named = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))
     kept = "the plane" if plane is not None else getattr(held, "title", "")
-    verdict = _supported(moving, path, why, round_, kept, notes)
+    verdict = to_copy(_supported(moving, path, why, round_, kept, notes), policy, notes)
     accelerations = named.actions or tuple(f"a{name}" for name in (named.states or ())[:places])
     columns = ["t", *sum(replace(named, actions=accelerations if how["order"] == 2 else None).labels({}), ())]
     if output != "-":
@@ -145,7 +146,7 @@ def _as_far_as_it_goes(policy: uc.Policy, start: list[float], **how: Any) -> tup
     for one in said:
         if one.category is not SupportEndsWarning:
             show_warning(one.message)
-    return path, " ".join(str(one.message) for one in said if one.category is SupportEndsWarning), None
+    return path, as_typed(" ".join(str(one.message) for one in said if one.category is SupportEndsWarning)), None
 
 
 def _supported(

@@ -18,7 +18,7 @@ from .constraining import held_of, options_for_held
 from .informing import TOLD, learnt_from
 from .printing import explained, number, option_for_json, print_table, refuse_warnings, say_verdict
 from .progress import shown
-from .reading import fitted_policy, options_for_reading, prepared
+from .reading import fitted_policy, options_for_reading, prepared, to_copy
 
 LEAST, ENOUGH = 5, 5.0
 """Samples that it takes to tell noise, and standard deviations of it that are enough in half a usual action."""
@@ -51,7 +51,7 @@ def score(
     refuse_warnings(reading["strict"])
     states = uc.stack(demonstrations).states
     held = held_of(plane, constraint, recipe, states, learnt.n_outputs_, "one for each action")
-    if 2 * (support_of(learnt, states) < uc.models.SUPPORTED).sum() > len(states):
+    if (support_of(learnt, states) < uc.models.SUPPORTED).mean() > 0.5:
         click.echo(f"Note: {policy}: learnt far from most of these states: another task, or other units?", err=True)
     with shown("scoring"):
         short = [one.name for one in demonstrations if len(one) < LEAST]
@@ -59,26 +59,33 @@ def score(
         rows = [_scores(moving, held, [demo], demo.name) for demo in demonstrations]
         whole = _scores(moving, held, demonstrations, "all")
         planes = uc.evaluation.metrics.explained_in_planes(moving, demonstrations)
-    known, under = learnt_from(learnt, notes, recordings), None if held is None else 1.0 - whole["ncpe"]
-    seen = None if known is None else len(known)
-    judged = verdicts.of_score(whole["explains"], len(demonstrations), under, seen, notes.get(TOLD))
-    judged = judged if whole["fast"] >= LEAST else verdicts.TOO_SLOW
+    known = learnt_from(learnt, notes, recordings)
+    given = None if held is None else 1.0 - whole["ncpe"], None if known is None else len(known), notes.get(TOLD)
+    judged = verdicts.of_score(whole["explains"], len(demonstrations), *given)
+    judged = _missed(judged, moving, demonstrations) if whole["fast"] >= LEAST else verdicts.TOO_SLOW
     judged = verdicts.of_worst(judged, {one["demonstration"]: one["explains"] for one in rows if one["fast"] >= LEAST})
     judged = judged if held is not None else verdicts.of_planes(judged, planes, _motion(demonstrations))
     with shown("running it from the same starts"):
         found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units)
-    verdict = verdicts.of_unit(verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0)), _times(learnt, states))
-    if as_json:
-        told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known, "hardly_moved": still}
-        more = {"too_short": short, "in_planes": _known(planes), "replayed": found.medians, "ran": found.in_figures}
-        click.echo(json.dumps(told | more | {"verdict": verdict.to_json()}, indent=2))
+    judged = verdicts.of_unit(verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0)), _times(learnt, states))
+    verdict = to_copy(judged, policy, notes)
+    if not as_json:
+        _print_scores(verdict, rows, whole, {"hardly moved": still, "too short": short}, found.in_figures)
         return
+    told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known, "hardly_moved": still}
+    more = {"too_short": short, "in_planes": _known(planes), "replayed": found.medians, "ran": found.in_figures}
+    click.echo(json.dumps(told | more | {"verdict": verdict.to_json()}, indent=2))
+
+
+def _missed(judged: Any, moving: Any, demonstrations: Sequence[uc.Demonstration]) -> Any:
+    """A verdict with what a policy misses where it predicts, and what noise alone makes of that."""
+    share, noise = explained(moving, demonstrations), uc.evaluation.metrics.missed_for_noise(moving, demonstrations)
+    return judged._replace(trust=judged.trust and f"{judged.trust} It {uc.evaluation.verdicts.misses(share, noise)}.")
+
+
+def _print_scores(verdict: Any, rows: Any, whole: dict[str, Any], left: dict[str, list[str]], ran: str) -> None:
+    """A verdict, scores of each demonstration and all, why others have none, and figures of runs from their starts."""
     say_verdict(verdict)
-    _print_scores(rows, whole, {"hardly moved": still, "too short": short}, found.in_figures)
-
-
-def _print_scores(rows: Sequence[dict[str, Any]], whole: dict[str, Any], left: dict[str, list[str]], ran: str) -> None:
-    """Scores of each demonstration and of all, why others have none, and figures of runs from their starts."""
     head = ["demonstration", "samples", "explains", "normalised inconsistency", "nPOE", "nCPE"][: len(whole) - 1]
     each = [_row(*one.values()) for one in (*rows, whole)]
     none = [[name, "", f"{why}: no score"] for why, names in left.items() for name in names]

@@ -26,6 +26,7 @@ OBJECTS = {
     "a smaller dt": "a smaller --dt",
     "goal=, or orbit='shown' for a cycle": "--guided its place, such as --guided 0.1,0, or --guided cycle",
     "fit each by itself": "fit each by itself (its file alone, or --episodes with its name)",
+    "guide the policy (uc.Guided)": "fit with --guided auto",
     "give it with goal=": "give it with --guided, such as --guided 0.1,0",
     "Take Hybrid()": "Take --learner hybrid",
     "the warnings of a survey": "what 'unconstrain inspect' warns of",

@@ -164,7 +164,7 @@ class Diagnosis:
     undecided_share : float
         Estimated share of samples that were free or always held in the same way: the data cannot tell.
     regions : tuple of Region
-        All, by decreasing undetermined spread.
+        All, by decreasing undetermined spread along their directions.
     movements : tuple of Movement
         Each demonstration.
     suspects : tuple of Place
@@ -371,11 +371,10 @@ def _regions(
     nearest = fields.weights(seen).argmax(axis=1)
     centres = enumerate(embedding.states(fields.centres))
     found = [(centre, rows) for index, centre in centres if len(rows := np.flatnonzero(nearest == index))]
-    found.sort(key=lambda one: -undetermined[one[1]].max())
     worst = [int(rows[undetermined[rows].argmax()]) for _, rows in found]
     directions, along = _least_determined(policy, states[worst])
     names, noise = names_of(demos), policy.solution_.noise
-    return tuple(
+    every = (
         Region(
             _numbers(centre),
             len(rows),
@@ -390,6 +389,16 @@ def _regions(
         )
         for (centre, rows), row, direction, size in zip(found, worst, directions, along, strict=True)
     )
+    return tuple(sorted(every, key=lambda one: -one.along))
+
+
+def places(regions: Sequence[Region]) -> list[Region]:
+    """Regions without those within a tenth of the extents of one before, and 45° of its direction: one tells both."""
+    near, kept = np.ptp([one.state for one in regions], axis=0) * 0.1 + 1e-300, list[Region]()
+    for one in regions:
+        by = [each for each in kept if (np.abs(np.subtract(each.state, one.state)) <= near).all()]
+        kept += [] if any(abs(np.dot(each.direction, one.direction)) >= 0.7 for each in by) else [one]
+    return kept
 
 
 def _moved(speeds: Array, groups: NDArray[np.intp], least: float) -> list[int]:

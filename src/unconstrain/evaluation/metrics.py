@@ -27,7 +27,7 @@ from ..learners import robust
 from ..models import spaces
 from ..recordings import Demonstration, stack
 from ..risks import TURNED as TURNED
-from ..risks import action_projection, null_space_projection, project
+from ..risks import action_projection, null_space_projection, project, unit_actions
 from ..risks import along_motion as along
 
 PolicyLike = Callable[[Array], Array]
@@ -160,6 +160,17 @@ def along_motion(policy: PolicyLike, demonstrations: Demonstrations, usual: floa
     demos = _listed(demonstrations)
     noise = np.repeat([_noise(demo) for demo in demos], [len(demo) for demo in demos])
     return along(stack(demos).actions, _predicted(policy, demos), usual=usual, noise=noise)
+
+
+def missed_for_noise(policy: PolicyLike, demonstrations: Demonstrations) -> float:
+    """What noise alone lets the best policy, about ``policy``, miss along the motion; a share of a typical action."""
+    demos = _listed(demonstrations)
+    noise = np.repeat([_noise(demo) for demo in demos], [len(demo) for demo in demos])
+    actions, predicted = stack(demos).actions, _predicted(policy, demos)
+    directions, lengths = unit_actions(actions)
+    turned = ((predicted - project(action_projection(actions), predicted)) ** 2).sum(axis=1) / lengths.clip(1e-150) ** 2
+    missed, motion = along(actions, actions - directions * np.sqrt(noise * (1.0 + turned))[:, None], noise=noise)
+    return float(np.sqrt(missed / motion)) if motion > 0 else 0.0
 
 
 def explained_in_planes(policy: PolicyLike, demonstrations: Demonstrations) -> Array:

@@ -110,7 +110,9 @@ def about_choice(method: str, candidates: Mapping[str, float]) -> str:
 
 def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> str:
     if all(one.determined == 1.0 for one in found.regions):
-        return "Every recorded state is determined, as far as noise lets it be told."
+        worst = max(one.along for one in found.regions)
+        off = f", though {percent(worst)} of a typical action may be off there" * bool(worst > SMALL)
+        return f"Every recorded state is determined, as far as noise lets it be told{off}."
     told, every, (open_, few) = found.told_together, len(found.regions), regions_left(found)
     left, hangs = (percent(max(share, 0.0)) for share in (1.0 - told, told - found.states_determined))
     where = "" if (left, open_) == ("0%", 0) else f"Not determined: {left} of the states, {open_} of {every} regions. "

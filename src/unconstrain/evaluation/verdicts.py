@@ -42,6 +42,14 @@ def _explains(share: float, what: str = "held-out motion") -> str:
     return f"explains {percent(share)} of {what}" if share >= -1 else f"misses {what} by more than that motion itself"
 
 
+def misses(share: float, noise: float) -> str:
+    """What is left of a share of motion, as one of a typical action, and what noise alone makes, if believable."""
+    missed = float(np.sqrt(max(1.0 - share, 0.0)))
+    known = 0.005 <= noise <= 1.2 * missed  # more is constraints that change at every sample, not noise
+    more = f" (noise in the recorded actions alone: {percent(min(noise, missed))} or more)" * known
+    return f"misses {percent(missed)} of a typical action{more}"
+
+
 def _advice(word: str, learnt: float, spoilt: bool) -> str:
     """What to do about a policy that explains so much of held-out motion, in a word, and of what it learnt from."""
     if spoilt:
@@ -57,7 +65,7 @@ def _advice(word: str, learnt: float, spoilt: bool) -> str:
         "in common.",
         "poor": "Look at the recordings ('unconstrain inspect'): columns, clocks or units may be wrong, or they have "
         "too little in common.",
-    }.get(word, "Score it on recordings that were held in other ways.")
+    }.get(word, "Score it on recordings that were held in other ways ('unconstrain score').")
 
 
 def of_untold(share: float) -> str:
@@ -74,13 +82,15 @@ def of_explained(
     there: str = "",
     learnt: float = 0.0,
     lost: float | None = None,
+    noise: float = 0.0,
 ) -> Verdict:
     """Judge how much of held-out motion a policy explains, along the motion.
 
     ``share`` is 1 − the share left unexplained, NaN where nothing could be held out; fewer than three demonstrations
     give no verdict. ``determined`` is the share of the recorded states at which recordings tell the policy, and
     ``there`` what to record where fewer show it. ``learnt`` is the share of what was learnt from, and ``lost`` what
-    guiding takes of that, None where it is not guided: a guided policy is judged by the one in it, or worse.
+    guiding takes of that, None where it is not guided: a guided policy is judged by the one in it, or worse. What
+    is missed for ``noise`` alone is a share of a typical action.
     """
     across, little = "What constraints hid: no recording shows it, so no score does.", ""
     (alone, word), (mark, _) = (graded(each, told=determined) for each in (share, share - (lost or 0.0)))
@@ -98,7 +108,7 @@ def of_explained(
         seen = f"The policy {_explains(share)}, but no" if np.isfinite(share) else "No"
         few = f"{seen} verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
         return Verdict(Mark.DOUBTFUL, few + retold, doubt=across, next=MORE)
-    missed = f"where the policy predicts, it misses {percent(np.sqrt(max(1 - share, 0)))} of a typical action"
+    missed = f"where the policy predicts, it {misses(share, noise)}"
     advice = f"{_advice(word, learnt, mark is not alone)} {there}".rstrip()
     if little:
         advice = there or "'unconstrain diagnose' says what to record."
@@ -135,7 +145,8 @@ def of_score(
     across += "--constraint (one by one, if each was held in its own way), tells more: all directions that were free."
     said, good = f"The policy {_explains(share)}{known}{unknown}: {word}.", mark is Mark.GOOD
     trust = "" if mark is Mark.BAD else "Movement like this, along the directions that were recorded."
-    then = f"Score it under other constraints.{few}" if good else "'unconstrain diagnose' says what to record."
+    other = "'unconstrain diagnose' says what to record."
+    then = f"Score it under other constraints ('unconstrain score').{few}" if good else other
     return Verdict(mark, said, trust, across if under is None else more, then)
 
 
@@ -274,7 +285,7 @@ def of_constraint(
         why = "each state was passed one way only, as by a free policy" if one_way else little
         then = "Record movements that cross each other, and learn it again; or name the --features."
         single = not others and not choice.several
-        then += " 'unconstrain diagnose' tells of several together which look held." * single
+        then += " 'diagnose' tells of several together which look held." * single
         said = f"Whether anything was held cannot be told{' by one demonstration alone' * single}: {why}."
         return Verdict(Mark.DOUBTFUL, said, doubt=f"That {min(ranks)} of {choice.actions} are held.", next=then)
     mark, word = graded(1.0 - missed)
@@ -285,7 +296,7 @@ def of_constraint(
         apart += f" (in some up to {max(ranks)} look so, as does a direction in which nobody moved)"
     undecided = " Positions do not decide it." if shown is False else ""
     said = f"{held}{apart}; {percent(missed)} of held-out motion is along them: {word}.{undecided}"
-    then = "Use it with 'unconstrain rollout --constraint' or 'score --constraint'."
+    then = "Use it with --constraint of 'rollout' or 'score'."
     if choice.several and not others and mark is not Mark.GOOD:
         said = f"If one constraint held all: {said}"
         then = "Learn it of each alone (--episodes, --leave-out): each may have been held otherwise, or not at all."
@@ -309,7 +320,7 @@ def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool) -> Verdict:
         keep = f"Positions may keep to {named.title}, which holds {more}; as it turns, velocities show less of it."
         return found._replace(said=f"{found.said} {keep}")
     said = f"{more} directions were held, by {named.title}. It turns on the way, so velocities alone show {rank}"
-    then = "Use it with 'unconstrain rollout --constraint', which follows the mechanism."
+    then = "Use it with --constraint of 'rollout' or 'score', which follow the mechanism."
     return found._replace(said=said + found.said.partition(" directions were held")[2], next=then)
 
 
@@ -363,7 +374,7 @@ def moves(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> tuple[st
 
     ``extents`` and ``paces`` are size and turns of each run over those of its demonstration, NaN where there are none,
     and ``lasts`` the size of the last round over that of the first, over the same.
-    Half of them may be off by :data:`OTHERWISE` either way, whatever the mean is, and none by :data:`FAR_OFF`.
+    Half of them may be off by :data:`OTHERWISE` either way, which nearly keeps them, and none by :data:`FAR_OFF`.
     """
     measured, many = _measured(extents, paces, lasts), len(extents)
     goes = ("go round" if many > 1 else "goes round") if "pace" in measured else f"turn{'s' * (many == 1)} out"
@@ -375,8 +386,9 @@ def moves(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> tuple[st
             who = f"{len(wrong)} of {many} " if many > 1 else "it " * (not said)
             said.append(who + f"{goes} " * (not said) + " or ".join(way for rows, way in ways if rows.any()))
             strays.append(name.replace(LAST, "size"))
+    nearly = "nearly " * any((by > np.log(OTHERWISE)).any() for _, by in measured.values())
     kept = " and ".join(name for name in measured if name != LAST)
-    return (" and ".join(said) if said else f"it keeps {kept}" * bool(kept)), [*dict.fromkeys(strays)]
+    return (" and ".join(said) if said else f"it {nearly}keeps {kept}" * bool(kept)), [*dict.fromkeys(strays)]
 
 
 def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = (), of: str = "", apart: str = "") -> str:
@@ -386,7 +398,7 @@ def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = (), of:
     runs = f" (in brackets, least to most of {many} runs)" if "(" in told else ""
     counts = {name: int((by > np.log(OTHERWISE)).sum()) for name, (_, by) in measured.items()}
     off = ", ".join(f"{name} of {count} of {many}" for name, count in counts.items() if count)
-    which = f"; more than {OTHERWISE - 1:.0%} off: {off}" if many > 1 and off else ""
+    which = f"; {'' if off else 'none '}more than {OTHERWISE - 1:.0%} off{off and f': {off}'}" * (many > 1)
     return f"{of}{told} the demonstrated{runs}, typically {apart} from the recorded path{which}" if told else ""
 
 

@@ -209,7 +209,7 @@ class _Tracks:
         warn(
             f"{many}{names[k]}{',' if many else ' stops'} after {last * self.flow.dt:.4g} s at ({where}): a step on "
             f"nothing was demonstrated (support below {least:g}). Demonstrate there, guide the policy (uc.Guided), or "
-            "go on with a least support of 0.",
+            "go on with least_support=0.",
             SupportEndsWarning,
             stacklevel=3,
         )

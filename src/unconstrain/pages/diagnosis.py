@@ -50,7 +50,7 @@ def diagnosis_page(
         html.words("diagnosis_lead"),
         html.section("What to record next", _next(found, states, actions)),
         html.section("Where three demonstrations do not tell", _map(found, demos, states, actions)),
-        html.section("In sentences", html.bullets(diagnosis.sentences(found, states, actions)), _tiles(found, demos)),
+        html.section("In sentences", html.bullets(diagnosis.sentences(found, states, actions))),
         html.section("Free or constrained", _freedom(found)),
         html.section("How the policy was chosen", _chosen(found)),
     )
@@ -71,24 +71,10 @@ def unknown(
     ]
 
 
-def _tiles(found: Diagnosis, demos: list[Demonstration]) -> html.Markup:
-    return html.tiles(
-        [
-            (str(len(demos)), f"demonstrations, {len(found.undetermined)} samples"),
-            (f"{found.noise_share:.1%}", "noise, of a typical action"),
-            (percent(found.told_together), "of the recorded states told by all together"),
-            (percent(found.states_determined), "by three demonstrations or more"),
-            (percent(found.directions_determined), f"of {found.directions} weight directions determined"),
-            (percent(found.free_share), "of the samples free, or held by less than the noise"),
-            (percent(found.undecided_share), "of the samples free or always held in the same way"),
-        ]
-    )
-
-
 def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], actions: Sequence[str]) -> html.Markup:
     """Two state columns, coloured by the undetermined spread."""
     recorded = stack(demos).states
-    regions = found.regions[:MOST_REGIONS]
+    regions = diagnosis.places(found.regions)[:MOST_REGIONS]
     worst = np.array([region.state for region in regions])
     if recorded.shape[1] == 1:
         recorded, worst = (np.column_stack([one, np.zeros(len(one))]) for one in (recorded, worst))
@@ -113,7 +99,8 @@ def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], ac
 
 
 def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> html.Markup:
-    shown = found.regions[:MOST_REGIONS]
+    every = diagnosis.places(found.regions)
+    shown = every[:MOST_REGIONS]
     rows = [
         [
             str(number),
@@ -132,7 +119,7 @@ def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> ht
     around, along = (", ".join(names) for names in (states, actions))
     header = ["", f"demonstrate around\n({around})", f"with motion left free along\n({along})", "recorded in"]
     header += ["spread\nalong it", "spread in\nthe region", "told\nby all", "by three", "moved\nalong it by", "samples"]
-    note = html.words("diagnosis_next", shown=len(shown), every=len(found.regions))
+    note = html.words("diagnosis_next", shown=len(shown), every=len(every), regions=len(found.regions))
     return html.table(header, rows, left=4, note=note)
 
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import is_dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.display import counted_off, innermost, listening, percent
+from ..base.display import counted_off, innermost, listening
 from ..base.errors import InvalidDataError, SettingError
 from ..constraints import Plane
-from ..evaluation import diagnosis, ncpe, ninconsistency, nupe, verdicts
+from ..evaluation import diagnosis, metrics, ncpe, nupe, verdicts
 from ..learners import named
 from ..motion import Guided, rollout
 from ..recordings import Demonstration, Recipe, stack
@@ -81,12 +81,12 @@ def policy_page(
         *_replays(judged.runs, judged.in_figures, xs),
         html.section("The demonstrations", _movements(moving, demos, xs)),
         *_reproduced(moving, demos, xs),
-        html.section("Predicted and observed actions", _actions(policy, demos, us)),
+        html.section("Predicted and observed actions", _actions(policy, demos, us, held_out)),
         html.section("Errors and support", _errors(policy, demos, held_out)),
     ]
     if policy.solution_.belief is not None:
         parts.append(html.section("What the demonstrations do not tell", *unknown(policy, demos, xs, us)))
-    parts += [html.section("Numbers", _summary(policy, demos), _determined(policy))]
+    parts += [html.section("Numbers", _summary(demos), _determined(policy))]
     if is_dataclass(learner):
         parts.append(html.settings_table(learner))
     return html.document(title, verdict or judged.verdict, _lead(policy, type(learner).__name__, xs, us), *parts)
@@ -97,12 +97,12 @@ def _lead(policy: Policy, learner: str, states: Sequence[str], actions: Sequence
     return html.words("fit_lead", **named, states=", ".join(states), actions=", ".join(actions))
 
 
-def _held_out(policy: Policy, demos: list[Demonstration]) -> list[float] | None:
-    """What each demonstration, with others, left unexplained while it was held out; None where that takes too long."""
+def _held_out(policy: Policy, demos: list[Demonstration]) -> list[Array] | None:
+    """What is predicted of each demonstration while it was held out with others; None where that takes too long."""
     count = min(FOLDS, len(demos))
     if count < 2 or sum(map(len, demos)) > MOST_REFITTED:
         return None
-    found, again = [float("nan")] * len(demos), copy(policy)
+    found, again = [demo.actions for demo in demos], copy(policy)
     if hasattr(again, "fields_"):  # as wide as was chosen
         again.variance = again.variance_
     for fold in counted_off(range(count), "report: learning again, each time without some demonstrations:"):
@@ -110,26 +110,20 @@ def _held_out(policy: Policy, demos: list[Demonstration]) -> list[float] | None:
         with listening(lambda *_: None):  # their own steps would look as if the policy were learnt anew
             learnt = again.fit_demonstrations(rest)
         for index in range(fold, len(demos), count):
-            found[index] = _or_nan(ninconsistency, learnt, [demos[index]])
+            found[index] = learnt(demos[index].states)
     return found
 
 
-def _summary(policy: Policy, demos: list[Demonstration]) -> html.Markup:
-    solution = policy.solution_
-    models, d, p = solution.weights.shape
-    shape = f"{models} × {p}" if models > 1 else str(p)
-    return html.tiles(
-        [
-            (str(len(demos)), "demonstrations"),
-            (f"{sum(map(len, demos)):,}".replace(",", " "), "samples"),
-            (shape, "local models × features" if models > 1 else "features"),
-            (percent(solution.determined_share), f"of {models * d * p} weight directions determined"),
-            (
-                html.number(_or_nan(ninconsistency, policy, demos)),
-                "normalised inconsistency, in which slow samples count as much",
-            ),
-        ]
-    )
+def _worst(demos: list[Demonstration], predicted: list[Array]) -> list[int]:
+    """Numbers of demonstrations, that of which predictions explain least first; what hardly moves comes last."""
+    usual = float(np.sqrt((stack(demos).actions ** 2).sum(axis=1).mean()))
+    missed, motion = np.array([_left([one], at, usual) for one, at in zip(demos, predicted, strict=True)]).T
+    return np.argsort(-missed / np.maximum(motion, 0.1 * motion.mean() + 1e-300), kind="stable").tolist()
+
+
+def _summary(demos: list[Demonstration]) -> html.Markup:
+    count = f"{sum(map(len, demos)):,}".replace(",", " ")
+    return html.tiles([(str(len(demos)), "demonstrations"), (count, "samples")])
 
 
 def _movements(policy: Policy | Guided, demos: list[Demonstration], names: Sequence[str]) -> html.Markup:
@@ -219,9 +213,9 @@ def _field(policy: Policy | Guided, demos: list[Demonstration], names: Sequence[
     )
 
 
-def _actions(policy: Policy, demos: list[Demonstration], names: Sequence[str]) -> html.Markup:
-    shown = demos[:MOST_PANELS]
-    panels = []
+def _actions(policy: Policy, demos: list[Demonstration], names: Sequence[str], held_out: Any) -> html.Markup:
+    order = _worst(demos, held_out or [policy(demo.states) for demo in demos]) if len(demos) > MOST_PANELS else [0]
+    shown, panels = [demos[index] for index in order[:MOST_PANELS]] if order[1:] else demos, []
     for demo in map(_thin, shown):
         predicted = policy(demo.states)
         along = project(action_projection(demo.actions), predicted)
@@ -230,42 +224,43 @@ def _actions(policy: Policy, demos: list[Demonstration], names: Sequence[str]) -
     return html.picture(
         "actions",
         panels,
-        html.words("fit_actions", shown=len(shown), every=len(demos)),
+        html.words("fit_actions", shown=len(shown), every=len(demos), held_out=held_out is not None),
         keys=("observed", "hybrid", "direct"),
         labels={"observed": "observed", "hybrid": "learnt policy", "direct": "along the observed motion"},
     )
 
 
-def _errors(policy: Policy, demos: list[Demonstration], held_out: list[float] | None) -> html.Markup:
+def _errors(policy: Policy, demos: list[Demonstration], held_out: list[Array] | None) -> html.Markup:
     known = all(demo.truth is not None for demo in demos)
-    support = _support(policy, demos)
-    header = ["demonstration", "samples", "explained\nheld out", "explained\nlearnt from"]
+    support, learnt = _support(policy, demos), [policy(demo.states) for demo in demos]
+    header = ["demonstration", "samples", *["explained\nheld out"] * (held_out is not None), "explained\nlearnt from"]
     header += ["nCPE", "nUPE"] if known else []
     header += ["median\nsupport", "least\nsupport"] if support is not None else []
 
-    def cells(name: str, of: list[Demonstration], missed: float, near: Array | None) -> list[str]:
-        row = [name, str(sum(map(len, of))), *map(_share, (missed, _or_nan(ninconsistency, policy, of)))]
+    def cells(name: str, rows: Sequence[int]) -> list[str]:
+        of = [demos[row] for row in rows]
+        row = [name, str(sum(map(len, of)))]
+        row += [_share(of, np.concatenate([each[k] for k in rows])) for each in (held_out, learnt) if each is not None]
         row += [html.number(_or_nan(metric, policy, of)) for metric in (ncpe, nupe) if known]
+        near = None if support is None else np.concatenate([support[k] for k in rows])
         return row if near is None else [*row, html.number(float(np.median(near))), html.number(float(near.min()))]
 
-    shown, none = demos[:MOST_ROWS], float("nan")
-    rows = [
-        cells(
-            demo.name or f"demonstration {index + 1}",
-            [demo],
-            none if held_out is None else held_out[index],
-            None if support is None else support[index],
-        )
-        for index, demo in enumerate(shown)
-    ]
-    rows.append(cells("all", demos, none, None if support is None else np.concatenate(support)))
+    every = range(len(demos))
+    shown = every if len(demos) <= MOST_ROWS else sorted(_worst(demos, held_out or learnt)[:MOST_ROWS])
+    rows = [cells(demos[index].name or f"demonstration {index + 1}", [index]) for index in shown]
     words = {"support": support is not None, "truth": known, "held_out": held_out is not None}
     note = html.words("fit_errors", shown=len(shown), every=len(demos), **words)
-    return html.table(header, rows, note=note, rules=(len(shown),))
+    return html.table(header, [*rows, cells("all", every)], note=note, rules=(len(shown),))
 
 
-def _share(missed: float) -> str:
-    return "–" if not np.isfinite(missed) else f"{1.0 - missed:.1%}" if missed < 2.0 else "none"
+def _left(of: list[Demonstration], predicted: Array, usual: float | None = None) -> tuple[float, float]:
+    """What predictions leave unexplained along the motion, and that motion."""
+    return metrics.along_motion(lambda _: predicted, of, usual)
+
+
+def _share(of: list[Demonstration], predicted: Array) -> str:
+    missed, motion = _left(of, predicted)
+    return "–" if motion == 0.0 else f"{1.0 - missed / motion:.1%}" if missed < 2.0 * motion else "none"
 
 
 def _determined(policy: Policy) -> html.Markup:

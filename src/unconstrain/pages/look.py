@@ -123,13 +123,13 @@ def look_page(
 
 
 def marks_of(recording: Recording, survey: Any, demonstration: Demonstration) -> list[Mark]:
-    """Warnings, gaps and pauses that a survey found, in seconds from the first sample of what was made of it."""
+    """Warnings, rest, gaps and pauses that a survey found, in seconds from the first sample of what was made of it."""
     stamps, kept = recording.times, demonstration.times
     begin = 0.0 if kept is None or not len(kept) else float(kept[0])
     first = 0.0 if stamps is None else float(stamps[np.isfinite(stamps)][:1].sum())
     said = "" if any(remark.code == "clock-gap" for remark in survey.warnings) else "{:.3g} s without samples"
     marks = [Mark("gap", said.format(gap.length), first + gap.start - begin, gap.length) for gap in survey.gaps]
-    for remark in survey.warnings:
+    for remark in (*survey.warnings, *(note for note in survey.notes if note.code == "rest")):
         row = None if remark.code == "clock-gap" else remark.row
         start = None if stamps is None or row is None else float(stamps[row]) - begin
         where = "" if remark.column is None else f" (column {remark.column})"

@@ -23,7 +23,7 @@ from ..readers.clocks import usual
 from ..remarks import Remark
 from ..signals.jumps import glitches, repaired, seams
 from ..signals.smoothing import LEAST, kalman_velocities, white_noise
-from ..signals.stillness import pauses, rest_at_start
+from ..signals.stillness import pauses, rest_at_ends
 from .continuity import continuous
 from .decisions import decide
 from .plausibility.checks import examine, is_irregular
@@ -432,12 +432,14 @@ def _long_enough(pieces: list[_Piece], needed: int, name: str) -> tuple[list[_Pi
 
 
 def _split(piece: _Piece, recipe: Recipe) -> list[_Piece]:
-    """Cut at gaps, at seams and around pauses, as the recipe says; without pauses and rest before the start."""
+    """Cut at gaps, at seams and around pauses, as the recipe says; without pauses and rest at its ends."""
     cuts = set((np.flatnonzero(np.diff(piece.times) > _longest(piece.times, recipe.max_gap_s)) + 1).tolist())
     if recipe.seams == "cut":
         cuts |= set(seams(piece.states))
     drop = recipe.pauses == "drop"
-    still = [(0, rest_at_start(piece.states, _typical(piece.times))), *pauses(piece.states)] if drop else []
+    first, last = rest_at_ends(piece.states, _typical(piece.times)) if drop else (0, 0)
+    rows = len(piece.times)
+    still = [(0, first), (rows - last, rows), *pauses(piece.states)] if drop else []
     bounds = sorted(cuts | {0, len(piece.times)} | {row for pause in still for row in pause})
     return [
         piece.at(slice(start, stop))

@@ -80,8 +80,8 @@ class Recipe:
     seams : {"keep", "cut"}
         Whether nothing is smoothed across jumps to another place, as between demonstrations in one table.
     pauses : {"drop", "keep"}
-        What becomes of rows in which nothing moves, in the middle of a demonstration or before it starts: who follows
-        a policy of the state and rests never starts. Time stamps stay as they are.
+        What becomes of rows in which nothing moves, in the middle of a demonstration, before it starts (who follows a
+        policy of the state and rests never starts) or after a sudden end. Time stamps stay as they are.
     action_is : {"auto", "velocity", "target", "delta"}
         What the action columns are: velocities; states to come, so that the velocity of the states is learnt; changes
         to the next sample, so that they are divided by the interval. ``"auto"`` takes them for velocities unless the

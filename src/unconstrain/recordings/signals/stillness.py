@@ -20,17 +20,11 @@ LEFT = 0.05
 NOISE = 4.5
 """What moves by less than this many standard deviations of the noise stands still."""
 
-SOON = 2
-"""After a rest of some time movement is fast within this part of it: who sets off smoothly was not at rest."""
-
 SHORTEST = 10
 """Samples that a pause has at least."""
 
 SHORTEST_STOP_S, STOP_ROWS = 0.3, 6
 """A stop takes so many seconds, and rows, at least: who turns a corner is slow for a shorter time."""
-
-LONGER = (1.0, 1.5, 2.0)
-"""Multiples of that, for rest at an end, as noise hides the shorter."""
 
 HALVES, SUDDEN = 2.0, 5.0
 """Means of both halves of a rest are nearer than so many standard errors of their difference. Who sets off suddenly is
@@ -98,16 +92,10 @@ def stops(values: Array, shortest: int) -> list[tuple[int, int]]:
     Means of neighbouring thirds of so many rows are compared in units of their noise. At a turning point these are near
     each other, too, but not long before and after: there a stop is left at the usual pace.
     """
-    moved, runs, fast = _slow_runs(values, shortest, 0.5)
+    moved, runs, fast = _slow_runs(values, shortest)
     last = 1 - 2 * (shortest // 3)
     found = [run for run in runs if _is_sudden(moved, run[0], run[1] + last, shortest, fast)]
     return _left(found, values, LEFT * np.ptp(values, axis=0))
-
-
-def rest_at_start(values: Array, interval: float = 0.0) -> int:
-    """Rows (T, n) before the start in which nothing moves; arguments as of :func:`rest_at_ends`."""
-    first = _standing(values, _lengths(values, interval)[0])
-    return first if first and first + _rest_at_end(values, interval) < len(values) else 0
 
 
 def rest_at_ends(values: Array, interval: float = 0.0) -> tuple[int, int]:
@@ -119,21 +107,17 @@ def rest_at_ends(values: Array, interval: float = 0.0) -> tuple[int, int]:
     interval : float
         Seconds between rows; 0 or NaN where it is not known.
     """
-    first, last = _standing(values, _lengths(values, interval)[0]), _rest_at_end(values, interval)
-    return (first, last) if first + last < len(values) else (0, 0)
-
-
-def _lengths(values: Array, interval: float) -> list[int]:
-    """Rows that a rest has at least, from few to many, as noise hides the shorter."""
     known = 0.0 < interval <= SHORTEST_STOP_S / STOP_ROWS
-    return [round(share * SHORTEST_STOP_S / interval) for share in LONGER] if known else [max(20, len(values) // 10)]
+    shortest = round(SHORTEST_STOP_S / interval) if known else max(20, len(values) // 10)
+    first, last = _standing(values, shortest), _standing(values[::-1], shortest, only_sudden=True)
+    return first, last if first + last < len(values) else 0
 
 
-def _standing(values: Array, shortest: int) -> int:
+def _standing(values: Array, shortest: int, only_sudden: bool = False) -> int:
     """Rows (T, n) at the start, so many or more, that stay at one place but for noise; 0 where noise hides movement.
 
-    Whatever the speed after it; half as many do where that is sudden. Those rows count that are near the first ones, up
-    to where the means of both halves would be farther apart than by chance.
+    Whatever the speed after it, unless only what is sudden counts; of that half as many rows do. Those rows count that
+    are near the first ones, up to where the means of both halves would be farther apart than by chance.
     """
     least = shortest // 2
     if len(values) < 4 * shortest or not least:
@@ -151,31 +135,18 @@ def _standing(values: Array, shortest: int) -> int:
         halves = values[: rows // 2].mean(axis=0) - values[rows // 2 : rows].mean(axis=0)
         if np.linalg.norm(halves) <= max(chance / np.sqrt(rows), SLOW * FINEST * usual):
             away = np.linalg.norm(values[rows : rows + least].mean(axis=0) - place)
-            return rows if rows >= shortest or away > SUDDEN * np.linalg.norm(noise) + SLOW * usual else 0
+            sudden = away > SUDDEN * np.linalg.norm(noise) + SLOW * usual
+            return rows if sudden or (rows >= shortest and not only_sudden) else 0
     return 0
 
 
-def _rest_at_end(values: Array, interval: float) -> int:
-    """Rows (T, n) at the end in which nothing moves, if all does soon before them: who comes to a goal slows down."""
-    lengths = _lengths(values, interval)
-    return max(_rest(values[::-1], rows, lengths[0]) for rows in lengths)
-
-
-def _rest(values: Array, shortest: int, soon: int) -> int:
-    """Rows (T, n) at the start, so many or more, in which nothing moves, if soon after, too, all does; 0 of others."""
-    moved, runs, _ = _slow_runs(values, shortest, 0.9)  # many slow down all the way
-    stop = next((last for first, last in runs if first == 0 and last < len(values)), 0)
-    after = moved[max(stop + 1 - 2 * (shortest // 3), 0) :]
-    return stop if stop and after[: min(stop // SOON, soon)].max() > RISE * np.quantile(after, 0.9) else 0
-
-
-def _slow_runs(values: Array, shortest: int, usually: float) -> tuple[Array, list[tuple[int, int]], float]:
+def _slow_runs(values: Array, shortest: int) -> tuple[Array, list[tuple[int, int]], float]:
     """How far means before and after each row are apart, stretches where hardly, and what is fast; none where loud."""
     if len(values) < 4 * shortest:
         return values[:0, 0], [], np.inf
     span = shortest // 3
     moved = np.sqrt(sum(_moved(column, span) ** 2 for column in values.T))
-    usual, noise = float(np.quantile(moved, usually)), np.sqrt(values.shape[1]) + 1.0
+    usual, noise = float(np.quantile(moved, 0.5)), np.sqrt(values.shape[1]) + 1.0
     runs = _stretches(moved <= max(SLOW * usual, noise), 2 * span - 1, shortest) if noise <= LOUD * usual else []
     return moved, runs, RISE * usual
 

@@ -154,8 +154,8 @@ def verdict(result: Result) -> uc.evaluation.verdicts.Verdict:
     said += f"{times if max(ours / direct, direct / ours) > CLOSE else 'about as much as'} ordinary regression."
     real = result.settings.real  # type: ignore[attr-defined]
     kind = "recorded tilts, one left out at a time" if real else "simulated plates"
-    doubt = "Far from where anybody wiped: all learners guess there."
-    return verdicts.Verdict(mark, said, f"Movement along surfaces like these ({kind}).", doubt, "unconstrain fit")
+    doubt, then = "Far from where anybody wiped: all learners guess there.", "unconstrain example wiping"
+    return verdicts.Verdict(mark, said, f"Movement along surfaces like these ({kind}).", doubt, then)
 
 
 def headlines(result: Result) -> list[str]:

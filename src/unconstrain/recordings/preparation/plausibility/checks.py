@@ -25,9 +25,6 @@ SHORTEST_GAP_S = 0.1
 IRREGULAR = 0.01
 """Intervals that differ from the median by more than this share are no uniform sampling."""
 
-STANDING = 1.5
-"""What trims rest over the speed of noise there."""
-
 SHORTEST_PIECE = 5
 """Rows before and after a gap; fewer are a stray row at an end."""
 
@@ -283,29 +280,15 @@ def rest(subject: Subject) -> Remark | None:
     if subject.recipe.still or not subject.moves:
         return None
     interval = 0.0 if subject.stamps is None else float(np.median(np.diff(subject.stamps)))
-    first, last = rest_at_ends(subject.clean, interval)
-    dropped = subject.recipe.pauses == "drop"
-    kept = last or (first and not dropped)
-    learnt = f"learnt as rest there; {_trimmed_by(subject, interval, first, last)}" if kept else ""
-    ends = (first, "before it starts", "left out (pauses='keep')" if dropped else learnt), (last, "at its end", learnt)
-    said = " and ".join(f"{subject.lasting(rows)} {where}, {done}" for rows, where, done in ends if rows)
-    return Remark("rest", f"stands still for {said}.", cured=not kept) if said else None
-
-
-def _trimmed_by(subject: Subject, interval: float, first: int, last: int) -> str:
-    """The ``still=`` that trims so many rows at both ends, and what tells them from movement."""
-    from scipy.signal import savgol_filter  # takes half a second to import
-
-    moving, recipe = subject.actions, subject.recipe
-    if not moving.size:
-        span = max(int(recipe.window_s / (interval or np.inf)) | 1, recipe.order + 2 - recipe.order % 2)
-        span = min(span, len(subject.clean) - 1 | 1)  # odd
-        moving = savgol_filter(subject.clean, span, recipe.order, deriv=1, delta=interval or 1.0, axis=0)
-    speeds = np.linalg.norm(moving, axis=1)
-    noise = np.append(speeds[: first // 2], speeds[len(speeds) - last // 2 :]).max()
-    apart = 2.0 * STANDING * noise < np.median(speeds[first : len(speeds) - last])
-    more = "" if apart else ", and movement as slow as that; with a longer window_s= noise is slower"
-    return f"still={float(f'{STANDING * noise:.2g}'):g} trims it{more}"
+    dropped, ends = subject.recipe.pauses == "drop", rest_at_ends(subject.clean, interval)
+    lasting = [
+        f"{subject.lasting(rows)} {at}"
+        for rows, at in zip(ends, ("before it starts", "at its end"), strict=True)
+        if rows
+    ]
+    goal = " where that is its goal" if ends[1] else ""
+    done = f"left out (pauses='keep'{goal})" if dropped else "learnt as rest there"
+    return Remark("rest", f"stands still for {' and '.join(lasting)}, {done}.", cured=dropped) if lasting else None
 
 
 def at_rest(subject: Subject) -> Remark | None:
