@@ -40,8 +40,6 @@ class Candidate:
         Share of the squared motion that was missed in demonstrations left out, where ``held_out`` is not about that.
     by_segments : bool
         Whether demonstrations that were held in the same way all the time show it more than samples along themselves.
-    jackknife : float
-        Share of the jackknife's variance that counts.
     otherwise : tuple of Candidate and Samples, optional
         The same learnt where other samples were held out together.
     """
@@ -57,7 +55,6 @@ class Candidate:
     spread: float | None = None
     alone: float = 0.0
     by_segments: bool = False
-    jackknife: float = 1.0
     otherwise: tuple[Candidate, Samples] | None = None
 
 

@@ -17,7 +17,7 @@ exactly, so differences aside from the action that are less than the least
 misfit do not count. Where N̂ is one line, û is along it, also of samples at
 rest. Where each of few demonstrations is needed, policies by segments are
 judged by :mod:`.agreement`. variance_k is the jackknife's, from the policies
-learnt without each fold; a share of it for softened hybrids and by segments.
+learnt without each fold; and half of it where they are learnt by segments.
 bias_k compares the candidate with others of less bias, j, as Goldenshluger and
 Lepski do (*Annals of Statistics* 39(3), 2011):
 
@@ -181,10 +181,7 @@ class Comparison:
         twice = [(one, *one.otherwise) for one in self._candidates if one.otherwise is not None]
         if len(twice) < len(self._candidates):
             return self._risks
-        again = [
-            replace(other, softness=one.softness, by_segments=one.by_segments, jackknife=one.jackknife)
-            for one, other, _ in twice
-        ]
+        again = [replace(other, softness=one.softness, by_segments=one.by_segments) for one, other, _ in twice]
         both = self._risks, Comparison(again, self.noise, [samples for *_, samples in twice])._risks
         tiny = TINY * self._samples.energy + 1e-300
         return np.asarray(np.sqrt(np.prod([np.maximum(risks, tiny) for risks in both], axis=0)))
@@ -274,14 +271,11 @@ class Comparison:
 
     @cached_property
     def _variance(self) -> Array:
-        """Variance of what motion does not show, shape (K,), by the jackknife, unless something else tells it."""
-        found = zip(self._candidates, *self._predictions, strict=True)
-        return np.array(
-            [
-                one.jackknife * _jackknife(refits - own) if one.spread is None else one.spread
-                for one, own, refits in found
-            ]
-        )
+        """Variance of what motion does not show, shape (K,), by the jackknife: a share of it for those by segments."""
+        found = [_jackknife(refits - own) for own, refits in zip(*self._predictions, strict=True)]
+        share = [SHARE_OF_JACKKNIFE if one.by_segments else 1.0 for one in self._candidates]
+        known = zip(self._candidates, share, found, strict=True)
+        return np.array([part * own if one.spread is None else one.spread for one, part, own in known])
 
     @cached_property
     def _bias(self) -> Array:

@@ -216,14 +216,6 @@ And of the variance of policies by segments, which lean on each demonstration: o
 :data:`LEAST_HIDDEN` 1.144 with all of it, 1.130 with 0.7, 1.122 with a half, 1.118 with 0.4 and 1.124 with 0.3.
 """
 
-SHARE_OF_SOFTENED = 0.7
-"""And of the variance of softened hybrids.
-
-On the 480 sets of :data:`REFIT_STEPS` the error was more than 1.1 times that of the safer of direct and soft hybrid in
-10.0 % with all of it, 8.1 % with this, 6.9 % with a half; and 1.113, 1.103 and 1.110 times that of the best candidate.
-On 450 others, of local models and 30 kinds, that was 1.149 with all of it, 1.147 with this and 1.153 with a half.
-"""
-
 LEAST_EXPLAINED = 0.2
 """Of a policy that explains less of held-out motion nothing counts as determined.
 

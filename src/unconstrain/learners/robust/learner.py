@@ -364,7 +364,7 @@ class Robust(_Maximising):
                 break
             one = Robust().compared(views[name], training).best
             soft = np.inf if one.softness >= AS_DIRECT else 0.0
-            best[name] = replace(one, name=name, softness=soft, by_segments=False, jackknife=1.0)
+            best[name] = replace(one, name=name, softness=soft, by_segments=False)
             if name == usual:
                 coarser = {one: best[one] for one in _simplest(_compared(best, views), list(best))}
                 best = {name: best[name]}
@@ -377,13 +377,10 @@ class Robust(_Maximising):
 
 
 def _simplest(found: Comparison, names: Sequence[str]) -> list[str]:
-    """Of models that refute the last, or show its bias: the first that none of the others refutes, if any."""
-    kept: list[str] = []
-    for one in names[:-1]:
-        better = found.refutes(one, names[-1]) or found.shows(one, names[-1])
-        if better and (not kept or found.refutes(one, kept[0])):
-            kept = [one]
-    return kept
+    """Of models that refute the last, or show its bias, the one of least estimated error, if any."""
+    risks, last = found.judged(), names[-1]
+    better = [one for one in names[:-1] if found.refutes(one, last) or found.shows(one, last)]
+    return sorted(better, key=lambda one: risks[one].risk)[:1]
 
 
 def _trusted(training: Training) -> tuple[Training, NDArray[np.intp]]:

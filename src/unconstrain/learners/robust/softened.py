@@ -8,7 +8,7 @@ from ...risks import Moments, inconsistency, minimum, softened_minima, standard_
 from ...training import Samples
 from ..thresholds import judged
 from .candidate import Candidate, scaled
-from .constants import CANDIDATE_SOFTNESSES, SHARE_OF_SOFTENED
+from .constants import CANDIDATE_SOFTNESSES
 from .noise import correlation_time, inefficiency
 from .posterior import Posterior
 from .smoothness import Smoothness
@@ -55,5 +55,4 @@ def _candidate(
         Smoothness.of(samples),
         refits,
         softness,
-        jackknife=SHARE_OF_SOFTENED if np.isfinite(softness) else 1.0,
     )
