@@ -199,11 +199,7 @@ class Comparison:
     @cached_property
     def _missed(self) -> tuple[Array, Array]:
         """Weighted mean square of what held-out motion shows to be missed, along the action and aside from it, (K,)."""
-        held, aside = self._held, np.zeros_like(self._along)
-        off = np.einsum("nab,knb->kna", self._seen[held], self._samples.actions[held] - self._held_out[:, held])
-        expected = self._noise[held] * np.einsum("naa->n", self._seen[held])
-        aside[:, held] = np.vecdot(off, off) - expected - self._along[:, held]
-        along, aside = (each @ self._reliable / self._reliable.sum() for each in (self._along, aside))
+        along, aside = (each @ self._reliable / self._reliable.sum() for each in (self._along, self._aside))
         return along, aside
 
     @cached_property
@@ -217,6 +213,12 @@ class Comparison:
         return self._by_demonstration(self._reliable, self._along) / self._reliable.sum()
 
     @cached_property
+    def _with_aside(self) -> tuple[Array, tuple[Array, Array]]:
+        """Losses (K, G) that count what is aside from the action, too, and their gaps."""
+        losses = self._by_demonstration(self._reliable, self._along + self._aside) / self._reliable.sum()
+        return losses, _gaps(losses)
+
+    @cached_property
     def _along(self) -> Array:
         """Squared residuals along the action, without the noise's part, (K, N)."""
         noise, d = self._noise, self._held_out.shape[2]
@@ -224,6 +226,15 @@ class Comparison:
         on_lines = self._residuals**2 - noise * (self._held_out**2).sum(axis=2) / size
         squares = np.stack([corrected_squares(self._samples, one, noise) for one in self._held_out])
         return np.where(self._on_line, on_lines, (squares + 2.0 * d * noise**2) / size)
+
+    @cached_property
+    def _aside(self) -> Array:
+        """Squared residuals aside from the action where a demonstration was held throughout, without noise, (K, N)."""
+        held, aside = self._held, np.zeros_like(self._along)
+        off = np.einsum("nab,knb->kna", self._seen[held], self._samples.actions[held] - self._held_out[:, held])
+        expected = self._noise[held] * np.einsum("naa->n", self._seen[held])
+        aside[:, held] = np.vecdot(off, off) - expected - self._along[:, held]
+        return aside
 
     @cached_property
     def _reliable(self) -> Array:
@@ -323,9 +334,15 @@ class Comparison:
         return max(apart - MOST_HIDDEN * max(gap - chance, 0.0), 0.0) if self._refuted[one, other] else apart
 
     def _far_less_consistent(self, one: int, other: int) -> bool:
-        """Whether the first candidate misses far more than the second where held out, and beyond chance."""
-        gap, error = (each[one, other] for each in self._gaps)
-        return bool(gap > REFUTED * error and self._losses[one].sum() > FAR_MORE_CONSISTENT * self._losses[other].sum())
+        """Whether the first candidate misses far more than the second where held out, and beyond chance.
+
+        Along the action, or with what is aside from it.
+        """
+        for losses, (gap, error) in ((self._losses, self._gaps), self._with_aside):
+            far = losses[one].sum() > FAR_MORE_CONSISTENT * losses[other].sum()
+            if far and gap[one, other] > REFUTED * error[one, other]:
+                return True
+        return False
 
     @cached_property
     def _refuted(self) -> NDArray[np.bool_]:
