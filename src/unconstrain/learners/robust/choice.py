@@ -159,9 +159,13 @@ class Comparison:
         return [self._candidates[1 + k] for k in np.flatnonzero(kept).tolist()]
 
     def refutes(self, one: str, other: str) -> bool:
-        """Whether a candidate is far more consistent than another where held out, and beyond chance."""
+        """Whether a candidate misses far less than another where held out, and beyond chance.
+
+        Along the action, or with what is aside from it.
+        """
         names = [each.name for each in self._candidates]
-        return self._far_less_consistent(names.index(other), names.index(one))
+        both = self._losses, self._by_demonstration(self._reliable, self._along + self._aside) / self._reliable.sum()
+        return any(_far_more(losses, names.index(other), names.index(one)) for losses in both)
 
     def shows(self, one: str, other: str) -> bool:
         """Whether a candidate has less bias than another and shows it, beyond their own variances."""
@@ -211,12 +215,6 @@ class Comparison:
     def _losses(self) -> Array:
         """Weighted mean square of the held-out residuals, without the noise's part, by demonstration: (K, G)."""
         return self._by_demonstration(self._reliable, self._along) / self._reliable.sum()
-
-    @cached_property
-    def _with_aside(self) -> tuple[Array, tuple[Array, Array]]:
-        """Losses (K, G) that count what is aside from the action, too, and their gaps."""
-        losses = self._by_demonstration(self._reliable, self._along + self._aside) / self._reliable.sum()
-        return losses, _gaps(losses)
 
     @cached_property
     def _along(self) -> Array:
@@ -334,15 +332,8 @@ class Comparison:
         return max(apart - MOST_HIDDEN * max(gap - chance, 0.0), 0.0) if self._refuted[one, other] else apart
 
     def _far_less_consistent(self, one: int, other: int) -> bool:
-        """Whether the first candidate misses far more than the second where held out, and beyond chance.
-
-        Along the action, or with what is aside from it.
-        """
-        for losses, (gap, error) in ((self._losses, self._gaps), self._with_aside):
-            far = losses[one].sum() > FAR_MORE_CONSISTENT * losses[other].sum()
-            if far and gap[one, other] > REFUTED * error[one, other]:
-                return True
-        return False
+        """Whether the first candidate misses far more than the second where held out, and beyond chance."""
+        return _far_more(self._losses, one, other)
 
     @cached_property
     def _refuted(self) -> NDArray[np.bool_]:
@@ -397,6 +388,13 @@ def _less_consistent(losses: Array) -> NDArray[np.bool_]:
     whole = losses.sum(axis=1)
     times = whole[:, None] > NEGLIGIBLE_RATIO * np.maximum(whole, 1e-9)
     return np.asarray((gap > NEGLIGIBLE_LOSS) | times | (gap > BEYOND_CHANCE * np.maximum(error, TINY)))
+
+
+def _far_more(losses: Array, one: int, other: int) -> bool:
+    """Whether one loss of some by demonstration (K, G) is far more than another, and beyond chance."""
+    gap, error = _gaps(losses[[one, other]])
+    far = losses[one].sum() > FAR_MORE_CONSISTENT * losses[other].sum()
+    return bool(far and gap[0, 1] > REFUTED * error[0, 1])
 
 
 def _gaps(losses: Array) -> tuple[Array, Array]:
