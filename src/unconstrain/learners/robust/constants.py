@@ -112,7 +112,7 @@ With five of them (0.3, 0.1, 0.01, 1e-4, 1e-11) the error was the same within a 
 """
 
 AGREED = 0.02
-AGREED_OF_HELD_OUT = 0.1
+AGREED_OF_HELD_OUT = 1.0
 MOST_FITTED = 2 / 3
 """Demonstrations agree on a policy that misses less than the first share of the motion, as expected of what is new, and
 less than the second share of what held-out predictions miss, and that fits less than the third share of what they tell.
