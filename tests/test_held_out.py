@@ -100,7 +100,7 @@ def round_a_circle(states):
     return np.column_stack([-1.5 * h, grows * a - 1.3 * b, grows * b + 1.3 * a]) @ axes.T
 
 
-@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("seed", [3, 5])
 def test_a_cubic_policy_is_found_from_seven_tilted_planes(seed):
     """At 50 Hz for 8 s, from positions to 0.3 mm. Local models, or an affine one, miss 15 to 20 % of it."""
     rng, recordings = np.random.default_rng(seed), []

@@ -112,14 +112,17 @@ With five of them (0.3, 0.1, 0.01, 1e-4, 1e-11) the error was the same within a 
 """
 
 AGREED = 0.02
-AGREED_OF_HELD_OUT = 1.0
+AGREED_OF_HELD_OUT = 0.1
 MOST_FITTED = 2 / 3
 """Demonstrations agree on a policy that misses less than the first share of the motion, as expected of what is new, and
-less than the second share of what held-out predictions miss, and that fits less than the third share of what they tell.
+no more than held-out predictions miss, and that fits less than the third share of what they tell. Below the second
+share of what held-out predictions miss, agreement is believed in their place.
 
 On 24 sets of ten strokes along rulers (seeds that are not reported), cubic features miss 0.06 to 1.5 % of what is new
 by this, and 4 to 6,000 times the motion of what is held out, with nUPE .0000 to .01 in 11 of 12 sets of cubic policies;
 of others 4 to 100 %, but for one (.8 %, nUPE 1.1). Of 60 recorded movements one or two were learnt otherwise.
+Of a cycle wiped under seven tilted planes, ten sets, four were missed by 13 to 23 % where agreement counted below that
+share alone, since the jackknife made cubic policies look unstable; none is by more than 4.2 %. On 270 sets of 27 kinds the geometric mean of the squared error was .99 times as large.
 """
 
 REFUTED = 1.0
