@@ -122,7 +122,8 @@ On 24 sets of ten strokes along rulers (seeds that are not reported), cubic feat
 by this, and 4 to 6,000 times the motion of what is held out, with nUPE .0000 to .01 in 11 of 12 sets of cubic policies;
 of others 4 to 100 %, but for one (.8 %, nUPE 1.1). Of 60 recorded movements one or two were learnt otherwise.
 Of a cycle wiped under seven tilted planes, ten sets, four were missed by 13 to 23 % where agreement counted below that
-share alone, since the jackknife made cubic policies look unstable; none is by more than 4.2 %. On 270 sets of 27 kinds the geometric mean of the squared error was .99 times as large.
+share alone, since the jackknife made cubic policies look unstable; none is by more than 4.2 %. On 270 sets of 27 kinds
+the geometric mean of the squared error was .99 times as large.
 """
 
 REFUTED = 1.0
