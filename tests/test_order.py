@@ -49,7 +49,7 @@ def test_the_order_of_arrival_is_kept_where_states_move_along_it(interleaved):
     states = np.vstack([spiral(), -spiral(60, 1.2)])
     groups = np.repeat([7, 3], 60)
     rows = np.arange(120).reshape(2, 60).T.ravel() if interleaved else np.arange(120)
-    order, demonstrations, notes = arranged(Batch(states[rows], states[rows], None, groups[rows]))
+    order, demonstrations, _, notes = arranged(Batch(states[rows], states[rows], None, groups[rows]))
     assert_array_equal(np.diff(rows[order])[np.diff(demonstrations) == 0], 1)
     assert notes == ("No times were given: rows count as recorded one after the other.",)
 
@@ -59,11 +59,11 @@ def test_times_tell_the_order(seed):
     rows = np.random.default_rng(seed).permutation(60)
     states = np.random.default_rng(5).normal(size=(60, 2))
     batch = Batch(states[rows], states[rows], None, np.zeros(60), np.arange(60.0)[rows])
-    order, _, notes = arranged(batch)
+    order, _, _, notes = arranged(batch)
     assert_array_equal(rows[order], np.arange(60))
     [alone] = notes
     assert alone.startswith("One demonstration alone: nothing tells what held it")
-    assert arranged(batch._replace(groups=np.arange(60) // 30))[2] == ()
+    assert arranged(batch._replace(groups=np.arange(60) // 30))[3] == ()
 
 
 def test_copies_are_one_sample_but_not_at_another_time_or_of_another_demonstration():

@@ -77,7 +77,7 @@ def by_arrival(values: NDArray[Any]) -> tuple[NDArray[np.intp], NDArray[np.intp]
     return first[arrival], np.argsort(arrival)[places]
 
 
-def arranged(samples: Batch) -> tuple[NDArray[np.intp], NDArray[np.intp], tuple[str, ...]]:
+def arranged(samples: Batch) -> tuple[NDArray[np.intp], NDArray[np.intp], bool, tuple[str, ...]]:
     """Order samples by demonstration, and by time within each.
 
     Demonstrations are in the order of :func:`by_content`. Where no times are given, the order of arrival is taken for
@@ -94,6 +94,8 @@ def arranged(samples: Batch) -> tuple[NDArray[np.intp], NDArray[np.intp], tuple[
     order : ndarray of int, shape (N,)
     demonstrations : ndarray of int, shape (N,)
         Number of each sample's demonstration, in that order.
+    reconstructed : bool
+        Whether the order within some of them had to be.
     notes : tuple of str
         What had to be assumed.
     """
@@ -105,7 +107,7 @@ def arranged(samples: Batch) -> tuple[NDArray[np.intp], NDArray[np.intp], tuple[
     unnamed = (UNNAMED if samples.groups is None else ALONE,) if not codes.any() else ()
     if samples.times is not None:
         order = np.lexsort((*columns, samples.times, demonstrations))
-        return order, demonstrations[order], unnamed
+        return order, demonstrations[order], False, unnamed
     arrival = np.argsort(demonstrations, kind="stable")
     pieces = np.split(arrival, np.flatnonzero(np.diff(demonstrations[arrival])) + 1)
     canonical, still = np.argsort(np.lexsort(columns)), 0
@@ -117,7 +119,7 @@ def arranged(samples: Batch) -> tuple[NDArray[np.intp], NDArray[np.intp], tuple[
             some = some[path(states[some])] if len(some) else some
         pieces[i] = np.concatenate([some, rows[~counting]])
     order = np.concatenate(pieces)
-    return order, demonstrations[order], (*unnamed, _said(len(pieces), still))
+    return order, demonstrations[order], still > 0, (*unnamed, _said(len(pieces), still))
 
 
 def is_movement(states: Array) -> bool:

@@ -16,7 +16,7 @@ from ..base.display import Shown, counted
 from ..risks import Moments, Quadratic, gather
 from .suspects import unlike_neighbours
 
-_OF_ALL = ("centring", "roughness", "places", "notes")
+_OF_ALL = ("centring", "roughness", "places", "notes", "reconstructed")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,6 +50,8 @@ class Samples(Shown):
         Standard deviation of the noise on each action coordinate, where it was given.
     notes : tuple of str
         What had to be assumed of their order.
+    reconstructed : bool
+        Whether the order within some demonstrations is a path through their states, as nothing tells the true one.
 
     Examples
     --------
@@ -72,6 +74,7 @@ class Samples(Shown):
     times: Array | None = None
     noise: Array | None = None
     notes: tuple[str, ...] = ()
+    reconstructed: bool = False
 
     def __len__(self) -> int:
         """Number of samples N."""

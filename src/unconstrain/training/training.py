@@ -207,7 +207,7 @@ class Training(Shown):
         """
         given, first, places = self._distinct()
         counts, each = _summed(given.counts, places), given.at(first)
-        order, demonstrations, notes = arranged(self._in_coordinates(each)._replace(weights=counts))
+        order, demonstrations, reconstructed, notes = arranged(self._in_coordinates(each)._replace(weights=counts))
         place = np.empty_like(order)
         place[order] = np.arange(len(order))
         each, counts = each.at(order), counts[order]
@@ -228,6 +228,7 @@ class Training(Shown):
             each.times,
             None if each.noise is None else np.sqrt((each.noise**2).mean(axis=1)),
             notes,
+            reconstructed,
         )
 
     def _distinct(self) -> tuple[Batch, NDArray[np.intp], NDArray[np.intp]]:

@@ -1,4 +1,4 @@
-"""Whether demonstrations agree on one policy, where each is needed and what is held out says nothing.
+"""Whether demonstrations agree on one policy, where each is needed and what is held out says little.
 
 Ten strokes along rulers may tell a policy twice over, and seven of them next to nothing: every candidate, right or
 wrong, then misses what is held out. But that one policy fits all ten, though they tell far more than it has freedom to
@@ -20,10 +20,10 @@ from .constants import AGREED, AGREED_OF_HELD_OUT, MOST_FITTED
 
 
 def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Candidate | None:
-    """The candidate, judged by agreement; None unless that says that it is right and what was held out says nothing.
+    """The candidate, judged by agreement; None unless that says that it is right, and no worse than held out.
 
-    Its held-out predictions are such that they miss what is new by as much as agreement says, its refits are all
-    alike, and its variance is that of the posterior.
+    Its variance is that of the posterior. Where agreement expects far less to be missed than held-out predictions do,
+    these are such that they miss as much as it says, and refits are all alike.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Cand
     policy, motion = samples.predict(found.weights), samples.energy
     residuals = np.einsum("nab,nb->na", projections, samples.actions - policy)
     held_out = np.einsum("nab,nb->na", projections, samples.actions - found.held_out)
-    most = min(AGREED * motion, AGREED_OF_HELD_OUT * _square(samples, held_out))
+    most = min(AGREED * motion, _square(samples, held_out))
     if _square(samples, residuals) > most:
         return None
     told, fitted = _numbers(found, samples, projections)
@@ -49,11 +49,13 @@ def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Cand
     if _square(samples, missed) > most:
         return None
     from_noise, undetermined = found.posterior.covariances()
+    found = replace(found, spread=_spread(samples, factor * from_noise[0] + undetermined[0]))
+    if _square(samples, missed) > AGREED_OF_HELD_OUT * _square(samples, held_out):
+        return found
     return replace(
         found,
         held_out=policy + residuals - missed,
         refits=np.repeat(found.weights[None], len(found.refits), axis=0),
-        spread=_spread(samples, factor * from_noise[0] + undetermined[0]),
         alone=_square(samples, held_out) / motion,
     )
 

@@ -1,10 +1,13 @@
 """A candidate policy."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...base.arrays import Array
+from ...training import Samples
 from .posterior import Posterior
 from .smoothness import Smoothness
 
@@ -37,6 +40,8 @@ class Candidate:
         Share of the squared motion that was missed in demonstrations left out, where ``held_out`` is not about that.
     by_segments : bool
         Whether demonstrations that were held in the same way all the time show it more than samples along themselves.
+    otherwise : tuple of Candidate and Samples, optional
+        The same learnt where other samples were held out together.
     """
 
     name: str
@@ -50,6 +55,7 @@ class Candidate:
     spread: float | None = None
     alone: float = 0.0
     by_segments: bool = False
+    otherwise: tuple[Candidate, Samples] | None = None
 
 
 def scaled(posterior: Posterior, variance: Array) -> Posterior:

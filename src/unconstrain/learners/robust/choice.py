@@ -17,7 +17,7 @@ exactly, so differences aside from the action that are less than the least
 misfit do not count. Where N̂ is one line, û is along it, also of samples at
 rest. Where each of few demonstrations is needed, policies by segments are
 judged by :mod:`.agreement`. variance_k is the jackknife's, from the policies
-learnt without each fold, and half of it where they are learnt by segments.
+learnt without each fold; and half of it where they are learnt by segments.
 bias_k compares the candidate with others of less bias, j, as Goldenshluger and
 Lepski do (*Annals of Statistics* 39(3), 2011):
 
@@ -58,6 +58,7 @@ demonstrations say little.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import combinations
 
@@ -122,6 +123,12 @@ class Comparison:
         self._leverage = np.max([leverage(one) for one in dict.fromkeys(self._views)], axis=0)
         self._noise, self._variation = self._variances(noise)
 
+    def beside(self, other: Comparison) -> Comparison:
+        """The candidates that both compare, each learnt twice."""
+        learnt = {one.name: (one, other._samples) for one in other._candidates}
+        both = [replace(one, otherwise=learnt[one.name]) for one in self._candidates if one.name in learnt]
+        return Comparison(both, self.noise, self._samples)
+
     def judged(self) -> dict[str, Judged]:
         """Figures of each candidate, by name, as shares of the mean squared action."""
         unit = max(self._samples.energy, 1e-300)
@@ -152,9 +159,13 @@ class Comparison:
         return [self._candidates[1 + k] for k in np.flatnonzero(kept).tolist()]
 
     def refutes(self, one: str, other: str) -> bool:
-        """Whether a candidate is far more consistent than another where held out, and beyond chance."""
+        """Whether a candidate misses far less than another where held out, and beyond chance.
+
+        Along the action, or with what is aside from it.
+        """
         names = [each.name for each in self._candidates]
-        return self._far_less_consistent(names.index(other), names.index(one))
+        both = self._losses, self._by_demonstration(self._reliable, self._along + self._aside) / self._reliable.sum()
+        return any(_far_more(losses, names.index(other), names.index(one)) for losses in both)
 
     def shows(self, one: str, other: str) -> bool:
         """Whether a candidate has less bias than another and shows it, beyond their own variances."""
@@ -167,7 +178,20 @@ class Comparison:
 
     @cached_property
     def risks(self) -> Array:
-        """Estimated squared error, shape (K,), up to what all have in common."""
+        """Estimated squared error, shape (K,), up to what all have in common.
+
+        Where candidates were learnt with other samples held out, too, the geometric mean of both estimates.
+        """
+        twice = [(one, *one.otherwise) for one in self._candidates if one.otherwise is not None]
+        if len(twice) < len(self._candidates):
+            return self._risks
+        again = [replace(other, softness=one.softness, by_segments=one.by_segments) for one, other, _ in twice]
+        both = self._risks, Comparison(again, self.noise, [samples for *_, samples in twice])._risks
+        tiny = TINY * self._samples.energy + 1e-300
+        return np.asarray(np.sqrt(np.prod([np.maximum(risks, tiny) for risks in both], axis=0)))
+
+    @cached_property
+    def _risks(self) -> Array:
         along, aside = self._missed
         more = aside - aside[np.nan_to_num(along + aside, nan=np.inf).argmin()]
         unresolved = LEAST_MISFIT**2 * self._samples.energy
@@ -179,11 +203,7 @@ class Comparison:
     @cached_property
     def _missed(self) -> tuple[Array, Array]:
         """Weighted mean square of what held-out motion shows to be missed, along the action and aside from it, (K,)."""
-        held, aside = self._held, np.zeros_like(self._along)
-        off = np.einsum("nab,knb->kna", self._seen[held], self._samples.actions[held] - self._held_out[:, held])
-        expected = self._noise[held] * np.einsum("naa->n", self._seen[held])
-        aside[:, held] = np.vecdot(off, off) - expected - self._along[:, held]
-        along, aside = (each @ self._reliable / self._reliable.sum() for each in (self._along, aside))
+        along, aside = (each @ self._reliable / self._reliable.sum() for each in (self._along, self._aside))
         return along, aside
 
     @cached_property
@@ -204,6 +224,15 @@ class Comparison:
         on_lines = self._residuals**2 - noise * (self._held_out**2).sum(axis=2) / size
         squares = np.stack([corrected_squares(self._samples, one, noise) for one in self._held_out])
         return np.where(self._on_line, on_lines, (squares + 2.0 * d * noise**2) / size)
+
+    @cached_property
+    def _aside(self) -> Array:
+        """Squared residuals aside from the action where a demonstration was held throughout, without noise, (K, N)."""
+        held, aside = self._held, np.zeros_like(self._along)
+        off = np.einsum("nab,knb->kna", self._seen[held], self._samples.actions[held] - self._held_out[:, held])
+        expected = self._noise[held] * np.einsum("naa->n", self._seen[held])
+        aside[:, held] = np.vecdot(off, off) - expected - self._along[:, held]
+        return aside
 
     @cached_property
     def _reliable(self) -> Array:
@@ -304,8 +333,7 @@ class Comparison:
 
     def _far_less_consistent(self, one: int, other: int) -> bool:
         """Whether the first candidate misses far more than the second where held out, and beyond chance."""
-        gap, error = (each[one, other] for each in self._gaps)
-        return bool(gap > REFUTED * error and self._losses[one].sum() > FAR_MORE_CONSISTENT * self._losses[other].sum())
+        return _far_more(self._losses, one, other)
 
     @cached_property
     def _refuted(self) -> NDArray[np.bool_]:
@@ -360,6 +388,13 @@ def _less_consistent(losses: Array) -> NDArray[np.bool_]:
     whole = losses.sum(axis=1)
     times = whole[:, None] > NEGLIGIBLE_RATIO * np.maximum(whole, 1e-9)
     return np.asarray((gap > NEGLIGIBLE_LOSS) | times | (gap > BEYOND_CHANCE * np.maximum(error, TINY)))
+
+
+def _far_more(losses: Array, one: int, other: int) -> bool:
+    """Whether one loss of some by demonstration (K, G) is far more than another, and beyond chance."""
+    gap, error = _gaps(losses[[one, other]])
+    far = losses[one].sum() > FAR_MORE_CONSISTENT * losses[other].sum()
+    return bool(far and gap[0, 1] > REFUTED * error[0, 1])
 
 
 def _gaps(losses: Array) -> tuple[Array, Array]:

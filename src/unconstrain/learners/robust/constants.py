@@ -92,8 +92,13 @@ EM_LEAST_STEPS = 6
 RACE_STEPS = 15
 """Steps from every start before the better one goes on alone."""
 
-REFIT_STEPS = 2
-"""Steps of expectation maximisation without each fold, after a first one from the optimum of all."""
+REFIT_STEPS = 4
+"""Steps of expectation maximisation without each fold, after a first one from the optimum of all.
+
+With two it has not left that optimum, and what is held out is still known. On 480 recorded sets of parametric policies,
+drawn with seeds that are not reported, the error over that of the best candidate was 1.133 with two and 1.113 with
+four; the worst case 7.9 times the safer of direct and soft hybrid, and 4.7. On half of them six were as good as four.
+"""
 
 POOLED_PSEUDO_COUNT = 10.0
 """Pseudo-count of the pooled mixture in the Dirichlet prior of each demonstration's own mixture."""
@@ -110,11 +115,15 @@ AGREED = 0.02
 AGREED_OF_HELD_OUT = 0.1
 MOST_FITTED = 2 / 3
 """Demonstrations agree on a policy that misses less than the first share of the motion, as expected of what is new, and
-less than the second share of what held-out predictions miss, and that fits less than the third share of what they tell.
+no more than held-out predictions miss, and that fits less than the third share of what they tell. Below the second
+share of what held-out predictions miss, agreement is believed in their place.
 
 On 24 sets of ten strokes along rulers (seeds that are not reported), cubic features miss 0.06 to 1.5 % of what is new
 by this, and 4 to 6,000 times the motion of what is held out, with nUPE .0000 to .01 in 11 of 12 sets of cubic policies;
 of others 4 to 100 %, but for one (.8 %, nUPE 1.1). Of 60 recorded movements one or two were learnt otherwise.
+Of a cycle wiped under seven tilted planes, ten sets, four were missed by 13 to 23 % where agreement counted below that
+share alone, since the jackknife made cubic policies look unstable; none is by more than 4.2 %. On 270 sets of 27 kinds
+the geometric mean of the squared error was .99 times as large.
 """
 
 REFUTED = 1.0
@@ -249,6 +258,14 @@ LEAST_CONSTRAINTS = 3
 
 BLOCKS_IN_A_FOLD = 4
 """Stretches of consecutive samples in each fold, where demonstrations are not told apart."""
+
+LINES_TO_STATES = 3.0
+"""Weight of lines of action beside states, which spread by one, where rows in no order are held out otherwise.
+
+On 60 recorded sets in no order, drawn with seeds that are not reported, the error over that of the best candidate was
+1.18 with stretches of a path through states alone, 1.08 with folds by this path, 1.12 with both; and of parametric
+policies 1.12, 1.15 and 1.10. With both, worst cases were 1.4 times the safer of direct and soft hybrid, not 4.0.
+"""
 
 COMPARED_STATES = 1000
 """States, at most, at which candidates are compared across the action."""

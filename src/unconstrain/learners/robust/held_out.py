@@ -2,7 +2,8 @@
 
 A policy that is wrong under a new constraint still looks consistent on a demonstration that is held out, as long as
 others under the same constraint stay. So demonstrations that were held in like directions are in one fold. Where
-demonstrations are not told apart, neighbours are: they say nearly the same.
+demonstrations are not told apart, neighbours are: they say nearly the same. A heap of rows is held out in two ways, as
+neither of them tells demonstrations for sure.
 """
 
 from dataclasses import replace
@@ -11,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array
+from ...risks import unit_actions
 from ...training import Samples
-from .constants import BLOCKS_IN_A_FOLD, LEAST_CONSTRAINTS, LIKE_CONSTRAINTS, SHARE_ALONG_HELD
+from ...training.order import path
+from .constants import BLOCKS_IN_A_FOLD, LEAST_CONSTRAINTS, LIKE_CONSTRAINTS, LINES_TO_STATES, SHARE_ALONG_HELD
 
 
 def held_out_together(samples: Samples) -> Samples:
@@ -24,6 +27,23 @@ def held_out_together(samples: Samples) -> Samples:
     like = like_constraints(samples.actions, samples.groups)
     few = like.max() + 1 < LEAST_CONSTRAINTS
     return samples if few else replace(samples, folds=_dealt(like, count)[samples.groups])
+
+
+def held_out_otherwise(samples: Samples) -> Samples | None:
+    """With folds of what lies near and may have been held alike, where one heap of rows came in no order; else None.
+
+    A demonstration in such a heap stays on both sides of a short stretch that is held out. Here folds are blocks of a
+    path of short steps through states and lines of action together.
+    """
+    if samples.groups.max() > 0 or not samples.reconstructed:
+        return None
+    spread = np.maximum(samples.states.std(axis=0), 1e-300) * np.sqrt(samples.states.shape[1])
+    along, _ = unit_actions(samples.actions)
+    lines = LINES_TO_STATES * (along[:, :, None] * along[:, None, :]).reshape(len(samples), -1)
+    order = path(np.column_stack([(samples.states - samples.states.mean(axis=0)) / spread, lines]))
+    folds = np.empty(len(samples), dtype=np.intp)
+    folds[order] = np.arange(len(samples)) * (int(samples.folds.max()) + 1) // len(samples)
+    return replace(samples, folds=folds)
 
 
 def like_constraints(actions: Array, groups: NDArray[np.intp]) -> NDArray[np.intp]:

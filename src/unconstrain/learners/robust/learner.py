@@ -26,7 +26,7 @@ from .candidate import Candidate
 from .choice import Comparison
 from .consistent import by_segments, noise_corrected
 from .constants import AS_DIRECT, LEAST_EXPLAINED, LEAST_INFORMATIVE, LEAST_MISFIT, LONG
-from .held_out import held_out_together
+from .held_out import held_out_otherwise, held_out_together
 from .kinematics import Jacobian, with_jacobian
 from .likelihood import free_probability, maximise
 from .noise import beyond_misfit, hides_sphere, most_noise, noise_of_each
@@ -82,7 +82,7 @@ class SampleLearner(Learner):
             found = self._plain(training, samples, everything)
         else:
             chosen, more = self.candidate(samples, training)
-            agreed = () if chosen.spread is None else (BY_AGREEMENT.format(chosen.alone),)
+            agreed = () if not chosen.alone else (BY_AGREEMENT.format(chosen.alone),)
             more["held_out_score"] = _explained(samples, chosen)
             second = None if self.secondary is None else on(self.secondary, training)(training.folds.whole)
             found = solution(chosen, samples, everything, training.model, second, **more)
@@ -310,6 +310,10 @@ class Robust(_Maximising):
     def compared(self, samples: Samples, training: Training) -> Comparison:
         """All candidates; those that use the Jacobian if they are as consistent as the best that does not, or more."""
         _say_if_long(samples)
+        found, other = self._compared(samples, training), held_out_otherwise(samples)
+        return found if other is None else found.beside(self._compared(other, training))
+
+    def _compared(self, samples: Samples, training: Training) -> Comparison:
         corrected, most = noise_corrected(samples), most_noise(samples)
         noise = noise_of_each(samples.actions, samples.groups, most, samples.noise)
         learnt = [*softened(samples), corrected, noise_corrected(samples, worth=1.0)]
@@ -373,13 +377,10 @@ class Robust(_Maximising):
 
 
 def _simplest(found: Comparison, names: Sequence[str]) -> list[str]:
-    """Of models that refute the last, or show its bias: the first that none of the others refutes, if any."""
-    kept: list[str] = []
-    for one in names[:-1]:
-        better = found.refutes(one, names[-1]) or found.shows(one, names[-1])
-        if better and (not kept or found.refutes(one, kept[0])):
-            kept = [one]
-    return kept
+    """Of models that refute the last, or show its bias, the one of least estimated error, if any."""
+    risks, last = found.judged(), names[-1]
+    better = [one for one in names[:-1] if found.refutes(one, last) or found.shows(one, last)]
+    return sorted(better, key=lambda one: risks[one].risk)[:1]
 
 
 def _trusted(training: Training) -> tuple[Training, NDArray[np.intp]]:
