@@ -482,7 +482,7 @@ def marked(tmp_path):
         at, seen = np.array([-1.0 if k < 5 else 1.0, 0.0]) + rng.uniform(-0.4, 0.4, 2), []
         for _ in range(100):
             seen.append(at + 1e-4 * rng.standard_normal(2))
-            at = at + 0.02 * np.outer(way, way) @ TURN @ at
+            at = at + 0.02 * np.outer(way, way) @ TURN @ (at + 0.3 * np.abs(at))
         times = 0.02 * np.arange(100)
         files.append(write(tmp_path / f"d{k}.csv", "t,x,y", np.column_stack([times, seen])))
     return files

@@ -382,13 +382,13 @@ def moves(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> tuple[st
 
     ``extents`` and ``paces`` are size and turns of each run over those of its demonstration, NaN where there are none,
     and ``lasts`` the size of the last round over that of the first, over the same.
-    A quarter may be off by :data:`OTHERWISE` either way, which nearly keeps them, and none by :data:`FAR_OFF`.
+    A quarter, of two one, may be off by :data:`OTHERWISE` either way, which nearly keeps them, and none by :data:`FAR_OFF`.
     """
     measured, many = _measured(extents, paces, lasts), len(extents)
     goes = ("go round" if many > 1 else "goes round") if "pace" in measured else f"turn{'s' * (many == 1)} out"
     said, strays = list[str](), list[str]()
     for name, (ratios, off) in measured.items():
-        if (off > np.log(OTHERWISE)).mean() > FEW or off.max() > np.log(FAR_OFF):
+        if (off > np.log(OTHERWISE)).mean() > (FEW if many >= ENOUGH else 0.5) or off.max() > np.log(FAR_OFF):
             wrong = ratios[off > np.log(OTHERWISE)]
             ways = zip((wrong > 1, (wrong >= 0) & (wrong <= 1), wrong < 0), _WRONG[name], strict=True)
             who = f"{len(wrong)} of {many} " if many > 1 else "it " * (not said)
