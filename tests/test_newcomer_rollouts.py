@@ -191,9 +191,7 @@ def test_lengths_and_velocities_are_told_in_the_unit_of_the_columns(tmp_path, he
     said = words(run("fit", *how, "--model", "affine", "--guided", "0,0,0", "-o", tmp_path / "p.npz"))
     far, speed = unit or "(unit of the states)", f"{unit}/s" if unit else ""
     assert f" {far} from the recorded path" in said
-    assert re.search(
-        rf"Noise and misfit are about [\d.e-]+ {f'{speed} on each action' if unit else 'on each'}", said
-    )
+    assert re.search(rf"Noise and misfit are about [\d.e-]+ {f'{speed} on each action' if unit else 'on each'}", said)
     assert re.search(rf"It ends [\d.e-]+ {re.escape(far)} from the goal", words(call(*goal, "--steps", 3).err))
     assert re.search(rf" noise [\d.e-]+ {speed or 'guided'} ", words(run("info", tmp_path / "p.npz")))
     learnt = f" {speed}".rstrip()

@@ -382,7 +382,8 @@ def moves(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> tuple[st
 
     ``extents`` and ``paces`` are size and turns of each run over those of its demonstration, NaN where there are none,
     and ``lasts`` the size of the last round over that of the first, over the same.
-    A quarter, of two one, may be off by :data:`OTHERWISE` either way, which nearly keeps them, and none by :data:`FAR_OFF`.
+    A quarter (of two, one) may be off by :data:`OTHERWISE` either way, which nearly keeps them, but none by
+    :data:`FAR_OFF`.
     """
     measured, many = _measured(extents, paces, lasts), len(extents)
     goes = ("go round" if many > 1 else "goes round") if "pace" in measured else f"turn{'s' * (many == 1)} out"

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Array
 from ..base.display import Shown, counted
 from ..risks import Moments, Quadratic, gather
+from .order import path
 from .suspects import unlike_neighbours
 
 _OF_ALL = ("centring", "roughness", "places", "notes", "reconstructed")
@@ -85,6 +86,10 @@ class Samples(Shown):
         per_sample = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in _OF_ALL}
         some: dict[str, Any] = {name: None if part is None else part[rows] for name, part in per_sample.items()}
         return replace(self, **some)
+
+    def path(self, places: Array) -> NDArray[np.intp]:
+        """Order of the samples along a path of short steps through a place for each, (N, k), shape (N,)."""
+        return path(places)
 
     @property
     def regressors(self) -> int:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from ...base.arrays import Array
 from ...risks import unit_actions
 from ...training import Samples
-from ...training.order import path
 from .constants import BLOCKS_IN_A_FOLD, LEAST_CONSTRAINTS, LIKE_CONSTRAINTS, LINES_TO_STATES, SHARE_ALONG_HELD
 
 
@@ -40,7 +39,7 @@ def held_out_otherwise(samples: Samples) -> Samples | None:
     spread = np.maximum(samples.states.std(axis=0), 1e-300) * np.sqrt(samples.states.shape[1])
     along, _ = unit_actions(samples.actions)
     lines = LINES_TO_STATES * (along[:, :, None] * along[:, None, :]).reshape(len(samples), -1)
-    order = path(np.column_stack([(samples.states - samples.states.mean(axis=0)) / spread, lines]))
+    order = samples.path(np.column_stack([(samples.states - samples.states.mean(axis=0)) / spread, lines]))
     folds = np.empty(len(samples), dtype=np.intp)
     folds[order] = np.arange(len(samples)) * (int(samples.folds.max()) + 1) // len(samples)
     return replace(samples, folds=folds)
