@@ -155,6 +155,12 @@ def path(states: Array) -> NDArray[np.intp]:
     return _walked(joined)
 
 
+def path_beside(states: Array, more: Array) -> NDArray[np.intp]:
+    """Order along a :func:`path` through states (N, n), which together spread by one, and more columns (N, k), (N,)."""
+    origin, scale = _spread(states)
+    return path(np.column_stack([(states - origin) / (scale * np.sqrt(states.shape[1])), more]))
+
+
 def _nearest_pairs(states: Array, among: NDArray[np.intp]) -> Iterator[tuple[int, int]]:
     """Pairs of neighbouring states, the nearest first."""
     from scipy.spatial import cKDTree  # takes long to import

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Array
 from ..base.display import Shown, counted
 from ..risks import Moments, Quadratic, gather
-from .order import path
+from .order import path_beside
 from .suspects import unlike_neighbours
 
 _OF_ALL = ("centring", "roughness", "places", "notes", "reconstructed")
@@ -87,9 +87,9 @@ class Samples(Shown):
         some: dict[str, Any] = {name: None if part is None else part[rows] for name, part in per_sample.items()}
         return replace(self, **some)
 
-    def path(self, places: Array) -> NDArray[np.intp]:
-        """Order of the samples along a path of short steps through a place for each, (N, k), shape (N,)."""
-        return path(places)
+    def path(self, more: Array) -> NDArray[np.intp]:
+        """Order along a path of short steps through states, which together spread by one, and more (N, k), (N,)."""
+        return path_beside(self.states, more)
 
     @property
     def regressors(self) -> int:

@@ -17,7 +17,7 @@ exactly, so differences aside from the action that are less than the least
 misfit do not count. Where N̂ is one line, û is along it, also of samples at
 rest. Where each of few demonstrations is needed, policies by segments are
 judged by :mod:`.agreement`. variance_k is the jackknife's, from the policies
-learnt without each fold; and half of it where they are learnt by segments.
+learnt without each fold, and half of it where they are learnt by segments.
 bias_k compares the candidate with others of less bias, j, as Goldenshluger and
 Lepski do (*Annals of Statistics* 39(3), 2011):
 
@@ -326,14 +326,10 @@ class Comparison:
             return apart
         if mine > its:
             return min(apart, -LEAST_HIDDEN * gap) if mine >= AS_DIRECT else apart
-        if self._far_less_consistent(one, other):
+        if _far_more(self._losses, one, other):
             return 0.0
         chance = BEYOND_CHANCE * error if self._candidates[one].by_segments else 0.0
         return max(apart - MOST_HIDDEN * max(gap - chance, 0.0), 0.0) if self._refuted[one, other] else apart
-
-    def _far_less_consistent(self, one: int, other: int) -> bool:
-        """Whether the first candidate misses far more than the second where held out, and beyond chance."""
-        return _far_more(self._losses, one, other)
 
     @cached_property
     def _refuted(self) -> NDArray[np.bool_]:

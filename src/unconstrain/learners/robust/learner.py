@@ -310,10 +310,11 @@ class Robust(_Maximising):
     def compared(self, samples: Samples, training: Training) -> Comparison:
         """All candidates; those that use the Jacobian if they are as consistent as the best that does not, or more."""
         _say_if_long(samples)
-        found, other = self._compared(samples, training), held_out_otherwise(samples)
-        return found if other is None else found.beside(self._compared(other, training))
+        found, other = self._as_held_out(samples, training), held_out_otherwise(samples)
+        return found if other is None else found.beside(self._as_held_out(other, training))
 
-    def _compared(self, samples: Samples, training: Training) -> Comparison:
+    def _as_held_out(self, samples: Samples, training: Training) -> Comparison:
+        """All candidates, as these folds hold samples out."""
         corrected, most = noise_corrected(samples), most_noise(samples)
         noise = noise_of_each(samples.actions, samples.groups, most, samples.noise)
         learnt = [*softened(samples), corrected, noise_corrected(samples, worth=1.0)]
@@ -366,7 +367,7 @@ class Robust(_Maximising):
             soft = np.inf if one.softness >= AS_DIRECT else 0.0
             best[name] = replace(one, name=name, softness=soft, by_segments=False)
             if name == usual:
-                coarser = {one: best[one] for one in _simplest(_compared(best, views), list(best))}
+                coarser = {one: best[one] for one in _better(_compared(best, views), list(best))}
                 best = {name: best[name]}
             found = chosen = _compared(best, views).best.name
             if coarser:  # by itself: what a third is sure of decides between no two
@@ -376,7 +377,7 @@ class Robust(_Maximising):
         return chosen
 
 
-def _simplest(found: Comparison, names: Sequence[str]) -> list[str]:
+def _better(found: Comparison, names: Sequence[str]) -> list[str]:
     """Of models that refute the last, or show its bias, the one of least estimated error, if any."""
     risks, last = found.judged(), names[-1]
     better = [one for one in names[:-1] if found.refutes(one, last) or found.shows(one, last)]
