@@ -33,16 +33,21 @@ from .constants import (
     LEAST_AUTOCORRELATION,
     LEAST_DIFFERENCES,
     LEAST_MISFIT,
+    MOST_GROWTH,
     MOST_LAGS,
+    MOST_SHARED_NOISE,
     SPHERE_HIDDEN_BY_NOISE,
 )
 
 
 def noise_by_differences(actions: Array, groups: NDArray[np.intp]) -> float:
-    """Variance of the white noise on each action coordinate, from differences in time.
+    """Variance of the noise on each action coordinate, from differences in time.
 
     The median of the squared fourth differences within demonstrations, which
-    is robust to constraints that switch now and then. Biased upwards where a
+    is robust to constraints that switch now and then. Differences are of
+    neighbours where these show white noise, and of samples farther apart where
+    neighbours share their noise, since positions were filtered, or
+    differentiated over a window; see :data:`~.constants.MOST_GROWTH`. Biased upwards where a
     constraint changes at every sample: that looks like noise. Infinity where
     no demonstration is long enough.
 
@@ -51,14 +56,34 @@ def noise_by_differences(actions: Array, groups: NDArray[np.intp]) -> float:
     actions : ndarray, shape (N, d)
     groups : ndarray of int, shape (N,)
     """
+    return _by_differences(actions, groups, lag_of_noise(actions, groups))
+
+
+def lag_of_noise(actions: Array, groups: NDArray[np.intp]) -> int:
+    """How many samples apart noise is no longer shared, a power of two; 1 where differences do not tell.
+
+    Noise that neighbours share grows with the lag, and stays the same from its correlation time on; a smooth movement
+    grows until it is as large as the actions.
+    """
+    lag, found = 1, _by_differences(actions, groups)
+    most = MOST_SHARED_NOISE**2 * float((actions**2).mean()) if len(actions) else 0.0
+    while (farther := _by_differences(actions, groups, 2 * lag)) > MOST_GROWTH * found:
+        lag, found = 2 * lag, farther
+        if not found <= most:
+            return 1
+    return 2 * lag if 1 < lag and farther < found else lag  # past a filter's ringing
+
+
+def _by_differences(actions: Array, groups: NDArray[np.intp], lag: int = 1) -> float:
+    """Variance by fourth differences of samples so far apart; infinity where too few are in one demonstration."""
     weights = np.array([(-1) ** i * comb(DIFFERENCE_ORDER, i) for i in range(DIFFERENCE_ORDER + 1)], dtype=np.float64)
-    count = len(actions) - DIFFERENCE_ORDER
+    count = len(actions) - DIFFERENCE_ORDER * lag
     if count < 1:
         return np.inf
-    same = groups[DIFFERENCE_ORDER:] == groups[:-DIFFERENCE_ORDER]
-    if not same.any():
+    same = groups[-count:] == groups[:count]
+    if same.sum() < (1 if lag == 1 else LEAST_DIFFERENCES):
         return np.inf
-    differences = sum(weight * actions[i : i + count] for i, weight in enumerate(weights))
+    differences = sum(weight * actions[i * lag : i * lag + count] for i, weight in enumerate(weights))
     lengths = (np.asarray(differences)[same] ** 2).sum(axis=1)
     median = 2.0 * gammaincinv(0.5 * actions.shape[1], 0.5)  # of a χ² distribution; scipy.stats takes long to import
     return float(np.median(lengths) / median / (weights**2).sum())
@@ -80,16 +105,16 @@ def noise_of_each(actions: Array, labels: NDArray[np.intp], most: float, known: 
     most : float
         Variance of short segments.
     known : ndarray, shape (N,), optional
-        Standard deviation on each coordinate.
+        Standard deviation on each coordinate. Where samples share their noise, it is at least that by differences.
     """
-    if known is not None:
+    lag, found = lag_of_noise(actions, labels), np.full(len(actions), most)
+    if known is not None and lag == 1:
         return known**2
-    found = np.full(len(actions), most)
     for label in np.unique(labels):
         rows = labels == label
-        if rows.sum() >= LEAST_DIFFERENCES:
-            found[rows] = noise_by_differences(actions[rows], labels[rows])
-    return found
+        if rows.sum() >= LEAST_DIFFERENCES + DIFFERENCE_ORDER * (lag - 1):
+            found[rows] = _by_differences(actions[rows], labels[rows], lag)
+    return found if known is None else np.maximum(found, known**2)
 
 
 def beyond_misfit(noise: Array, samples: Samples) -> Array:

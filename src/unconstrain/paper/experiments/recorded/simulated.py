@@ -245,7 +245,7 @@ def along_rulers(rng: np.random.Generator, form: str) -> Simulated:
     speeds = [np.linalg.norm(demo.actions, axis=1) for demo in test]
     least = 0.1 * np.sqrt(np.mean(np.concatenate(speeds) ** 2))
     moving = [demo[speed > least] for demo, speed in zip(test, speeds, strict=True) if (speed > least).any()]
-    return Simulated([_differentiated(demo, 3e-4, rng) for demo in learnt], moving)
+    return Simulated([_differentiated(demo, 3e-4 * rng.standard_normal(demo.states.shape)) for demo in learnt], moving)
 
 
 def partly_at_rest(rng: np.random.Generator, share: float) -> Simulated:
@@ -283,12 +283,26 @@ def parallel_planes(rng: np.random.Generator) -> Simulated:
 
 def tilted_plates(rng: np.random.Generator) -> Simulated:
     """Cycles of 80 mm on eight plates tilted by 5 to 30 degrees, as velocities of positions recorded to 0.05 mm."""
-    tilts, ways = np.radians(rng.uniform(5, 30, 8)), rng.uniform(0, 2 * np.pi, 8)
-    normals = np.column_stack([np.sin(tilts) * np.cos(ways), np.sin(tilts) * np.sin(ways), np.cos(tilts)])
-    starts = np.column_stack([rng.uniform(-120, 120, (8, 2)), np.zeros(8)])
-    starts -= normals * np.vecdot(normals, starts)[:, None]
+    normals = _tilted_by(rng, 5, 30, 8)
+    starts = _onto(normals, np.column_stack([rng.uniform(-120, 120, (8, 2)), np.zeros(8)]))
     demos = _rolled(wipe_round, starts, 4000, 0.001, [uc.constraints.Plane(normal) for normal in normals])
-    return Simulated([_differentiated(one[::10], 0.05, rng) for one in demos])
+    return Simulated([_differentiated(one[::10], 0.05 * rng.standard_normal(one[::10].states.shape)) for one in demos])
+
+
+def filtered_positions(rng: np.random.Generator, form: str) -> Simulated:
+    """Velocities of positions as motion capture delivers them: at 100 Hz, with an error that is filtered at 10 Hz.
+
+    It is 0.8 mm. Five demonstrators of four seconds are free on an oval, and five go along rulers; or ten are on plates
+    tilted by 10 to 40 degrees.
+    """
+    if form == "rulers":
+        oval = Oval(rng.uniform(0.1, 0.2) * np.array([1.0, rng.uniform(0.5, 1.0)]), 1.8, "cubic")
+        free = _rolled(oval, rng.uniform(-1.3, 1.3, (5, 2)) * oval.radii, 2000, 0.002, None)
+        return Simulated([_captured(one[::5], 8e-4, rng) for one in (*free, *_strokes(oval, 5, rng, 2))])
+    normals = _tilted_by(rng, 10, 40, 10)
+    starts = _onto(normals, np.column_stack([rng.uniform(-120, 120, (10, 2)), np.zeros(10)]))
+    demos = _rolled(wipe_round, starts, 2000, 0.002, [uc.constraints.Plane(normal) for normal in normals])
+    return Simulated([_captured(one[::5], 0.8, rng) for one in demos])
 
 
 def reaching(rng: np.random.Generator, share: float) -> Simulated:
@@ -388,18 +402,37 @@ def _moved(demo: uc.Demonstration, by: Array) -> uc.Demonstration:
     return replace(demo, actions=demo.actions + by)
 
 
-def _differentiated(demo: uc.Demonstration, error: float, rng: np.random.Generator) -> uc.Demonstration:
-    """As it is recorded by its positions alone, each with an error of such a standard deviation."""
-    recorded = demo.states + error * rng.standard_normal(demo.states.shape)
+def _captured(demo: uc.Demonstration, error: float, rng: np.random.Generator) -> uc.Demonstration:
+    """As motion capture delivers positions at 100 Hz: their errors filtered at 10 Hz, forward and backward."""
+    from scipy.signal import butter, filtfilt
+
+    errors = filtfilt(*butter(2, 10.0, fs=100.0), rng.standard_normal((len(demo) + 200, demo.states.shape[1])), axis=0)
+    return _differentiated(demo, error * errors[100:-100] / errors.std())
+
+
+def _tilted_by(rng: np.random.Generator, least: float, most: float, count: int) -> Array:
+    """Normals (count, 3) of plates that are tilted by so many degrees, in any direction."""
+    tilts, ways = np.radians(rng.uniform(least, most, count)), rng.uniform(0, 2 * np.pi, count)
+    return np.column_stack([np.sin(tilts) * np.cos(ways), np.sin(tilts) * np.sin(ways), np.cos(tilts)])
+
+
+def _onto(normals: Array, positions: Array) -> Array:
+    """Positions (N, 3), each moved onto the plate through the origin with its normal."""
+    return positions - normals * np.vecdot(normals, positions)[:, None]
+
+
+def _differentiated(demo: uc.Demonstration, errors: Array) -> uc.Demonstration:
+    """As it is recorded by its positions alone, with errors (T, n)."""
+    recorded = demo.states + errors
     return replace(demo, states=recorded, actions=uc.preparation.differentiate(np.asarray(demo.times), recorded))
 
 
-def _strokes(oval: Oval, count: int, rng: np.random.Generator) -> list[uc.Demonstration]:
-    """Four seconds at 50 Hz along lines in any direction, from starts in and about an oval."""
+def _strokes(oval: Oval, count: int, rng: np.random.Generator, every: int = 4) -> list[uc.Demonstration]:
+    """Four seconds, every so many of 200 samples a second, along lines in any direction, from starts in and about an oval."""
     angles = rng.uniform(0, np.pi, count)
     rulers = [uc.constraints.Plane(np.array([np.sin(angle), np.cos(angle)])) for angle in angles]
     starts = rng.uniform(-1.3, 1.3, (count, 2)) * oval.radii
-    return [demo[::4] for demo in _rolled(oval, starts, 800, 0.005, rulers)]
+    return [demo[::every] for demo in _rolled(oval, starts, 800, 0.005, rulers)]
 
 
 def _spoiled(
