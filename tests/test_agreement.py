@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import unconstrain as uc
-from unconstrain.learners.robust.agreement import where_agreed
+from unconstrain.learners.robust.agreement import as_told, where_agreed
 from unconstrain.learners.robust.consistent import least_error
 from unconstrain.learners.robust.segments import projections_of
 from unconstrain.paper.experiments.recorded.judging import knowledge
@@ -72,6 +72,22 @@ def test_what_is_new_is_missed_by_as_much_as_the_naive_formula_says():
     assert missed(judged, samples, projections) < 0.02
     assert_allclose(judged.refits, np.broadcast_to(found.weights, found.refits.shape))
     assert judged.spread > 0.0
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.1, True), (0.5, True), (0.6, False), (1.5, False)])
+def test_agreement_counts_only_where_nobody_predicts_what_is_held_out(share, told):
+    """A policy that predicts so much of the motion shows that the others do tell of it."""
+    found, samples, projections = candidate()
+    judged = where_agreed(found, samples, projections)
+    assert judged.apart is found
+    other = replace(found, name="other", held_out=samples.actions * (1.0 - share * np.sqrt(1.2)))
+    first, second = as_told([replace(judged, name="own", softness=0.5), other], samples)
+    assert second is other
+    assert (first.name, first.softness) == ("own", 0.5)
+    assert_allclose(first.held_out, found.held_out if told else judged.held_out)
+    assert (first.apart is None) == (first.spread is None) == told
+    assert as_told([judged], samples) == [judged]
+    assert as_told([other, found], samples) == [other, found]
 
 
 @pytest.mark.parametrize(

@@ -532,3 +532,14 @@ def test_an_unstable_candidate_shows_bias_where_it_is_the_more_consistent():
     policy = data.fit(uc.Robust())
     assert uc.nupe(policy, data.test) < 0.1 * uc.nupe(policy.with_learner(uc.Direct()), data.test)
     assert any(one.variance > 1.0 for one in policy.solution_.candidates.values())
+
+
+@pytest.mark.parametrize("form", ["rulers", "plates"])
+def test_positions_that_were_filtered_hide_no_constraint(form):
+    data = draw_recorded("filtered positions", f"{form} #1", 1)
+    policy = data.fit(uc.Robust())
+    error = uc.nupe(policy, data.test)
+    assert error < 0.5 * uc.nupe(data.fit(uc.Hybrid(alpha="auto")), data.test)
+    assert error < 0.03  # .35 and .05 where noise was told by neighbours
+    spread = policy.uncertainty(data.test[0].states)
+    assert (np.abs(policy.predict(data.test[0].states) - data.test[0].truth.policy) < 2.5 * spread.total).mean() > 0.9

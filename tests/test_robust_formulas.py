@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.signal import butter, filtfilt
 
 import naive
 import unconstrain as uc
@@ -22,7 +23,9 @@ from unconstrain.learners.robust.noise import (
     corrected,
     corrected_squares,
     correlation_time,
+    lag_of_noise,
     noise_by_differences,
+    noise_of_each,
 )
 from unconstrain.learners.robust.posterior import Posterior
 from unconstrain.learners.robust.segments import (
@@ -146,6 +149,65 @@ def test_noise_shows_in_differences_and_a_switch_does_not():
     assert noise_by_differences(smooth, groups) < 1e-12
     assert noise_by_differences(noisy[:4], groups[:4]) == np.inf
     assert noise_by_differences(noisy, np.arange(300)) == np.inf
+
+
+def _filtered(rng, hertz, count=3000, d=2):
+    """Noise of standard deviation one at 100 Hz, of which a filter left what is slower than so many hertz."""
+    found = filtfilt(*butter(2, hertz, fs=100.0), rng.standard_normal((count, d)), axis=0)
+    return found / found.std()
+
+
+@pytest.mark.parametrize("hertz", [6.0, 10.0, 20.0])
+@pytest.mark.parametrize("share", [0.03, 0.2])
+def test_noise_that_neighbours_share_is_told_by_samples_farther_apart(hertz, share):
+    times = np.arange(3000) / 100.0
+    smooth = np.column_stack([np.sin(2.0 * times), np.cos(1.3 * times)])
+    groups = np.arange(3000) // 500
+    noisy = smooth + share * np.sqrt(0.5) * _filtered(np.random.default_rng(1), hertz)
+    assert noise_by_differences(smooth, groups) < 1e-9  # not taken for noise, however smooth
+    assert lag_of_noise(smooth, groups) == 1
+    neighbours = (np.diff(noisy[:500], n=4, axis=0) ** 2).sum(axis=1)
+    assert np.sqrt(np.median(neighbours) / 140.0) < 0.4 * share * np.sqrt(0.5)  # what neighbours show of it
+    assert_allclose(np.sqrt(noise_by_differences(noisy, groups)), share * np.sqrt(0.5), rtol=0.35)
+    assert_allclose(np.sqrt(noise_of_each(noisy, groups, 1.0)), share * np.sqrt(0.5), rtol=0.5)
+    known = np.full(3000, 1e-3)  # from positions that were filtered before anybody saw them
+    assert (noise_of_each(noisy, groups, 1.0, known) > 10 * known**2).all()
+
+
+def test_white_noise_is_told_by_neighbours_and_known_noise_is_used_as_it_is():
+    rng, groups = np.random.default_rng(2), np.arange(2000) // 400
+    noisy = np.sin(np.arange(2000) / 40.0)[:, None] + 0.1 * rng.standard_normal((2000, 2))
+    assert lag_of_noise(noisy, groups) == 1
+    assert_allclose(noise_of_each(noisy, groups, 1.0, np.full(2000, 0.03)), 0.03**2)
+    assert lag_of_noise(noisy[:3], groups[:3]) == lag_of_noise(noisy, np.arange(2000)) == 1
+
+
+@pytest.mark.parametrize("rate", [50, 100, 250])
+def test_noise_of_positions_that_were_differentiated_is_what_is_known_of_it(rate):
+    rng, times = np.random.default_rng(3), np.arange(0, 8, 1 / rate)
+    positions = np.column_stack([np.sin(2.0 * times), np.cos(1.3 * times)])
+    actions, truth = (
+        uc.preparation.differentiate(times, one)
+        for one in (positions + 3e-3 * rng.standard_normal(positions.shape), positions)
+    )
+    known, groups = np.sqrt(((actions - truth) ** 2).mean()), np.zeros(len(times), dtype=int)
+    assert_allclose(np.sqrt(noise_by_differences(actions, groups)), known, rtol=0.3)
+
+
+def test_half_of_the_samples_constrained_at_random_is_not_the_noise_of_all():
+    rng = np.random.default_rng(4)
+    demos = [limit_cycle_of(rng, random) for random in (False, True) * 15]
+    actions, groups = np.vstack(demos), np.repeat(np.arange(30), len(demos[0]))
+    assert lag_of_noise(actions, groups) == 1
+
+
+def limit_cycle_of(rng, random):
+    """Forty actions round a cycle, along it or along directions at random."""
+    angles = rng.uniform(0, 6) + np.arange(40) * 0.08
+    actions = np.column_stack([-np.sin(angles), np.cos(angles)])
+    along = rng.standard_normal((40, 2)) if random else actions
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    return along * np.vecdot(along, actions)[:, None]
 
 
 def test_correlation_time_of_known_processes():

@@ -29,7 +29,7 @@ from .constants import (
 )
 from .evidence import Evidence, shown, surely
 from .likelihood import free_probability, mixture_of
-from .noise import hides_sphere, noise_by_differences
+from .noise import hides_sphere, most_noise
 from .pivot import pointing
 from .posterior import Posterior, unit_information
 from .smoothness import Smoothness
@@ -238,5 +238,5 @@ def _as_free_as_known(belief: Belief, everything: Samples, model: Model, togethe
 def _misfit(samples: Samples, variance: float) -> float:
     """Variance of the misfit per coordinate: residual variance less that of the noise by differences in time."""
     floor = LEAST_MISFIT**2 * samples.energy
-    smooth = variance - max(noise_by_differences(samples.actions, samples.groups), floor)
+    smooth = variance - max(most_noise(samples), floor)
     return LEAST_SMOOTH_MISFIT**2 * samples.energy / samples.actions.shape[1] + max(smooth, 0.0)

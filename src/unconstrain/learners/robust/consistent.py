@@ -26,7 +26,7 @@ from .constants import (
     SOFTNESS_RANGE,
     SOFTNESS_STANDARD_ERRORS,
 )
-from .noise import consistency_residuals, corrected, correlation_time, inefficiency, noise_by_differences
+from .noise import consistency_residuals, corrected, correlation_time, inefficiency, most_noise
 from .posterior import Posterior, unit_information
 from .smoothness import Smoothness
 from .sphere import distances
@@ -42,7 +42,7 @@ def noise_corrected(samples: Samples, noise: float | None = None, worth: float |
     """
     parts = _Folds(samples)
     d, rough, time = samples.actions.shape[1], Smoothness.of(samples), 1.0
-    most, variance = noise_by_differences(samples.actions, samples.groups), 0.0 if noise is None else noise**2
+    most, variance = most_noise(samples), 0.0 if noise is None else noise**2
     for _ in range(NOISE_ROUNDS):
         used = variance
         whole = parts.corrected(used)

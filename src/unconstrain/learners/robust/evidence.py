@@ -32,7 +32,6 @@ from .noise import (
     correlation_time,
     inefficiency,
     most_noise,
-    noise_by_differences,
     noise_of_each,
 )
 from .pivot import pivot_of
@@ -86,7 +85,7 @@ def shown(samples: Samples, policy: Array, variance: float, free: Array, by_segm
     by_segments : bool
         Whether demonstrations that were held in the same way all the time show more than samples along themselves.
     """
-    least = min(variance, noise_by_differences(samples.actions, samples.groups))
+    least = min(variance, most_noise(samples))
     noise = max(least, LEAST_MISFIT**2 * samples.energy)  # variance on each coordinate
     time = correlation_time(consistency_residuals(samples, policy, noise)[:, None], samples.groups)
     unit, parts = _residual(samples, policy, noise, time), parts_of(samples)

@@ -24,7 +24,7 @@ from .constants import (
     RACE_STEPS,
     REFIT_STEPS,
 )
-from .noise import correlation_time, noise_by_differences
+from .noise import correlation_time, most_noise
 from .posterior import Posterior, unit_information
 from .smoothness import Smoothness
 from .sphere import Distances, Responsibilities, distances, e_step
@@ -54,7 +54,7 @@ def maximise(
     mixture : ndarray, shape (K + 1,)
         Mixing proportions: of each spread, and of the uniform component.
     """
-    thinned, noise = samples[:: -(-len(samples) // most)], noise_by_differences(samples.actions, samples.groups)
+    thinned, noise = samples[:: -(-len(samples) // most)], most_noise(samples)
     first = min(steps, RACE_STEPS)
     optima = [_maximise_from(thinned, _start(thinned, start, smoothness), first, noise) for start in starts]
     best = optima[0]

@@ -60,22 +60,26 @@ def noise_by_differences(actions: Array, groups: NDArray[np.intp]) -> float:
 
 
 def lag_of_noise(actions: Array, groups: NDArray[np.intp]) -> int:
-    """How many samples apart noise is no longer shared, a power of two; 1 where differences do not tell.
+    """How many samples apart noise is no longer shared, a power of two; 1 where neighbours tell it, or nothing does.
 
-    Noise that neighbours share grows with the lag, and stays the same from its correlation time on; a smooth movement
-    grows until it is as large as the actions.
+    Noise that neighbours share grows with the lag, and stays the same from its correlation time on, everywhere alike; a
+    smooth movement grows until it is as large as the actions. A derivative over a window has a little white noise
+    besides, from the window's ends, so that the last lag counts from which on it stays.
     """
-    lag, found = 1, _by_differences(actions, groups)
+    found, lag, at = 1, 1, _by_differences(actions, groups)
     most = MOST_SHARED_NOISE**2 * float((actions**2).mean()) if len(actions) else 0.0
-    while (farther := _by_differences(actions, groups, 2 * lag)) > MOST_GROWTH * found:
-        lag, found = 2 * lag, farther
-        if not found <= most:
-            return 1
-    return 2 * lag if 1 < lag and farther < found else lag  # past a filter's ringing
+    told = np.inf  # of a first plateau that is higher than neighbours tell
+    while at <= most:
+        farther = _by_differences(actions, groups, 2 * lag)
+        if farther <= MOST_GROWTH * at and (told == np.inf or at > MOST_GROWTH**2 * told):
+            alike = at <= MOST_GROWTH**2 * _by_differences(actions, groups, lag, 0.25)
+            found, told = (2 * lag if lag > 1 and farther < at else lag, at) if alike else (found, told)
+        lag, at = 2 * lag, farther
+    return found
 
 
-def _by_differences(actions: Array, groups: NDArray[np.intp], lag: int = 1) -> float:
-    """Variance by fourth differences of samples so far apart; infinity where too few are in one demonstration."""
+def _by_differences(actions: Array, groups: NDArray[np.intp], lag: int = 1, quantile: float = 0.5) -> float:
+    """Variance by a quantile of fourth differences of samples so far apart; infinity where too few are together."""
     weights = np.array([(-1) ** i * comb(DIFFERENCE_ORDER, i) for i in range(DIFFERENCE_ORDER + 1)], dtype=np.float64)
     count = len(actions) - DIFFERENCE_ORDER * lag
     if count < 1:
@@ -85,13 +89,18 @@ def _by_differences(actions: Array, groups: NDArray[np.intp], lag: int = 1) -> f
         return np.inf
     differences = sum(weight * actions[i * lag : i * lag + count] for i, weight in enumerate(weights))
     lengths = (np.asarray(differences)[same] ** 2).sum(axis=1)
-    median = 2.0 * gammaincinv(0.5 * actions.shape[1], 0.5)  # of a χ² distribution; scipy.stats takes long to import
-    return float(np.median(lengths) / median / (weights**2).sum())
+    usual = 2.0 * gammaincinv(0.5 * actions.shape[1], quantile)  # of χ²; scipy.stats takes long to import
+    return float(np.quantile(lengths, quantile) / usual / (weights**2).sum())
 
 
 def most_noise(samples: Samples) -> float:
-    """Variance of the noise by differences in time over all demonstrations, at most that of the actions."""
-    return min(noise_by_differences(samples.actions, samples.groups), samples.energy)
+    """Variance of the noise by differences in time over all demonstrations, at least what is known of it.
+
+    At most that of the actions.
+    """
+    found = noise_by_differences(samples.actions, samples.groups)
+    known = 0.0 if samples.noise is None else samples.mean(samples.noise**2)
+    return min(max(found, known), samples.energy)
 
 
 def noise_of_each(actions: Array, labels: NDArray[np.intp], most: float, known: Array | None = None) -> Array:

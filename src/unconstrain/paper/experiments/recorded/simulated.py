@@ -428,7 +428,7 @@ def _differentiated(demo: uc.Demonstration, errors: Array) -> uc.Demonstration:
 
 
 def _strokes(oval: Oval, count: int, rng: np.random.Generator, every: int = 4) -> list[uc.Demonstration]:
-    """Four seconds, every so many of 200 samples a second, along lines in any direction, from starts in and about an oval."""
+    """Four seconds along lines in any direction, from starts in and about an oval: so many 200ths of a second apart."""
     angles = rng.uniform(0, np.pi, count)
     rulers = [uc.constraints.Plane(np.array([np.sin(angle), np.cos(angle)])) for angle in angles]
     starts = rng.uniform(-1.3, 1.3, (count, 2)) * oval.radii
