@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
+from scipy.ndimage import gaussian_filter1d
 
 import unconstrain as uc
 from seen import below
@@ -402,6 +403,35 @@ def test_free_hands_among_rails_are_named_and_what_comes_next_leaves_them_out(tm
     assert said.startswith("! Demonstrations differ: free for 5, held for 3 of 8 demonstrations")
     assert f"with --leave-out {','.join(names[:5])}." in " ".join(said.split())
     assert "Maybe free" not in said
-    left = run("constraint", tmp_path, "--leave-out", ",".join(names[:5]), "-o", tmp_path / "r.npz")
+    left = run(
+        "constraint", *sorted(tmp_path.glob("*.csv")), "--leave-out", ",".join(names[:5]), "-o", tmp_path / "r.npz"
+    )
     assert "Demonstrations differ" not in left
     assert "Mechanism: a line for each of 3 demonstrations" in left
+
+
+def wiped_once(path, seed):
+    """One stroke towards the middle of a tilted plate, by a hand that varies, in mm: its velocities are half noise."""
+    rng, step = np.random.default_rng(seed), 0.0125
+    size, turn, varied = rng.uniform(80, 160), rng.uniform(0, 6.28), np.zeros(2)
+    at, seen = size * np.array([np.cos(turn), np.sin(turn)]), []
+    for _ in range(420):
+        seen.append(at)
+        wanted = (160 * np.array([-at[1], at[0]]) - 70 * at) / np.hypot(np.hypot(*at), 60)
+        varied = varied * (1 - step / 0.3) + 0.04 * np.sqrt(step / 0.15) * rng.standard_normal(2)
+        at = at + step * (wanted + np.hypot(*wanted) * varied)
+    plate = np.pad(seen, ((24, 60), (0, 0)), "edge") @ [[1, 0, 0], [0, np.cos(0.6), np.sin(0.6)]]
+    sensor = gaussian_filter1d(rng.standard_normal((len(plate), 3)), 2, axis=0)
+    write(path, "t [s],x [mm],y [mm],z [mm]", [step * np.arange(len(plate)), plate + 0.9 * sensor / sensor.std(axis=0)])
+    return path
+
+
+def test_what_is_learnt_of_one_recording_holds_no_more_than_its_plane_as_among_others(tmp_path):
+    files = [wiped_once(tmp_path / f"w{seed}.csv", seed) for seed in (34, 44)]
+    alone = [json.loads(run("constraint", one, "-o", tmp_path / f"{one.stem}.npz", "--json")) for one in files]
+    assert [one["mechanism"].partition(" through")[0] for one in alone] == 2 * ["a plane"]
+    assert [one["rank"] for one in alone] == 2 * [1]
+    told = json.loads(run("constraint", *files, "-o", tmp_path / "all.npz", "--json"))
+    assert {one["rank"] for one in told["each"].values() or [told]} == {1}
+    asked = run("constraint", files[0], "--features", "affine", "-o", tmp_path / "a.npz", "--json")
+    assert json.loads(asked)["rank"] == 2  # as asked for

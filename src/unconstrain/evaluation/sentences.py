@@ -148,10 +148,15 @@ def looks(free: float, told: float, flat: bool) -> str:
 
 def about_freedom(found: Diagnosis) -> str:
     """What looks free, and how demonstrations look."""
-    others = [one for one in found.movements if one.looks != "flat"]
+    many, others = (
+        Counter(one.looks for one in found.movements),
+        [one for one in found.movements if one.looks != "flat"],
+    )
+    look = ", ".join(f"{many[how]} {words}" for how, words in LOOKS.items() if many[how])
+    look = f"How {counted(len(found.movements), 'demonstration')} look: {look}."
     if not others:
         said = "No sample is said to be free: each demonstration looks held, by a plane of its own all along"
-        return f"{said}; a short free stroke may, too. {_how_they_look(found)}"
+        return f"{said}; a short free stroke may, too. {look}"
     free = sum(one.samples * (one.free or 0.0) for one in others) / sum(one.samples for one in found.movements)
     share = free if len(others) < len(found.movements) else found.free_share
     said = f"{percent(share)} of the samples look free: nothing that shows above the noise held them"
@@ -160,10 +165,4 @@ def about_freedom(found: Diagnosis) -> str:
         said += "the same way, which looks alike; demonstrations held in another way would tell"
     if found.free is None:
         return f"{said}. That is of the samples that the policy was fitted to."
-    return f"{said}. {_how_they_look(found)}"
-
-
-def _how_they_look(found: Diagnosis) -> str:
-    many = Counter(one.looks for one in found.movements)
-    told = ", ".join(f"{many[how]} {words}" for how, words in LOOKS.items() if many[how])
-    return f"How {counted(len(found.movements), 'demonstration')} look: {told}."
+    return f"{said}. {look}"
