@@ -148,10 +148,8 @@ def looks(free: float, told: float, flat: bool) -> str:
 
 def about_freedom(found: Diagnosis) -> str:
     """What looks free, and how demonstrations look."""
-    many, others = (
-        Counter(one.looks for one in found.movements),
-        [one for one in found.movements if one.looks != "flat"],
-    )
+    many = Counter(one.looks for one in found.movements)
+    others = [one for one in found.movements if one.looks != "flat"]
     look = ", ".join(f"{many[how]} {words}" for how, words in LOOKS.items() if many[how])
     look = f"How {counted(len(found.movements), 'demonstration')} look: {look}."
     if not others:
