@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
+from scipy.ndimage import gaussian_filter1d
 
 import unconstrain as uc
 from seen import below
@@ -365,3 +366,72 @@ def test_where_each_was_held_in_its_own_way_the_options_that_fit_each_are_named(
     )
     assert said.endswith("and of joint angles that a hand's constraint holds, with --jacobian.")
     assert "by itself (its file" not in run("constraint", tmp_path / "flat.csv", *learn)
+
+
+def to_a_cycle(folder, rails=0):
+    """Five free hands that come onto one circle from inside and outside, and some more on straight rails, in m."""
+    rng, files = np.random.default_rng(3), []
+    for number, start in enumerate([0.04, 0.2, 0.06, 0.19, 0.05] + rails * [0.15]):
+        turn, aside = rng.uniform(0, 2 * np.pi), rng.uniform(0.8, 2.0)
+        at, way = (size * np.array([np.cos(way), np.sin(way)]) for size, way in ((start, turn), (1.0, turn + aside)))
+        path = [at]
+        for _ in range(400 if number < 5 else 200):
+            size = np.hypot(*path[-1])
+            step = 0.015 * max(1 - (size / 0.12) ** 2, -3) * path[-1] + 0.018 * np.array([-path[-1][1], path[-1][0]])
+            path.append(path[-1] + (step if number < 5 else way * (way @ step)))
+        hand = np.array(path) + 5e-4 * rng.standard_normal((len(path), 2))
+        write(folder / f"hand_{number}.csv", "t,x [m],y [m]", [0.01 * np.arange(len(path)), hand])
+        files.append(f"hand_{number}")
+    return files
+
+
+def test_a_cycle_that_free_hands_come_onto_is_no_hinge(tmp_path):
+    to_a_cycle(tmp_path)
+    said = run("constraint", tmp_path, "-o", tmp_path / "c.npz")
+    assert "Mechanism: a movement that nothing holds, against a circle" in said
+    assert "hinge" not in said
+    alone = run("constraint", tmp_path / "hand_1.csv", "-o", tmp_path / "a.npz")
+    assert "Mechanism: a movement that nothing holds, against a circle" in alone
+
+
+def test_free_hands_among_rails_are_named_and_what_comes_next_leaves_them_out(tmp_path):
+    names = to_a_cycle(tmp_path, rails=3)
+    said = run("constraint", tmp_path, "-o", tmp_path / "c.npz")
+    lines = [line for line in said.splitlines() if line.startswith("hand_")]
+    assert [" free " in line for line in lines] == [number < 5 for number in range(8)]
+    assert [" held " in line for line in lines] == [number >= 5 for number in range(8)]
+    assert said.startswith("! Demonstrations differ: free for 5, held for 3 of 8 demonstrations")
+    assert f"with --leave-out {','.join(names[:5])}." in " ".join(said.split())
+    assert "Maybe free" not in said
+    left = run(
+        "constraint", *sorted(tmp_path.glob("*.csv")), "--leave-out", ",".join(names[:5]), "-o", tmp_path / "r.npz"
+    )
+    assert "Demonstrations differ" not in left
+    assert "Mechanism: a line for each of 3 demonstrations" in left
+
+
+def wiped_once(path, seed):
+    """One stroke towards the middle of a tilted plate, by a hand that varies, in mm: its velocities are half noise."""
+    rng, step = np.random.default_rng(seed), 0.0125
+    size, turn, varied = rng.uniform(80, 160), rng.uniform(0, 6.28), np.zeros(2)
+    at, seen = size * np.array([np.cos(turn), np.sin(turn)]), []
+    for _ in range(420):
+        seen.append(at)
+        wanted = (160 * np.array([-at[1], at[0]]) - 70 * at) / np.hypot(np.hypot(*at), 60)
+        varied = varied * (1 - step / 0.3) + 0.04 * np.sqrt(step / 0.15) * rng.standard_normal(2)
+        at = at + step * (wanted + np.hypot(*wanted) * varied)
+    plate = np.pad(seen, ((24, 60), (0, 0)), "edge") @ [[1, 0, 0], [0, np.cos(0.6), np.sin(0.6)]]
+    sensor = gaussian_filter1d(rng.standard_normal((len(plate), 3)), 2, axis=0)
+    write(path, "t [s],x [mm],y [mm],z [mm]", [step * np.arange(len(plate)), plate + 0.9 * sensor / sensor.std(axis=0)])
+    return path
+
+
+def test_what_is_learnt_of_one_recording_holds_no_more_than_its_plane_as_among_others(tmp_path):
+    files = [wiped_once(tmp_path / f"w{seed}.csv", seed) for seed in (34, 44)]
+    alone = [json.loads(run("constraint", one, "-o", tmp_path / f"{one.stem}.npz", "--json")) for one in files]
+    assert [one["mechanism"].partition(" through")[0] for one in alone] == 2 * ["a plane"]
+    assert [one["rank"] for one in alone] == 2 * [1]
+    told = json.loads(run("constraint", *files, "-o", tmp_path / "all.npz", "--json"))
+    assert {one["rank"] for one in told["each"].values() or [told]} == {1}
+    asked = run("constraint", files[0], "--features", "affine", "-o", tmp_path / "a.npz", "--json")
+    assert json.loads(asked)["rank"] == 2  # as asked for

@@ -576,8 +576,16 @@ def test_what_keeps_to_a_plane_that_others_cross_is_not_called_free(tmp_path):
     assert (
         "How 6 demonstrations look: 6 on a plane that others cross (as what is held, or a short free stroke)." in said
     )
+    assert "No sample is said to be free: each demonstration looks held, by a plane of its own all along" in said
+    assert "of the samples look free" not in said
     assert "Mean probability that a sample was free" not in said
-    assert "Of no demonstration this can be told" in (tmp_path / "a.html").read_text("utf-8")
+    page = (tmp_path / "a.html").read_text("utf-8")
+    assert "Of no demonstration this can be told" in page
+    assert "each demonstration looks held, by a plane" in page
+    few = words(
+        run("diagnose", *files[:3], "--state", "x,y,z", "--differentiate")
+    )  # too few to tell the policy at most states
+    assert "How 3 demonstrations look: 3 on a plane that others cross" in few
 
 
 def test_the_first_place_to_record_is_in_the_verdict_and_the_list_fits_a_terminal(folder):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -91,13 +93,13 @@ def constraint(
     asked = _asked(features, jacobian, tip, surface, with_task)
     with shown("reading, learning"):
         demonstrations, recipe, (first, *_) = prepared(paths, reading)
-        learnt = _learnt(asked, demonstrations, surface)
+        named = mechanism_of(demonstrations, recipe, first) if jacobian is None else None
+        learnt = _agreeing(asked, named, demonstrations, surface)
     refuse_warnings(reading["strict"])
     if recipe.angles:
         click.echo(f"Note: {', '.join(recipe.angles)} as unwrapped: a turn more is another state to it.", err=True)
     outputs = {name: _of_demonstration(output, name) for name in learnt}
     check_outputs([place for name, place in outputs.items() if name], (*paths, jacobian), force)
-    named = mechanism_of(demonstrations, recipe, first) if jacobian is None else None
     wound = uc.constraints.mechanisms.winding(one.actions for one in demonstrations)
     verdict = _judged(learnt, named, wound)
     if not as_json:
@@ -137,9 +139,19 @@ def _judged(
     """What was learnt, and what it is by name where that holds more."""
     shown, rank = None if named is None else named.shown(learnt), max(one.rank_ for one in learnt.values())
     found = uc.evaluation.verdicts.of_constraint(*learnt.values(), shown=shown, wound=wound)
+    kinds = {} if named is None else dict(zip(named.names, named.found.candidates[0].kinds, strict=False))
+    if named is not None and "free" in kinds.values() and {*kinds.values()} - {"free", "undecided"}:
+        names = [name for name, kind in kinds.items() if kind in ("free", "undecided")]
+        left = shlex.quote(",".join([*click.get_current_context().params["leave_out"], *names]))
+        said = f"Demonstrations differ: {named.found.summary}. No one constraint holds all of them."
+        then = f"Learn it of those that look held, with --leave-out {left}."
+        doubt = "What is learnt of all together." if "" in learnt else f"What is learnt of {listed(names)}."
+        return uc.evaluation.verdicts.Verdict(uc.evaluation.verdicts.Mark.DOUBTFUL, said, doubt=doubt, next=then)
     if named is not None and named.differs(learnt):
         said = f"Demonstrations differ: {named.found.summary}. {found.said.replace('held;', 'held in all;')}"
         return found._replace(said=said, next="Learn those of one mechanism alone, with --episodes or --leave-out.")
+    if named is not None and named.found.kind == "free" and named.found.decided:
+        found = found._replace(said=found.said.replace("do not decide it", "keep to nothing that would hold them"))
     judged = uc.evaluation.verdicts.of_mechanism
     return found if named is None else judged(found, rank, named.found.mechanism, named.is_followed(learnt))
 
@@ -177,6 +189,20 @@ def _learnt(
         if not shared.doubts and any(FEATURES.index(one.choice_.name) >= form for one in each.values()):
             each = {}
     return {demonstrations[int(str(number))].name: one for number, one in each.items()} or {"": constraint}
+
+
+def _agreeing(asked: uc.LearntConstraint, named: Named | None, *samples: Any) -> dict[str, uc.LearntConstraint]:
+    """By other features if these hold more than positions show: one path always moves little along what bends."""
+    learnt, every = _learnt(asked, *samples), [] if named is None else named.found.candidates
+    likely = [one for one in every if every[0].against(one) < uc.constraints.mechanisms.LIKELY]
+    ranks = {max(each.rank for each in one.mechanisms) for one in likely}
+    forms = FEATURES[1:] if len(ranks - {0}) == len(ranks) == 1 and asked.features == "auto" and not asked.task else ()
+    for name in forms if max(one.rank_ for one in learnt.values()) > max(ranks, default=0) else ():
+        with contextlib.suppress(InvalidDataError):
+            other = _learnt(uc.LearntConstraint(name), *samples)
+            if max(one.rank_ for one in other.values()) <= max(ranks):
+                return other
+    return learnt
 
 
 def _of_demonstration(output: str, name: str) -> str:
@@ -316,7 +342,7 @@ class Named(NamedTuple):
     @property
     def each(self) -> list[tuple[str, str]]:
         """Name and mechanism of each, where they differ."""
-        open_ = ["undecided: " * (kind == "undecided") for kind in self.found.candidates[0].kinds]
+        open_ = [f"{kind}: " * (kind in ("undecided", "held")) for kind in self.found.candidates[0].kinds]
         told = [doubt + one.sentence for doubt, one in zip(open_, self.held, strict=True)]
         return list(zip(self.names, told, strict=True)) if len(told) > 1 else []
 
@@ -329,6 +355,7 @@ class Named(NamedTuple):
         apart = [
             name for name, one in zip(self.names, self.held, strict=False) if sum(map(one.parallel, self.held)) < 2
         ]
+        apart = [] if self.found.candidates[0].over_free else apart  # of each its kind says that
         free = f"Maybe free, as no other has an axis of that direction: {listed(apart)}."
         said = [f"{known}: {self.found.summary} ({meant}).", *([f"{doubt[0].upper()}{doubt[1:]}."] if doubt else [])]
         return [*said, free] if doubt and 0 < len(apart) < len(self.held) else said

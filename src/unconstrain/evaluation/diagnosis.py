@@ -25,6 +25,7 @@ from .sentences import CONSTRAINED as CONSTRAINED
 from .sentences import COUNTED as COUNTED
 from .sentences import FREE as FREE
 from .sentences import about_choice as about_choice
+from .sentences import about_freedom as about_freedom
 from .sentences import about_suspects as about_suspects
 from .sentences import in_words as in_words
 from .sentences import looks

@@ -41,7 +41,7 @@ def sentences(found: Diagnosis, states: Sequence[str], actions: Sequence[str], u
         _about_noise(found, f" {unit}".rstrip()),
         about_choice(found.method, found.candidates),
         _about_regions(found, states, actions),
-        _about_freedom(found),
+        about_freedom(found),
         *about_suspects(found.suspects),
     ]
 
@@ -141,18 +141,26 @@ def _least_shown(region: Region, states: Sequence[str], actions: Sequence[str]) 
 
 def looks(free: float, told: float, flat: bool) -> str:
     """How one looks by its mean probability of a free sample, the share of its samples that three tell, and a plane."""
-    if told < PARTLY:
-        return "untold"
-    return "constrained" if free < CONSTRAINED else "flat" if flat else "free" if free > FREE else "unsure"
+    if told < PARTLY or flat:
+        return "constrained" if told >= PARTLY and free < CONSTRAINED else "flat" if flat else "untold"
+    return "constrained" if free < CONSTRAINED else "free" if free > FREE else "unsure"
 
 
-def _about_freedom(found: Diagnosis) -> str:
-    said = f"{percent(found.free_share)} of the samples look free: nothing that shows above the noise held them"
+def about_freedom(found: Diagnosis) -> str:
+    """What looks free, and how demonstrations look."""
+    many = Counter(one.looks for one in found.movements)
+    others = [one for one in found.movements if one.looks != "flat"]
+    look = ", ".join(f"{many[how]} {words}" for how, words in LOOKS.items() if many[how])
+    look = f"How {counted(len(found.movements), 'demonstration')} look: {look}."
+    if not others:
+        said = "No sample is said to be free: each demonstration looks held, by a plane of its own all along"
+        return f"{said}; a short free stroke may, too. {look}"
+    free = sum(one.samples * (one.free or 0.0) for one in others) / sum(one.samples for one in found.movements)
+    share = free if len(others) < len(found.movements) else found.free_share
+    said = f"{percent(share)} of the samples look free: nothing that shows above the noise held them"
     if found.undecided_share >= LITTLE:
         said += f". Of {percent(found.undecided_share)} the recordings cannot tell: they were free or always held in "
         said += "the same way, which looks alike; demonstrations held in another way would tell"
     if found.free is None:
         return f"{said}. That is of the samples that the policy was fitted to."
-    many = Counter(one.looks for one in found.movements)
-    told = ", ".join(f"{many[how]} {words}" for how, words in LOOKS.items() if many[how])
-    return f"{said}. How {counted(len(found.movements), 'demonstration')} look: {told}."
+    return f"{said}. {look}"

@@ -128,7 +128,8 @@ def _freedom(found: Diagnosis) -> html.Markup:
         return html.paragraph("The policy was fitted to other demonstrations.")
     told = [one for one in found.movements if one.looks in diagnosis.COUNTED]
     if not (shown := told[:MOST_MOVEMENTS]):
-        return html.paragraph("Of no demonstration this can be told; the sentences above say why.")
+        said = "Of no demonstration this can be told by how free its samples look."
+        return html.paragraph(f"{said} {diagnosis.about_freedom(found)}")
     free = [one.free or 0.0 for one in shown]
     picture = figures.bars([one.name for one in shown], {"hybrid": free}, title="", label="probability of being free")
     picture.axes[0].set_ylim(0.0, 1.0)

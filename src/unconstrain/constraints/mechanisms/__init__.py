@@ -1,5 +1,6 @@
 """Mechanisms with names: found in recorded positions, compared by evidence."""
 
+from .identify import LIKELY as LIKELY
 from .identify import identify as identify
 from .kinds import restored as restored
 from .track import winding as winding

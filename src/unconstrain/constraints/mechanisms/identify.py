@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import factorial, log, prod
 
 import numpy as np
@@ -33,6 +33,9 @@ SMALLEST_MOVEMENT = 1e-12
 LIKELY = 20.0
 """Odds from which one kind is called decided."""
 
+BEYOND = 4.0
+"""Who spreads by so many times the usual noise in each direction moves there: noise that lasts looks free, too."""
+
 NEAR = 0.15
 """A path is near a circle that it leaves by less than this share of the radius."""
 
@@ -50,12 +53,15 @@ class Candidate(Shown):
         Standard deviation from them in each direction that they hold; NaN where they hold none, or kinds differ.
     odds : tuple of float
         Of the kind of each against the next, where kinds differ; else empty.
+    over_free : tuple of float
+        By how much the log evidence of each is above that of nothing held, where some are free; else empty.
     """
 
     mechanisms: tuple[Mechanism, ...]
     log_evidence: float
     noise: float
     odds: tuple[float, ...] = ()
+    over_free: tuple[float, ...] = ()
 
     @property
     def kind(self) -> str:
@@ -64,9 +70,11 @@ class Candidate(Shown):
 
     @property
     def kinds(self) -> list[str]:
-        """Of each mechanism; undecided where that is, or a radius is not known."""
+        """Of each mechanism; undecided where that is, or a radius is not known; held, if only that is, beside free."""
         told = zip(self.odds or len(self.mechanisms) * (LIKELY,), self.mechanisms, strict=True)
-        return ["undecided" if odds < LIKELY or one.vague else one.kind for odds, one in told]
+        kinds = ["undecided" if odds < LIKELY or one.vague else one.kind for odds, one in told]
+        held = [lead >= log(LIKELY) for lead in self.over_free or len(kinds) * (0.0,)]
+        return ["held" if sure and kind == "undecided" else kind for sure, kind in zip(held, kinds, strict=True)]
 
     @property
     def free(self) -> int:
@@ -150,7 +158,7 @@ class Identification(Shown):
     @property
     def decided(self) -> bool:
         """Whether a kind is likely enough to speak of, that of each where they differ, and each radius known at all."""
-        return self.odds >= LIKELY and "undecided" not in self.candidates[0].kinds
+        return self.odds >= LIKELY and not {"undecided", "held"} & {*self.candidates[0].kinds}
 
     @property
     def sentence(self) -> str:
@@ -241,9 +249,15 @@ def identify(
     every = _fits(track)
     times = [min(max(fit.time for fit in fits) for fits in one.values() if fits[0].mechanism.count) for one in every]
     time, white = min(times[0], max(times[1:] or times)), noise_by_differences(track.positions, track.groups)
-    found = [(fits, log_evidences(fits, time, white)) for fits in every]
+    twice = zip([*every, *every[1:]], [*len(every) * [time], *times[1:]], strict=True)
+    found = [(fits, log_evidences(fits, each, white)) for fits, each in twice]
     whole, *alone = ([_candidate(one[key], worth[key], scale, origin, unit) for key in one] for one, worth in found)
-    ranked = tuple(sorted([*whole, *_mixtures(whole, alone)], key=lambda one: -one.log_evidence))
+    alone, own = alone[: len(every) - 1], alone[len(every) - 1 :]
+    mixed = _mixtures(whole, own if (leads := _free(own)) else alone)
+    free = next(one.log_evidence for one in whole if one.kind == "free")
+    most = {kind: free - lead for kind, lead in leads.items()}  # where free ones end on one cycle, it seems to hold all
+    whole = [replace(one, log_evidence=min(one.log_evidence, most.get(one.kind, np.inf))) for one in whole]
+    ranked = tuple(sorted([*whole, *mixed], key=lambda one: -one.log_evidence))
     places = origin + scale * track.positions
     said = [] if pushed is None or ranked[0].odds else witnesses(ranked[0].mechanisms, places, pushed, track.groups)
     steps = [np.diff(one.positions, axis=0) for one in track.demonstrations]
@@ -321,7 +335,18 @@ def _mixtures(whole: list[Candidate], alone: list[list[Candidate]]) -> list[Cand
     gains = {each: sum(lead[each.kind] for lead in leads) for each in whole if len(each.mechanisms) == len(alone)}
     best = min(gains, key=lambda each: gains[each])
     price = log(factorial(len(alone)) // prod(map(factorial, counts.values())) * len(leads[0]) ** (len(counts) - 1))
-    return [Candidate(tuple(one.mechanisms[0] for one in own), best.log_evidence + gains[best] - price, np.nan, odds)]
+    told = best.log_evidence + gains[best] - price, np.nan, odds, tuple(lead["free"] for lead in leads)
+    return [Candidate(tuple(one.mechanisms[0] for one in own), *(told if "free" in counts else told[:-1]))]
+
+
+def _free(alone: list[list[Candidate]]) -> dict[str, float]:
+    """Lead on each kind of those that alone are free, and move by more than noise every way; empty without any."""
+    held = [sorted((one for one in found if one.kind != "free"), key=lambda one: -one.log_evidence) for found in alone]
+    usual = BEYOND * float(np.median([first.noise for first, *_ in held] or [0.0]))
+    wide = [min(one.noise for one in found if one.kind in ("line", "plane")) > usual for found in held]
+    told = [(*_own(found), moves) for found, moves in zip(alone, wide, strict=True)]
+    leads = [leads for own, odds, leads, moves in told if moves and own.kind == "free" and odds >= LIKELY]
+    return {kind: sum(lead[kind] for lead in leads) for kind in leads[0]} if leads else {}
 
 
 def _candidate(fits: list[Fit], evidence: float, scale: float, origin: Array, unit: str) -> Candidate:
