@@ -269,7 +269,10 @@ def test_a_cycle_that_was_not_shown_is_refused_with_what_shows_one(tmp_path):
     turn = np.linspace(0, 2 * np.pi, 81)
     write(tmp_path / "round.csv", "t,x,y", np.column_stack([t, 50 * np.cos(turn), 50 * np.sin(turn)]))
     said = refused("fit", tmp_path, *READ, "--guided", "cycle", "-o", tmp_path / "p.npz")
-    assert "record whole rounds, or learn from the 1 alone that make one (round); or guide it to a goal" in said
+    assert (
+        "record whole rounds, or learn from the 1 alone that make a cycle (--episodes round); or guide it to a goal"
+        in said
+    )
 
 
 @pytest.mark.parametrize(("seconds", "doubted"), [(1.9, True), (6.0, False)])
