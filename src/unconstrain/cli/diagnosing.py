@@ -93,11 +93,11 @@ def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequenc
     ]  # fmt: skip
     print_table(head, rows)
     click.echo(
-        "told: share of samples at which all tell the policy, to a tenth of a typical action or to noise below one."
+        "told: share of samples there at which all tell the policy: what they leave open is at most a tenth of a"
     )
-    click.echo(
-        "by three: the same whichever two are left out, so that it hangs on no one or two, as uncertainty() says."
-    )
+    click.echo("  typical action, or below noise, if that is below a typical action (lengths over the coordinates).")
+    click.echo("by three: the same whichever two are left out, so that it hangs on no one or two; in Python")
+    click.echo("  'undetermined' and 'from_noise' of policy.uncertainty(states).")
     click.echo("spread: how far it may be off along 'leave free', with any two left out; 100% is a typical action.")
     click.echo("  Large although all tell the policy, it hangs on one or two demonstrations, which others may confirm.")
     click.echo("shown by: demonstrations that moved along 'leave free' in this region.")

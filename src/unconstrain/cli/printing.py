@@ -101,7 +101,7 @@ def of_option(name: str) -> Iterator[None]:
     except (SettingError, InvalidDataError) as error:
         said, alone = re.sub(r"^[a-z_]+: ", "", str(error)), options_in(str(error)).get("--episodes")
         more = ["--episodes", alone or "", name, "auto", "-o", click.get_current_context().params.get("output", "")]
-        said += f"\n  {next_command('fit', *more, without=['to', 'episodes'])}" if alone else ""
+        said += f" These alone: {next_command('fit', *more, without=['to', 'episodes'])}" if alone else ""
         raise type(error)(f"{name}: {said}") from None
 
 

@@ -91,10 +91,9 @@ def _missed(judged: Any, moving: Any, demonstrations: Sequence[uc.Demonstration]
     """A verdict with what a policy misses where it predicts, what noise makes of that, and what it learnt from."""
     share, noise = explained(moving, demonstrations), uc.evaluation.metrics.missed_for_noise(moving, demonstrations)
     judged = judged._replace(trust=judged.trust and f"{judged.trust} It {uc.evaluation.verdicts.misses(share, noise)}.")
-    said = (
-        f"it learnt from {len(learnt) - 1} of {len(learnt) - 1 + len(demonstrations)} demonstrations, which are scored "
-    )
-    return uc.evaluation.verdicts.doubted(judged, f"{said}apart: this is of the others alone") if learnt else judged
+    seen = len(learnt) - 1
+    said = f"it learnt from {seen} of {seen + len(demonstrations)} demonstrations: scored apart, this is of the others"
+    return uc.evaluation.verdicts.doubted(judged, said) if learnt else judged
 
 
 def _print_scores(verdict: Any, rows: Any, whole: dict[str, Any], left: dict[str, list[str]], ran: str) -> None:

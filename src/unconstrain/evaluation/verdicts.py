@@ -381,7 +381,7 @@ def of_replays(found: Verdict, said: str, strays: Sequence[str], starts: str = "
     )
 
 
-def moves(extents: Array, paces: Array, lasts: Sequence[float] | Array = ()) -> tuple[str, list[str]]:
+def moves(extents: Array, paces: Array, lasts: Any = ()) -> tuple[str, list[str]]:
     """How runs move, the rest of a sentence, empty without any; and in what they stray.
 
     ``extents`` and ``paces`` are size and turns of each run over those of its demonstration, NaN where there are none,
@@ -404,9 +404,7 @@ def moves(extents: Array, paces: Array, lasts: Sequence[float] | Array = ()) -> 
     return (" and ".join(said) if said else f"it {nearly}keeps {kept}" * bool(kept)), [*dict.fromkeys(strays)]
 
 
-def size_and_pace(
-    extents: Array, paces: Array, lasts: Sequence[float] | Array = (), of: str = "", apart: str = ""
-) -> str:
+def size_and_pace(extents: Array, paces: Array, lasts: Any = (), of: str = "", apart: str = "") -> str:
     """Figures of :func:`moves`, ``of`` some, if not all, and how far ``apart`` from recorded states, with its unit."""
     measured, many = _measured(extents, paces, lasts), len(extents)
     told = ", ".join(f"{name} {_times(ratios)}" for name, (ratios, _) in measured.items())

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import Array, as_matrix, as_vector, check_at_least
-from ..base.display import Shown, listed
+from ..base.display import Shown
 from ..base.errors import InvalidDataError, SettingError
 from ..deployment import Exportable
 from ..models import ClosedForm, spaces
@@ -292,10 +292,10 @@ def _encircled(demos: Sequence[Demonstration], policy: Callable[[Array], Array])
 
 
 def _no_cycle(demos: Sequence[Demonstration]) -> SettingError:
-    alone = _rounds(demos)[1]
+    alone = f", or {advice}" if (advice := _rounds(demos)[1]) else ""
     return SettingError(
         f"orbit: demonstrations make {_around(demos):.2f} turns in the mean, and no cycle is near them. At least "
-        f"{_HALF:g} is needed, and {_ROUND:g} to be sure: record whole rounds{alone and f', or {alone}'}; or guide it to a goal, "
+        f"{_HALF:g} is needed, and {_ROUND:g} to be sure: record whole rounds{alone}; or guide it to a goal, "
         "or not at all."
     )
 
