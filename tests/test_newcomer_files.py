@@ -737,7 +737,7 @@ def test_what_was_learnt_from_in_blocks_is_known_again_whole(tmp_path, monkeypat
 
 
 def test_a_wrong_group_whose_rows_are_mixed_is_answered_with_the_column_that_tells_apart(tmp_path):
-    rows = [[*row, int(row[0][1:]) % 2] for row in trials(1, 2, 3, 4)]
+    rows = [[int(name[1:]), *row, "rail" if int(name[1:]) % 2 else "free"] for name, *row in trials(1, 2, 3, 4)]
     file = write(tmp_path / "all.csv", "trial,t,x,y,kind", rows)
     how = ("--state", "x,y", "--by", "savgol", *LINEAR, "-o", tmp_path / "p.npz")
     said = refused("fit", file, "--group", "kind", *how)
