@@ -701,7 +701,7 @@ def test_score_knows_what_was_learnt_from_in_another_file_and_scores_it_apart(tm
     run("fit", write(tmp_path / "train.csv", head, trials(1, 2, 3, 4)), *how, "-o", tmp_path / "p.npz")
     mixed = write(tmp_path / "export.csv", head, trials(9, 2, 3, 5))
     ran = call("score", tmp_path / "p.npz", mixed)
-    assert "it learnt from 2 of 4 demonstrations: scored apart, this is of the others" in text(ran)
+    assert "it learnt from 2 of 4 demonstrations, scored apart: this judges the others" in text(ran)
     table = re.findall(r"^(s\d|learnt from|held out) ", ran.out, re.MULTILINE)
     assert table == ["s2", "s3", "learnt from", "s9", "s5", "held out"]
     found = json.loads(run("score", tmp_path / "p.npz", mixed, "--json"))

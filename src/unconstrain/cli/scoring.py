@@ -92,7 +92,7 @@ def _missed(judged: Any, moving: Any, demonstrations: Sequence[uc.Demonstration]
     share, noise = explained(moving, demonstrations), uc.evaluation.metrics.missed_for_noise(moving, demonstrations)
     judged = judged._replace(trust=judged.trust and f"{judged.trust} It {uc.evaluation.verdicts.misses(share, noise)}.")
     seen = len(learnt) - 1
-    said = f"it learnt from {seen} of {seen + len(demonstrations)} demonstrations: scored apart, this is of the others"
+    said = f"it learnt from {seen} of {seen + len(demonstrations)} demonstrations, scored apart: this judges the others"
     return uc.evaluation.verdicts.doubted(judged, said) if learnt else judged
 
 
