@@ -269,7 +269,10 @@ def test_a_cycle_that_was_not_shown_is_refused_with_what_shows_one(tmp_path):
     turn = np.linspace(0, 2 * np.pi, 81)
     write(tmp_path / "round.csv", "t,x,y", np.column_stack([t, 50 * np.cos(turn), 50 * np.sin(turn)]))
     said = refused("fit", tmp_path, *READ, "--guided", "cycle", "-o", tmp_path / "p.npz")
-    assert "record whole rounds, or learn from the 1 alone that make one (round); or guide it to a goal" in said
+    assert (
+        "record whole rounds, or learn from the 1 alone that make a cycle (--episodes round); or guide it to a goal"
+        in said
+    )
 
 
 @pytest.mark.parametrize(("seconds", "doubted"), [(1.9, True), (6.0, False)])
@@ -681,3 +684,129 @@ def test_a_verdict_says_in_words_what_is_not_as_it_should_be(tmp_path):
     assert "jumps to another place" in verdict
     assert "seam" not in verdict
     assert "seam: " in said  # which options and programs go by
+
+
+def trials(*numbers, seconds=3.0):
+    """Rows of trial, time and place, of winding movements to one place, each of a start of its own."""
+    times = np.arange(0.0, seconds, 0.02)
+    rows = []
+    for k in numbers:
+        turn = np.exp((-0.9 + 2.0j) * times + 1j * k) * (80.0 + 5.0 * k)
+        rows += [[f"s{k}", t, z.real, z.imag] for t, z in zip(times, turn, strict=True)]
+    return rows
+
+
+def test_score_knows_what_was_learnt_from_in_another_file_and_scores_it_apart(tmp_path):
+    head, how = "trial,t,x,y", ("--group", "trial", "--state", "x,y", "--by", "savgol", *LINEAR)
+    run("fit", write(tmp_path / "train.csv", head, trials(1, 2, 3, 4)), *how, "-o", tmp_path / "p.npz")
+    mixed = write(tmp_path / "export.csv", head, trials(9, 2, 3, 5))
+    ran = call("score", tmp_path / "p.npz", mixed)
+    assert "it learnt from 2 of 4 demonstrations, scored apart: this judges the others" in text(ran)
+    table = re.findall(r"^(s\d|learnt from|held out) ", ran.out, re.MULTILINE)
+    assert table == ["s2", "s3", "learnt from", "s9", "s5", "held out"]
+    found = json.loads(run("score", tmp_path / "p.npz", mixed, "--json"))
+    assert found["learnt_from"] == ["s2", "s3"]
+    assert [one["demonstration"] for one in found["rows"]] == ["s9", "s5"]
+    assert [one["demonstration"] for one in found["learnt"]] == ["s2", "s3", "learnt from"]
+    new = write(tmp_path / "new.csv", head, trials(9, 5))
+    alone = json.loads(run("score", tmp_path / "p.npz", new, "--json"))
+    assert (alone["learnt_from"], alone["learnt"]) == ([], [])
+    assert {**found["all"], "demonstration": "all"} == alone["all"]
+    assert "learnt from" not in text(call("score", tmp_path / "p.npz", new))
+    other = ("score", tmp_path / "p.npz", mixed, "--window", "0.3", "--json")  # as recorded, however it is prepared
+    assert json.loads(run(*other))["learnt_from"] == ["s2", "s3"]
+    notes = uc.storage.load_notes(tmp_path / "p.npz")
+    old = {name: note for name, note in notes.items() if name != "contents"}
+    uc.save(uc.load(tmp_path / "p.npz"), tmp_path / "old.npz", old)
+    assert json.loads(run("score", tmp_path / "old.npz", mixed, "--json"))["learnt_from"] == []
+    again = json.loads(run("score", tmp_path / "old.npz", tmp_path / "train.csv", "--json"))
+    assert again["learnt_from"] == ["s1", "s2", "s3", "s4"]
+
+
+def test_what_was_learnt_from_in_blocks_is_known_again_whole(tmp_path, monkeypatch):
+    rows = [
+        [t, z.real, z.imag] for k in range(3) for t, z in [(0.1 * j, (k + 1) * np.exp(0.1j * j)) for j in range(40)]
+    ]
+    table = np.array(rows)
+    file = write(tmp_path / "w.csv", "t,x,y,vx,vy", np.column_stack([table[:40], -table[:40, 1:]]))
+    monkeypatch.setattr("unconstrain.recordings.readers.text.BLOCK_ROWS", 7, raising=False)
+    stream = uc.Stream(file, uc.Recipe(states=("x", "y"), actions=("vx", "vy")))
+    assert len(list(stream)) >= 1
+    [recording] = uc.read(file)
+    assert stream.contents == [recording.content(stream.recipe).hexdigest()]
+
+
+def test_a_wrong_group_whose_rows_are_mixed_is_answered_with_the_column_that_tells_apart(tmp_path):
+    rows = [[int(name[1:]), *row, "rail" if int(name[1:]) % 2 else "free"] for name, *row in trials(1, 2, 3, 4)]
+    file = write(tmp_path / "all.csv", "trial,t,x,y,kind", rows)
+    how = ("--state", "x,y", "--by", "savgol", *LINEAR, "-o", tmp_path / "p.npz")
+    said = refused("fit", file, "--group", "kind", *how)
+    assert said.startswith("Column 'trial' has 4 values, a stroke each by its jumps: give --group trial. As it is: ")
+    shown = run("inspect", file, "--group", "kind")
+    assert re.search(r"^ +unconstrain inspect \S+all\.csv --group trial$", shown, re.MULTILINE)
+    sorted_ = run("fit", file, "--group", "kind", "--sort", *how)
+    assert re.search(r"^ +unconstrain inspect \S+all\.csv .*--sort$", sorted_, re.MULTILINE)
+    assert "several-in-one" not in text(call("fit", file, "--group", "trial", *how, "--force"))
+    halves = [[*row, int(row[0] > "s2")] for row in trials(1, 2, 3, 4)]  # each in one piece
+    assert "several-in-one" not in run(
+        "inspect", write(tmp_path / "halves.csv", "n,t,x,y,half", halves), "--group", "half"
+    )
+
+
+def test_a_page_of_several_files_is_called_by_how_many_they_are(tmp_path):
+    files = [write(tmp_path / f"w{k}.csv", "trial,t,x,y", trials(k)) for k in range(3)]
+    how = ("--state", "x,y", "--by", "savgol", "--variance", "inf", "-o", tmp_path / "d.html", "--force")
+    for given, title in ((files, "Diagnosis of w0.csv and 2 more"), (files[1:2], "Diagnosis of w1.csv")):
+        call("diagnose", *given, *how)
+        assert f"<title>{title}</title>" in (tmp_path / "d.html").read_text("utf-8")
+
+
+def test_a_cycle_drawn_from_few_whole_rounds_is_doubted_and_the_command_for_these_works(tmp_path):
+    turns = np.linspace(0.0, 2 * np.pi, 150)
+    rows = [[f"r{k}", 0.02 * j, 50 * np.cos(a + k), 50 * np.sin(a + k)] for k in range(3) for j, a in enumerate(turns)]
+    slow = 1.0 - (1.0 - np.linspace(0.0, 1.0, 150)) ** 3  # which come to rest in places of their own
+    rows += [
+        [f"r{k}", 0.02 * j, 50 * np.cos(a), 50 * np.sin(a)]
+        for k, part in enumerate((0.3, 0.55, 0.2), 3)
+        for j, a in enumerate(2.0 * k + part * turns[-1] * slow)
+    ]
+    file, how = write(tmp_path / "all.csv", "trial,t,x,y", rows), ("--state", "x,y", "--by", "savgol", *LINEAR)
+    ran = call("fit", file, *how, "--guided", "cycle", "-o", tmp_path / "all.npz")
+    assert ran.code == 0
+    said = text(call("certify", tmp_path / "all.npz"))
+    assert said.startswith("! ")
+    assert "But only 50% of the demonstrations that its cycle was drawn from go all the way round." in said
+    assert ". the " not in said
+    run("fit", file, *how, "--episodes", "r0,r1,r2", "--guided", "cycle", "-o", tmp_path / "three.npz")
+    said = text(call("certify", tmp_path / "three.npz"))
+    assert said.startswith("✔ ")
+    refusal = refused("fit", file, *how, "--guided", "auto", "-o", tmp_path / "auto.npz")
+    assert "learn from the 3 alone that make a cycle (--episodes r0,r1,r2), or pass --guided" in refusal
+    command = refusal.partition(" These alone: unconstrain ")[2]
+    assert call(*shlex.split(command)).code == 0
+
+
+@pytest.mark.parametrize(
+    ("under", "said"), [(-0.06, "misses held-out motion by more than that"), (0.4, "explains 40%")]
+)
+def test_a_score_under_a_constraint_begins_with_what_a_held_robot_does(under, said):
+    found = uc.evaluation.verdicts.of_score(0.45, 3, under).said
+    assert found.startswith(f"Under the constraint given, as a held robot moves, the policy {said}")
+    assert found.endswith("Along the motion, it explains 45% of held-out motion, if none of it was learnt from: poor.")
+    assert uc.evaluation.verdicts.of_score(0.45, 3).said.startswith("The policy explains 45%")
+
+
+def test_what_diagnose_calls_told_is_what_it_says_of_uncertainty(tmp_path):
+    demos, rng = [], np.random.default_rng(0)
+    for k in range(3):
+        states = rng.uniform(-1.0, 1.0, (40, 2)) + 0.3 * k
+        demos.append(uc.Demonstration(states, -states + 0.05 * rng.standard_normal(states.shape)))
+    policy = uc.LocallyLinearPolicy(learner=uc.Robust()).fit_demonstrations(demos)
+    found, (states, actions, _) = uc.evaluation.diagnose(policy, demos), uc.stack(demos)
+    spread, typical = policy.uncertainty(states), np.sqrt((actions**2).sum(axis=1).mean())
+    open_, noise = (np.linalg.norm(one, axis=1) for one in (spread.undetermined, spread.from_noise))
+    told = (open_ <= 0.1 * typical) | ((open_ < noise) & (noise < typical))
+    assert found.states_determined == pytest.approx(told.mean())
+    doubt = uc.evaluation.verdicts.of_diagnosis(found).doubt
+    held = sum(one.samples for one in found.regions if one.together < 0.7) / len(states)
+    assert (f"(these hold {held:.0%} of the states)" in doubt) == (held > 0)

@@ -119,11 +119,34 @@ def test_the_page_of_a_fit_shows_and_says_how_large_its_ovals_are(folder, browse
     assert run_ / done == pytest.approx(size, abs=0.15)
 
 
-def test_a_policy_that_leaves_the_finite_numbers_does_not_pass_in_silence(folder):
+def test_a_policy_that_runs_away_is_told_by_when_and_from_where_and_has_no_size(folder):
     ran = judged(folder, pace=-500.0)
-    assert (ran.medians, ran.in_figures) == (None, "")
+    assert ran.in_figures == ""
+    assert {name: ran.medians[name] for name in ("extent", "apart")} == {"extent": None, "apart": None}
+    assert [*ran.medians["away"]] == ["held_3", "held_4", "held_5"]
+    assert all(0.0 < seconds < 8.0 for seconds in ran.medians["away"].values())
     assert ran.verdict.mark is Mark.DOUBTFUL
-    assert "But run from the same starts, it leaves the finite numbers." in ran.verdict.said
+    said = "But run from the same starts, it runs away, to more than 10 times the extent of what was recorded, from"
+    assert f"{said} 'held_3' (after {ran.medians['away']['held_3']:.2g} s), 'held_4' (after" in ran.verdict.said
+    assert ran.verdict.doubt.startswith("Its way over time.")
+    extent = np.ptp(np.vstack([one.done.states for one in ran.runs]), axis=0)
+    assert max(np.abs(one.run.states).max() for one in ran.runs) < 11 * np.linalg.norm(extent)  # as pages draw it
+
+
+def test_who_stays_has_a_size_though_others_run_away(tmp_path):
+    class Leaving(Ovals):
+        def __call__(self, states):
+            return np.where(np.asarray(states)[:, 2:] > 40.0, 5.0 * np.asarray(states), super().__call__(states))
+
+    for seed, (name, above) in enumerate((("near", 0.0), ("near_too", 0.0), ("far", 90.0)), 3):
+        write(tmp_path / f"{name}.csv", HEAD, oval(seed) + np.array([0.0, 0.0, 0.0, above]))
+    recipe = uc.Recipe(states=("x", "y", "z"), differentiate="savgol")
+    demos = uc.prepare(uc.read(str(tmp_path / "*.csv")), recipe)
+    ran = replayed(Verdict(Mark.GOOD, "Good."), Leaving(), demos, recipe, None, MM)
+    assert [*ran.medians["away"]] == ["far"]
+    assert ran.medians["extent"] == pytest.approx(1.0, abs=0.05)
+    assert re.search(r"it runs away, .* from 'far' \(after \S+ s\); else it keeps size and pace\.", ran.verdict.said)
+    assert re.match(r"of those that stay, size (0\.9|1\.0)\d times", ran.in_figures)
 
 
 def test_a_cycle_that_shrinks_is_told_by_its_last_round(folder):
@@ -538,7 +561,9 @@ def test_where_some_demonstrations_alone_are_run_it_is_said_how_many_and_why(fol
     told = "for 4 of 5 demonstrations that look flat (on a line, in a plane), as what was held and short strokes do, "
     said = " ".join(run("fit", *held, bent, *asked).split())
     assert f"Run from the same starts: {told}size" in said
-    assert re.search(r"un from the same starts, [^.]*, as far as compared \(4 of 5 demonstrations\)\.", said)
+    assert re.search(
+        r"un from the same starts, [^.]*, as far as compared \(4 of 5 demonstrations, which look flat; what held", said
+    )
     assert f" from the same starts {told}size" in " ".join(run("info", tmp_path / "p.npz").split())
     assert f"Run from the same starts: {told}size" in " ".join(run("score", tmp_path / "p.npz", *held, bent).split())
     said = " ".join(run("fit", *held, *asked).split())

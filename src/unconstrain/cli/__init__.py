@@ -291,7 +291,7 @@ def fit(
     refuse_warnings(reading["strict"])
     found = {TOLD: told, LOST: judged.lost, NOISE: judged.noise_alone, MARK: judged.verdict.mark.name.lower()}
     found |= {RAN: judged.ran or None, MOVES: judged.moves or None} | ({GUIDE: judged.guides} if to is None else {})
-    uc.save(moving, output, provenance(paths, stream.recipe, stream.first, **reading) | found)
+    uc.save(moving, output, provenance(paths, stream.recipe, stream.first, contents=stream.contents, **reading) | found)
     say_written(_reported(moving, stream, report, output, judged), judged.to_json() if as_json else None)
 
 

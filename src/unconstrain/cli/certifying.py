@@ -9,7 +9,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import unit_of
+from ..base.display import percent, unit_of
 from ..base.errors import ModelFileError
 from .endings import NOT_GUARANTEED
 from .informing import GUIDE, LOST, explained_by
@@ -60,12 +60,14 @@ def _judged(policy: str, stored: Any, found: uc.motion.certificate.Certificate) 
         return verdicts.Verdict(verdicts.Mark.BAD, said, next=then)
     promise, away, checked = found.said.partition("A constraint that moves or is not told")
     far = "'unconstrain score' says how near it keeps to recordings."
-    far = far if notes.get(LOST) is None else explained_by(stored, notes).said.replace("The", "the", 1)
-    far = f"That it moves as demonstrated is not guaranteed: {far}"
+    far = far if notes.get(LOST) is None else explained_by(stored, notes).said
+    far = f"That it moves as demonstrated is not guaranteed: {far[0].lower()}{far[1:]}"
     doubt = f"{away}{checked.partition(' Checked at')[0]} {far}".lstrip()
     then = f"unconstrain export {shlex.quote(policy)} -o policy.c"
-    said = f"{policy}: guaranteed. {unit}"
-    return verdicts.Verdict(verdicts.Mark.GOOD, said, promise.strip(), doubt, then)
+    judged = verdicts.Verdict(verdicts.Mark.GOOD, f"{policy}: guaranteed. {unit}", promise.strip(), doubt, then)
+    whole = getattr(getattr(stored, "aim_", None), "whole", 1.0)
+    said = f"only {percent(whole)} of the demonstrations that its cycle was drawn from go all the way round"
+    return judged if whole > 0.5 else verdicts.doubted(judged, said)
 
 
 def _learnt_at(policy: Any) -> Any:

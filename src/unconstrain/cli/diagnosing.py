@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import click
@@ -71,7 +70,7 @@ def diagnose(
     if report is not None:
         from ..pages.diagnosis import diagnosis_page
 
-        title = f"Diagnosis of {Path(files[0]).name}"
+        title = f"Diagnosis of {paths[0].name}{f' and {len(paths) - 1} more' * (len(paths) > 1)}"
         write(report, diagnosis_page(found, demonstrations, title, *recipe.labels(first.units), verdict))
         click.echo(f"report: {report}", err=as_json)
 
@@ -93,8 +92,12 @@ def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequenc
         for one in shown
     ]  # fmt: skip
     print_table(head, rows)
-    click.echo("told: share of samples there at which all tell the policy, to a tenth of a typical action or to noise.")
-    click.echo("by three: the same whichever two are left out, so that it hangs on no one or two.")
+    click.echo(
+        "told: share of samples there at which all tell the policy: what they leave open is at most a tenth of a"
+    )
+    click.echo("  typical action, or below noise, if that is below a typical action (lengths over the coordinates).")
+    click.echo("by three: the same whichever two are left out, so that it hangs on no one or two; in Python")
+    click.echo("  'undetermined' and 'from_noise' of policy.uncertainty(states).")
     click.echo("spread: how far it may be off along 'leave free', with any two left out; 100% is a typical action.")
     click.echo("  Large although all tell the policy, it hangs on one or two demonstrations, which others may confirm.")
     click.echo("shown by: demonstrations that moved along 'leave free' in this region.")

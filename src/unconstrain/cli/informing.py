@@ -42,8 +42,8 @@ OF, HELD_BY, SHOWN, WHERE, WOUND = "of", "held by", "shown by positions", "least
 NAMED = "named, but not held to"
 """Note of the mechanism that positions may keep to, where the directions that were learnt are followed all the same."""
 
-ENDS = 2**16
-"""Bytes at either end of a file by which it is known again."""
+CONTENTS, ENDS = "contents", 2**16
+"""Note of what each demonstration is known again by, and bytes at either end of a file by which that is."""
 
 
 def provenance(paths: Iterable[str | Path], recipe: uc.Recipe, first: uc.Recording, **reading: Any) -> dict[str, Any]:
@@ -55,6 +55,7 @@ def provenance(paths: Iterable[str | Path], recipe: uc.Recipe, first: uc.Recordi
         "units": recipe.units(first.units),
         "sources": [Path(path).name for path in sources],
         "digests": [*map(digest_of, sources)],
+        CONTENTS: reading.get(CONTENTS, []),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "made with": f"unconstrain {uc.__version__}",
     }
@@ -71,16 +72,17 @@ def digest_of(path: Path) -> str:
 
 
 def learnt_from(
-    policy: uc.Policy | uc.Guided, notes: Mapping[str, Any], recordings: Sequence[uc.Recording]
+    policy: uc.Policy | uc.Guided, notes: Mapping[str, Any], recordings: Sequence[uc.Recording], recipe: uc.Recipe
 ) -> list[str] | None:
-    """Which recordings a policy learnt from, by their files and names; None where it does not say from what it did."""
-    sources = notes.get("digests")
+    """Which recordings, of columns of a recipe, a policy learnt from, by content or file and name; None if unknown."""
+    sources, contents = notes.get("digests"), notes.get(CONTENTS)
     learnt = [str(name).partition("/") for name in innermost(policy).training_.split.fold_of]
-    if not sources or not learnt:
+    if not contents and not (sources and learnt):
         return None
-    known = {(sources[int(number)], name) for number, _, name in learnt if number.isdecimal()}
+    known = {(sources[int(number)], name) for number, _, name in learnt if number.isdecimal()} if sources else ()
     digests = {file: digest_of(Path(file)) for file in {one.file for one in recordings}}
-    return [one.name for one in recordings if (digests[one.file], one.name) in known]
+    same = {one.name for one in recordings if contents and one.content(recipe).hexdigest() in contents}
+    return [one.name for one in recordings if one.name in same or (digests[one.file], one.name) in known]
 
 
 @click.command(epilog="\b\nExample:\n  unconstrain info wipe.npz --json")
@@ -92,7 +94,7 @@ def info(file: str, as_json: bool) -> None:
     A policy, guided or not, or a constraint.
     """
     held, notes = loaded(file, uc.Policy | uc.LearntConstraint | uc.Guided), uc.storage.load_notes(file)
-    inner = ("recipe", "units", "digests", GUIDE, MARK, NOISE, MOVES, HELD_BY, SHOWN, WHERE, WOUND)
+    inner = ("recipe", "units", "digests", CONTENTS, GUIDE, MARK, NOISE, MOVES, HELD_BY, SHOWN, WHERE, WOUND)
     rest = {name: value for name, value in notes.items() if name not in inner}
     verdict = to_copy(verdict_of(held, notes), file, notes)
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held, notes), **rest}

@@ -186,7 +186,7 @@ def _about(seen: Seen) -> Iterator[str]:
     """What the policy and the constraint that are drawn are of."""
     count = len(seen.demonstrations)
     if seen.policy is not None:
-        known = learnt_from(seen.policy, seen.notes, seen.recordings)
+        known = learnt_from(seen.policy, seen.notes, seen.recordings, seen.recipe)
         if known is not None and len(known) < count:
             named = f", {listed(known, 4)}" if known else ""
             yield f"policy: learnt from {len(known) or 'none'} of these {counted(count, 'demonstration')}{named}."

@@ -20,7 +20,7 @@ from ..base.display import counted, innermost, listed, percent, unit_of
 from ..base.errors import InvalidDataError, ModelFileError, ReadError, SettingError, WriteError
 from .endings import REFUSED, ending
 from .reading import next_command, said_recipe, say_left, to_copy
-from .speaking import as_typed, meant_of
+from .speaking import as_typed, meant_of, options_in
 from .terminal import plain_output
 
 if TYPE_CHECKING:
@@ -98,8 +98,11 @@ def of_option(name: str) -> Iterator[None]:
     """Let settings that cannot be begin with the option that they came from."""
     try:
         yield
-    except SettingError as error:
-        raise SettingError(f"{name}: {re.sub(r'^[a-z_]+: ', '', str(error))}") from None
+    except (SettingError, InvalidDataError) as error:
+        said, alone = re.sub(r"^[a-z_]+: ", "", str(error)), options_in(str(error)).get("--episodes")
+        more = ["--episodes", alone or "", name, "auto", "-o", click.get_current_context().params.get("output", "")]
+        said += f" These alone: {next_command('fit', *more, without=['to', 'episodes'])}" if alone else ""
+        raise type(error)(f"{name}: {said}") from None
 
 
 def say_surveys(surveys: Sequence[Any]) -> None:
@@ -164,7 +167,7 @@ class Judged(NamedTuple):
     """How much of the motion a policy explains."""
 
     verdict: uc.evaluation.verdicts.Verdict
-    replayed: Mapping[str, float | None] | None
+    replayed: Mapping[str, Any] | None
     ran: str
     moves: str
     demonstrations: int

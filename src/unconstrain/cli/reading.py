@@ -279,14 +279,16 @@ def of_files(recordings: Iterable[uc.Recording]) -> Iterator[None]:
         yield
     except (InvalidDataError, SettingError) as error:
         with suppress(UnconstrainError):
-            came = {(one.name, one.file): None for one in recordings}
+            came = {(one.name, one.file): one.remarks for one in recordings}
+            told = [one for remarks in came.values() for one in remarks if one.code == "several-in-one"]
             named = max((name for name, _ in came if str(error).startswith(f"'{name}'")), key=len, default="")
             if named and (files := {file: None for name, file in came if name == named and file}):
                 own = any(stem(file) == named for file in files)
                 title = " or ".join(files) if own else f"'{named}' of {' or '.join(files)}"
                 left_out = ",".join([*click.get_current_context().params["leave_out"], named])
                 leave = f" Or leave it out: --leave-out {shlex.quote(left_out)}" * (len(came) > len(files))
-                said = f"{title}{str(error)[len(named) + 2 :]}{getattr(error, 'cure', leave)}"
+                first = f"Column {told[0].column!r} {told[0].message} As it is: " if told else ""
+                said = f"{first}{title}{str(error)[len(named) + 2 :]}{getattr(error, 'cure', leave)}"
                 error.args = (said, *error.args[1:])
         raise
 
@@ -319,7 +321,8 @@ def to_copy(verdict: Any, policy: str, notes: Mapping[str, Any] | None = None, s
             lines[0] += f" GOAL: {counted(len(states), 'number')}, of {', '.join(states)}." if states else ""
         more = ["--guided", to] * bool(to) + ["-o", "guided.npz" if to else "policy.npz"]
         more = {"fit": more, "look": [policy]}.get(name, [])
-        own = next_command(name, *more, without=["to"]) if notes is None and name != "score" else ""
+        left = ["to", *["group"] * ("--group" in verdict.next)]  # another one is asked for
+        own = next_command(name, *more, without=left) if notes is None and name != "score" else ""
         files = [policy, "NEW.csv"] if name == "score" else read
         lines.append(own or shlex.join(["unconstrain", name, *files, *more]))
     return verdict._replace(next="\n".join(dict.fromkeys(lines)))

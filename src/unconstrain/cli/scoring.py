@@ -52,20 +52,20 @@ def score(
     with shown("reading"):
         demonstrations, recipe, recordings = prepared(files, reading, notes)
     refuse_warnings(reading["strict"])
-    states = uc.stack(demonstrations).states
+    states, known = uc.stack(demonstrations).states, learnt_from(learnt, notes, recordings, recipe)
     held = held_of(plane, constraint, recipe, states, learnt.n_outputs_, "one for each action")
     if (support_of(learnt, states) < uc.models.SUPPORTED).mean() > 0.5:
         click.echo(f"Note: {policy}: learnt far from most of these states: another task, or other units?", err=True)
     with shown("scoring"):
         short = [one.name for one in demonstrations if len(one) < LEAST]
         demonstrations, still = _moved(moving, _long_enough(demonstrations))
+        before, demonstrations = _learnt(moving, held, demonstrations, known or ())
         rows = [_scores(moving, held, [demo], demo.name) for demo in demonstrations]
-        whole = _scores(moving, held, demonstrations, "all")
+        whole = _scores(moving, held, demonstrations, "held out" if before else "all")
         planes = uc.evaluation.metrics.explained_in_planes(moving, demonstrations)
-    known = learnt_from(learnt, notes, recordings)
-    given = None if held is None else 1.0 - whole["ncpe"], None if known is None else len(known), notes.get(TOLD)
-    judged = verdicts.of_score(whole["explains"], len(demonstrations), *given)
-    judged = _missed(judged, moving, demonstrations) if whole["fast"] >= LEAST else verdicts.TOO_SLOW
+    given = None if held is None else 1.0 - whole["ncpe"], None if known is None else len(known) * (not before)
+    judged = verdicts.of_score(whole["explains"], len(demonstrations), *given, notes.get(TOLD))
+    judged = _missed(judged, moving, demonstrations, before) if whole["fast"] >= LEAST else verdicts.TOO_SLOW
     judged = verdicts.of_worst(judged, {one["demonstration"]: one["explains"] for one in rows if one["fast"] >= LEAST})
     judged = judged if held is not None else verdicts.of_planes(judged, planes, _motion(demonstrations))
     with shown("running it from the same starts"):
@@ -73,17 +73,27 @@ def score(
     judged = verdicts.of_unit(verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0)), _times(learnt, states))
     verdict = to_copy(judged, policy, notes)
     if not as_json:
-        _print_scores(verdict, rows, whole, {"hardly moved": still, "too short": short}, found.in_figures)
+        _print_scores(verdict, [*before, *rows], whole, {"hardly moved": still, "too short": short}, found.in_figures)
         return
-    told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known, "hardly_moved": still}
+    told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known, "learnt": before, "hardly_moved": still}
     more = {"too_short": short, "in_planes": _known(planes), "replayed": found.medians, "ran": found.in_figures}
     click.echo(json.dumps(told | more | {"verdict": verdict.to_json()}, indent=2))
 
 
-def _missed(judged: Any, moving: Any, demonstrations: Sequence[uc.Demonstration]) -> Any:
-    """A verdict with what a policy misses where it predicts, and what noise alone makes of that."""
+def _learnt(moving: Any, held: Any, of: list[uc.Demonstration], known: Sequence[str]) -> tuple[list[Any], Any]:
+    """Scores of what was learnt from, each and all, where others were held out; and these, or else all."""
+    old, new = ([one for one in of if (one.name in known) is seen] for seen in (True, False))
+    parts = *((one.name, [one]) for one in old), ("learnt from", old)
+    return ([_scores(moving, held, some, name) for name, some in parts], new) if old and new else ([], of)
+
+
+def _missed(judged: Any, moving: Any, demonstrations: Sequence[uc.Demonstration], learnt: Sequence[Any]) -> Any:
+    """A verdict with what a policy misses where it predicts, what noise makes of that, and what it learnt from."""
     share, noise = explained(moving, demonstrations), uc.evaluation.metrics.missed_for_noise(moving, demonstrations)
-    return judged._replace(trust=judged.trust and f"{judged.trust} It {uc.evaluation.verdicts.misses(share, noise)}.")
+    judged = judged._replace(trust=judged.trust and f"{judged.trust} It {uc.evaluation.verdicts.misses(share, noise)}.")
+    seen = len(learnt) - 1
+    said = f"it learnt from {seen} of {seen + len(demonstrations)} demonstrations, scored apart: this judges the others"
+    return uc.evaluation.verdicts.doubted(judged, said) if learnt else judged
 
 
 def _print_scores(verdict: Any, rows: Any, whole: dict[str, Any], left: dict[str, list[str]], ran: str) -> None:

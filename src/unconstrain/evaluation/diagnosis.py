@@ -157,8 +157,8 @@ class Diagnosis:
     directions_determined : float
         Share of them in which the data has more than half of the posterior precision.
     states_determined : float
-        Share of the recorded states at which the undetermined spread is below that from noise, or below a tenth of
-        the typical action.
+        Share of the recorded states at which the undetermined spread is at most a tenth of the typical action, or below
+        that from noise, where this is below the typical action: lengths over coordinates of ``policy.uncertainty``.
     told_together : float
         That, or if more the share at which all demonstrations together determine it, and one or two may be needed.
     free_share : float

@@ -129,28 +129,30 @@ def of_score(
 ) -> Verdict:
     """Judge how much of recordings that were not learnt from a policy explains; one is enough to see it fail.
 
-    ``under`` is the same under their constraint, 1 − nCPE, where that is known: then the smaller one is judged. Of
+    ``under`` is the same under their constraint, 1 − nCPE, said first where that is known; the smaller is judged. Of
     ``learnt`` of them, where that is known, the policy learnt; ``told`` is as ``determined`` in :func:`of_explained`,
     and makes any score doubtful where it is small: under the constraint given, too, others are not told.
     """
     mark, word = graded(share if under is None else min(share, under), told=told, under=under is not None)
     few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
-    least = "nothing" if under is not None and under < -1 else percent(under or 0)
-    known = "" if under is None else f", and {least} under the constraint given (1 − nCPE)"
+    who, motion = "The policy", "the motion" if learnt else "held-out motion"
+    if under is not None:
+        much = f"explains {percent(under)} of {motion}" if under >= 0 else f"misses {motion} by more than that varies"
+        who = f"Under the constraint given, as a held robot moves, the policy {much} (1 − nCPE). Along the motion, it"
     untold = of_untold(1 - told) if told is not None and told < MOSTLY else ""
     more = (
         f"Movement under other constraints{untold and f': {untold}'}. Noise, and motion faster or slower than learnt, "
     )
     more += "count as missed in nCPE."
     if learnt:
-        said = f"The policy {_explains(share, 'the motion')}{known}, but it learnt from {learnt} of "
+        said = f"{who} {_explains(share, motion)}, but it learnt from {learnt} of "
         said += f"{_count(demonstrations)}: a score on what was learnt from is too good."
         return Verdict(Mark.DOUBTFUL, said, next="Hold some out of the fit (--leave-out, --episodes), and score these.")
     unknown = ", if none of it was learnt from" if learnt is None else ""
     across = f"Across the motion: {untold}" if untold else "What constraints hid in these recordings, too"
     across += ". Only motion along the recorded actions is judged; what held these recordings, given with --plane or "
     across += "--constraint (one by one, if each was held in its own way), tells more: all directions that were free."
-    said, good = f"The policy {_explains(share)}{known}{unknown}: {word}.", mark is Mark.GOOD
+    said, good = f"{who} {_explains(share)}{unknown}: {word}.", mark is Mark.GOOD
     trust = "" if mark is Mark.BAD else "Movement like this, along the directions that were recorded."
     other = "'unconstrain diagnose' says what to record."
     then = f"Score it under other constraints ('unconstrain score').{few}" if good else other
@@ -243,8 +245,10 @@ def regions_left(found: Diagnosis) -> tuple[int, int]:
 def of_diagnosis(found: Diagnosis, first: str = "") -> Verdict:
     """Judge whether recordings tell the unconstrained policy; ``first`` is what to record, before the list of it."""
     share, count, (open_, few) = found.states_determined, len(found.movements), regions_left(found)
+    there = sum(one.samples for one in found.regions if one.together < PARTLY) / len(found.undetermined)
     doubt = f"{open_} of {len(found.regions)} regions, where all recordings leave a direction open: free, or "
-    doubt = f"{doubt}always held the same way, cannot be told there." if open_ else "States that nobody came near."
+    doubt = f"{doubt}always held the same way, cannot be told there (these hold {percent(there)} of the states)."
+    doubt = doubt if open_ else "States that nobody came near."
     hangs = f" {few} of {len(found.regions)} regions by one or two demonstrations alone." if few else ""
     if count < ENOUGH:
         said = f"No verdict: {_count(count)}; whether they were free cannot be told from fewer than {ENOUGH}."
@@ -360,8 +364,8 @@ def _part(where: NDArray[np.bool_], seconds: Array) -> str:
     return f"{percent(where.mean())} of the time, first at {seconds[int(where.argmax())]:.2f} s"
 
 
-LAST, DIVERGES = "last round over first", ("it leaves the finite numbers", ["size and pace"])
-"""A ratio of sizes, and :func:`moves` of what has no size."""
+LAST = "last round over first"
+"""A ratio of sizes."""
 
 _WRONG = {"size": ("too large", "too small", ""), "pace": ("too fast", "too slow", "the other way")}
 _WRONG[LAST] = "too large in the last round", "too small in the last round", ""
@@ -377,7 +381,7 @@ def of_replays(found: Verdict, said: str, strays: Sequence[str], starts: str = "
     )
 
 
-def moves(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> tuple[str, list[str]]:
+def moves(extents: Array, paces: Array, lasts: Any = ()) -> tuple[str, list[str]]:
     """How runs move, the rest of a sentence, empty without any; and in what they stray.
 
     ``extents`` and ``paces`` are size and turns of each run over those of its demonstration, NaN where there are none,
@@ -400,7 +404,7 @@ def moves(extents: Array, paces: Array, lasts: Sequence[float] = ()) -> tuple[st
     return (" and ".join(said) if said else f"it {nearly}keeps {kept}" * bool(kept)), [*dict.fromkeys(strays)]
 
 
-def size_and_pace(extents: Array, paces: Array, lasts: Sequence[float] = (), of: str = "", apart: str = "") -> str:
+def size_and_pace(extents: Array, paces: Array, lasts: Any = (), of: str = "", apart: str = "") -> str:
     """Figures of :func:`moves`, ``of`` some, if not all, and how far ``apart`` from recorded states, with its unit."""
     measured, many = _measured(extents, paces, lasts), len(extents)
     told = ", ".join(f"{name} {_times(ratios)}" for name, (ratios, _) in measured.items())

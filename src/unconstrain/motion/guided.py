@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import Array, as_matrix, as_vector, check_at_least
-from ..base.display import Shown, listed
+from ..base.display import Shown
 from ..base.errors import InvalidDataError, SettingError
 from ..deployment import Exportable
 from ..models import ClosedForm, spaces
@@ -286,15 +286,16 @@ def _encircled(demos: Sequence[Demonstration], policy: Callable[[Array], Array])
     """The cycle that was shown; strokes that do not go round, but straight on, show none."""
     try:
         with np.errstate(divide="ignore", invalid="ignore"):
-            return encircled(demos, policy)
+            return replace(encircled(demos, policy), whole=len(_rounds(demos)[0]) / len(demos))
     except InvalidDataError as error:
         raise _no_cycle(demos) from error
 
 
 def _no_cycle(demos: Sequence[Demonstration]) -> SettingError:
+    alone = f", or {advice}" if (advice := _rounds(demos)[1]) else ""
     return SettingError(
         f"orbit: demonstrations make {_around(demos):.2f} turns in the mean, and no cycle is near them. At least "
-        f"{_HALF:g} is needed, and {_ROUND:g} to be sure: record whole rounds{_rounds(demos)}; or guide it to a goal, "
+        f"{_HALF:g} is needed, and {_ROUND:g} to be sure: record whole rounds{alone}; or guide it to a goal, "
         "or not at all."
     )
 
@@ -304,17 +305,18 @@ def _around(demos: Sequence[Demonstration]) -> float:
     return float(abs(turns(demos).mean()))
 
 
-def _rounds(demos: Sequence[Demonstration]) -> str:
-    """Which demonstrations alone go round, if some do."""
+def _rounds(demos: Sequence[Demonstration]) -> tuple[list[str], str]:
+    """Which demonstrations go all the way round, and advice to learn from these alone, if only some do."""
     names = [one.name or str(k + 1) for k, one in enumerate(demos) if abs(turns(demos)[k]) >= _ROUND]
-    return f", or learn from the {len(names)} alone that make one ({listed(names, 8)})" * (0 < len(names) < len(demos))
+    alone = f"learn from the {len(names)} alone that make a cycle (episodes={(*names,)})"
+    return names, alone * (0 < len(names) < len(demos))
 
 
 def _given(demos: Sequence[Demonstration]) -> str:
     """What says where to, where demonstrations do not."""
-    alone = _rounds(demos)
-    cycle = alone or _around(demos) >= _HALF
-    return f"pass goal=, or orbit='shown' for a cycle{alone}" if cycle else "give it with goal="
+    names, alone = _rounds(demos)
+    cycle = "pass goal=, or orbit='shown' for a cycle" if names or _around(demos) >= _HALF else "give it with goal="
+    return ", or ".join(filter(None, (alone, cycle) if 2 * len(names) >= len(demos) else (cycle, alone)))
 
 
 def _descent(

@@ -68,6 +68,8 @@ class Orbit(Shown):
         B, 1/s.
     rate : float
         ω, rad/s.
+    whole : float
+        Share of the demonstrations it was drawn from that go all the way round.
 
     Examples
     --------
@@ -81,6 +83,7 @@ class Orbit(Shown):
     radius: float
     turn: Array
     rate: float
+    whole: float = 1.0
 
     @property
     def promise(self) -> str:

@@ -21,7 +21,7 @@ from ..risks import action_projection, project
 from . import figures, html
 from .diagnosis import unknown
 from .replays import GUIDES as GUIDES
-from .replays import Replay
+from .replays import Replay, bounded
 from .replays import guides as guides
 from .replays import replayed as replayed
 from .replays import retraced as retraced
@@ -187,12 +187,10 @@ def _reproduced(policy: Policy | Guided, demos: list[Demonstration], names: Sequ
     tilt = np.radians(TILT)
     normal = np.cos(tilt) * axes[:, 0] + np.sin(tilt) * axes[:, -1]
     step = float(np.median(np.diff(demo.times)))
-    runs = {}
+    runs, (moving, near) = {}, bounded(policy, stack(demos).states)
     for key, held in (("roll-out, free", None), ("roll-out, new plane", Plane(normal))):
-        try:
-            runs[key] = rollout(policy, demo.states[0], len(demo), step, held, least_support=0.0)
-        except InvalidDataError:  # it runs away
-            continue
+        run = rollout(moving, demo.states[0], len(demo), step, held, least_support=0.0)
+        runs[key] = run[near(run.states)]
     picture = _drawn([("observed", _thin(demo)), *runs.items()], names)
     keys = ("observed", *runs)
     caption = html.words("fit_rollout", name=demo.name, seconds=f"{step * len(demo):.3g}", tilt=f"{TILT:g}", runs=runs)

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Array
-from ..base.display import innermost, unit_of
-from ..base.errors import DivergedError, InvalidDataError, SettingError
+from ..base.display import innermost, listed, unit_of
+from ..base.errors import InvalidDataError, SettingError
 from ..evaluation import diagnosis, verdicts
 from ..models import spaces
 from ..motion import Guided, rollout
-from ..recordings import Demonstration
+from ..recordings import Demonstration, stack
 
 if TYPE_CHECKING:
     from ..policies import Policy
@@ -45,6 +46,9 @@ ROUNDS = 1.5
 PASSING = 0.2
 """Nearer to the middle than this share of the usual distance from it, noise turns what goes straight."""
 
+AWAY = 10.0
+"""Farther from the middle of demonstrations than this many times their extent, a run has no size: it ran away."""
+
 DRIFT = 0.2
 """Recorded actions are velocities of the states if, integrated, they miss their ways by less than this share: noise and
 a bias of a fifth of the speed do; another unit, order or sign do not."""
@@ -65,13 +69,14 @@ class Replay(NamedTuple):
     """Whether what held the demonstration is known: given, or seen as it is flat."""
     done: Demonstration
     run: Demonstration
+    away: float | None  # seconds until it goes beyond AWAY, where it ends; None where it stays
 
 
 class Replayed(NamedTuple):
-    """A verdict; of those whose constraint is known medians, or None; all that were run; figures and words for them."""
+    """A verdict; of known constraints medians, and seconds until some run "away", or None; all runs; figures, words."""
 
     verdict: verdicts.Verdict
-    medians: dict[str, float | None] | None
+    medians: dict[str, Any] | None
     runs: Sequence[Replay] = ()
     in_figures: str = ""
     in_words: str = ""
@@ -92,28 +97,30 @@ def replayed(
     ``held`` is their constraint, or None; ``units`` are those of columns. Those whose constraint is not known are run
     ``free``, or not at all. ``starts`` are those of which demonstrations, in words.
     """
-    try:
-        runs = replays(policy, demos, recipe, held, free)
-    except DivergedError:
-        judged = _advised(verdicts.of_replays(found, *verdicts.DIVERGES, starts), found, policy, demos)
-        return Replayed(judged, None, in_words=verdicts.DIVERGES[0])
+    runs = replays(policy, demos, recipe, held, free)
     known = [one for one in runs if one.held]
     if not known:
         why = "not compared, as what held these recordings is not known" if runs else unlike(demos, recipe)
         why = why and f" Its size and pace over time: {why}."
         return Replayed(found._replace(doubt=(found.doubt + why).strip()), None, runs)
-    extents, paces, lasts, apart = np.array([one[:4] for one in known]).T
-    said = f"{np.median(apart):.3g} {unit_of(recipe.labels(units)[0]) or '(unit of the states)'}"
+    gone = {one.done.name: one.away for one in known if one.away is not None}
+    extents, paces, lasts, apart = np.array([one[:4] for one in known if one.away is None]).reshape(-1, 4).T
+    said = f"{np.median(apart) if len(apart) else 0.0:.3g} {unit_of(recipe.labels(units)[0]) or '(unit of the states)'}"
     measured = {"extent": extents, "pace": paces, "last_round": lasts, "apart": apart}
     finite = {name: values[np.isfinite(values)] for name, values in measured.items()}
     told = {name: float(np.median(values)) if len(values) else None for name, values in finite.items()}
     alike = "" if held is not None else " that look flat (on a line, in a plane), as what was held and short strokes do"
-    (words, strays), of = verdicts.moves(extents, paces, lasts), ""
+    (words, strays), of = verdicts.moves(extents, paces, lasts), "of those that stay, " * bool(gone)
+    if gone:
+        named = listed([f"'{name}' (after {seconds:.2g} s)" for name, seconds in gone.items()], 4)
+        away = f"it runs away, to more than {AWAY:g} times the extent of what was recorded, from {named}"
+        words, strays = f"{away}{f'; else {words}' * bool(words)}", ["way", *strays]
     if len(known) < len(demos):
         some = f"{len(known)} of {len(demos)} demonstrations"
-        words, of = f"{words}, as far as compared ({some})", f"for {some}{alike}, "
+        why = ", which look flat; what held the others, if anything, is not known" * (held is None and len(runs) < MOST)
+        words, of = f"{words}, as far as compared ({some}{why})", f"for {some}{alike}, {of}"
     judged = _advised(verdicts.of_replays(found, words, strays, starts), found, policy, demos)
-    return Replayed(judged, told, runs, verdicts.size_and_pace(extents, paces, lasts, of, said), words)
+    return Replayed(judged, told | {"away": gone}, runs, verdicts.size_and_pace(extents, paces, lasts, of, said), words)
 
 
 def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Replayed:
@@ -164,13 +171,7 @@ def guides(policy: Policy | Guided, demos: Sequence[Demonstration]) -> str:
 def replays(
     policy: Policy | Guided, demos: Sequence[Demonstration], recipe: Recipe, held: Any = None, free: bool = True
 ) -> list[Replay]:
-    """Compare at most twenty demonstrations; none where :func:`unlike` says why not.
-
-    Raises
-    ------
-    DivergedError
-        If a run leaves the finite numbers.
-    """
+    """Compare at most twenty demonstrations; none where :func:`unlike` says why not."""
     chosen = [] if unlike(demos, recipe) else _moving(demos)
     chosen = chosen if free or held is not None else [one for one in chosen if diagnosis.flat(one.states)[0].any()]
     if not chosen:
@@ -183,12 +184,28 @@ def replays(
     task = held.target if getattr(held, "task", False) else None
     starts, steps = np.array([one.states[0] for one in chosen]), round(max(lasted) / dt) + 1
     own = [partial(_same, rows) for rows, _ in shapes] if held is None else held
-    runs = rollout(policy, starts, steps, dt, own, task=task, least_support=0.0)
+    moving, near = bounded(policy, stack(demos).states)
+    runs = rollout(moving, starts, steps, dt, own, task=task, least_support=0.0)
     cut = [run[: round(seconds / dt) + 1] for run, seconds in zip(runs, lasted, strict=True)]
     return [
-        _compared(one, run, along, held is not None or bool(rows.any()))
+        _compared(one, run, along, held is not None or bool(rows.any()), near(run.states))
         for one, run, (rows, along) in zip(chosen, cut, shapes, strict=True)
     ]
+
+
+def bounded(policy: Any, states: Array) -> tuple[Any, Callable[[Array], NDArray[np.bool_]]]:
+    """A policy that rests beyond :data:`AWAY` of states (N, n), and whether states (T, n) are nearer, (T,)."""
+    low, high = states.min(axis=0), states.max(axis=0)
+
+    def near(at: Array) -> NDArray[np.bool_]:
+        return np.asarray(np.linalg.norm(at - 0.5 * (low + high), axis=1) <= AWAY * np.linalg.norm(high - low))
+
+    def moving(at: Array, *under: Array) -> Array:
+        inside, own = near(at)[:, None], policy.under if under else policy
+        return np.where(inside, own(np.where(inside, at, 0.5 * (low + high)), *under), 0.0)
+
+    moving.under = moving if hasattr(policy, "under") else None  # type: ignore[attr-defined]
+    return moving, near
 
 
 def unlike(demos: Sequence[Demonstration], recipe: Recipe) -> str:
@@ -228,15 +245,16 @@ def _same(rows: Array, states: Array, _times: Array) -> Array:
     return np.broadcast_to(rows, (len(states), *rows.shape))
 
 
-def _compared(done: Demonstration, run: Demonstration, plane: Array, held: bool) -> Replay:
-    """As seen along two directions in rows, (2, n)."""
+def _compared(done: Demonstration, run: Demonstration, plane: Array, held: bool, near: NDArray[np.bool_]) -> Replay:
+    """As seen along two directions in rows, (2, n); it ends where it is not ``near``."""
+    away, run = None if near.all() else float(np.asarray(run.times)[near.argmin()]), run[near]
     both = done.states, run.states
     size = [float(np.sqrt(one.var(axis=0).sum())) for one in both]
     turns = [_turns((one - one.mean(axis=0)) @ plane.T) for one in both]
     pace = turns[1][-1] / turns[0][-1] if abs(turns[0][-1]) >= ROUNDS else np.nan
     lasting = [_lasting(one, done) for one, done in zip(both, turns, strict=True)]
     apart = cKDTree(done.states).query(run.states)[0].mean()
-    return Replay(size[1] / size[0], float(pace), lasting[1] / lasting[0], float(apart), held, done, run)
+    return Replay(size[1] / size[0], float(pace), lasting[1] / lasting[0], float(apart), held, done, run, away)
 
 
 def _turns(points: Array) -> Array:

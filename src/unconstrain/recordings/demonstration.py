@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from hashlib import blake2b
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -108,6 +109,12 @@ class Recording(Shown):
             cure = " Name those of this file with states= and actions=, or all of its columns with columns=."
             raise LackingError(said + cure * others)
         return self.values[:, [self._places[name] for name in names]]
+
+    def content(self, recipe: Any, begun: blake2b | None = None) -> blake2b:
+        """A digest of the states and actions of a recipe, to be known by; it goes on with ``begun``, of rows before."""
+        values = self.select((*(recipe.states or ()), *(recipe.actions or ()))) + 0.0  # no zero has a sign
+        (found := begun or blake2b(digest_size=8)).update(values.tobytes())
+        return found
 
     def resolve(self, names: Sequence[str]) -> tuple[str, ...]:
         """Columns that names, patterns (``joint_?``), ranges (``q1..q7``) and stems (``position``) mean, in order."""

@@ -103,6 +103,7 @@ class Stream:
         self._came: dict[str, None] = {}
         self._stamps: dict[Path, Stamp] = {}
         self._outlines: list[tuple[str, Outline | None]] = []
+        self.contents: list[str] = []  # of the recordings of a whole walk, Recording.content
 
     @cached_property
     def first(self) -> Recording:
@@ -192,7 +193,7 @@ class Stream:
 
     def _read(self) -> Iterator[tuple[str, Demonstration]]:
         by_rows = self.recipe.is_row_by_row
-        read = 0
+        read, contents = 0, dict[str, Any]()
         self._outlines.clear()  # of a walk that was left
         for number, path in enumerate(self.paths, start=self._first_file):
             before = Counter[str]()
@@ -201,12 +202,14 @@ class Stream:
                     if self._walked:  # it was said on the first walk
                         warnings.simplefilter("ignore", UserWarning)
                     demonstration = self._prepared(recording, before[recording.name])
+                name = f"{number}/{recording.name}"
+                contents[name] = recording.content(self.recipe, contents.get(name))
                 before[recording.name] += len(recording)
                 read += len(recording)
                 if self._progress is not None:
                     self._progress(read, self._rows)
-                yield f"{number}/{recording.name}", demonstration
-        self._rows = read
+                yield name, demonstration
+        self._rows, self.contents = read, [one.hexdigest() for one in contents.values()]
 
     def _blocks(self, path: Path, whole: bool = False) -> Iterator[Recording]:
         with unchanged(path, self._stamps.setdefault(path, Stamp.of(path))):

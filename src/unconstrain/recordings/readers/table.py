@@ -205,7 +205,9 @@ class Assembly:
         )
         groups = _groups(table, roles.group)
         tasks = table.words.get("task")
-        split = self._taken_apart(whole, table, roles) if groups is None else split_by_group(whole, groups, tasks)
+        split = self._at_breaks(whole, table, roles) if groups is None else split_by_group(whole, groups, tasks)
+        if groups is None or sum(one != other for one, other in pairwise(groups)) >= len({*groups}):  # mixed up
+            split = self._hinted(split, table, roles)
         return [each for each in split if self.reading.takes(each.name, table.labels, each.attributes.get("task"))]
 
     def _times(self, table: Table, roles: Roles) -> tuple[Array | None, tuple[Remark, ...]]:
@@ -238,9 +240,9 @@ class Assembly:
             return None
         return np.arange(len(table.values)) / table.rate
 
-    def _taken_apart(self, whole: Recording, table: Table, roles: Roles) -> list[Recording]:
-        """Recordings between breaks, the first with a remark where a column takes apart more."""
-        first, *others = self._at_breaks(whole, table, roles)
+    def _hinted(self, found: list[Recording], table: Table, roles: Roles) -> list[Recording]:
+        """Recordings, the first with a remark where another column takes apart more."""
+        first, *others = found
         name, count = _labels(table, roles)
         said = f"has {'several' if self._in_blocks else count} values, a stroke each by its jumps: give group={name!r}."
         hint = (Remark("several-in-one", said, name),) if count > 1 + len(others) else ()
