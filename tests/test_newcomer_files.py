@@ -525,6 +525,19 @@ def test_rest_is_seen_whatever_the_spectrum_of_the_noise(tmp_path, noise, highes
 
 
 @pytest.mark.parametrize("noise", [0.05, 0.8])
+@pytest.mark.parametrize("still", [0.0, 1.5])
+def test_a_pause_is_left_out_whole_whatever_the_spectrum_of_the_noise(tmp_path, noise, still):
+    turn = 0.02 * np.concatenate([np.arange(125), np.full(round(50 * still), 125), np.arange(125, 250)])
+    way = 80.0 * np.column_stack([np.cos(turn), np.sin(turn)])
+    for seed in range(3):
+        table = np.column_stack([0.02 * np.arange(len(way)), way + shaking(way.shape, noise, 10.0, seed)])
+        said = text(call("inspect", write(tmp_path / "r.csv", "t,x,y", table), *READ))
+        found = re.search(r"stands still for (\d+) of \d+ rows .* in the middle", said)
+        assert bool(found) == bool(still)
+        assert not found or abs(int(found[1]) - 75) < 8
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.8])
 @pytest.mark.parametrize("rate", [1.0, 2.0, 4.0])
 def test_a_goal_that_is_come_to_slowly_is_neither_rest_nor_a_stop_whatever_the_noise(tmp_path, noise, rate):
     times = 0.02 * np.arange(300)

@@ -151,12 +151,17 @@ def _goes_nowhere(values: Array, white: float, usual: float) -> bool:
     Parts of it show what noise there is, white or not: by noise neighbours differ as much as halves do, but movement,
     however slow, adds up.
     """
-    parts = np.array([part.mean(axis=0) for part in np.array_split(values, min(2 * HALF, len(values)))])
+    parts = _parts(values)
     half = len(parts) // 2
     gone = float(np.linalg.norm(parts[half:].mean(axis=0) - parts[:half].mean(axis=0)))
     steps = float(np.median(np.linalg.norm(np.diff(parts, axis=0), axis=1))) if len(values) >= 4 * HALF else 0.0
     chance = max(2.0 * HALVES * white / np.sqrt(len(values)), ADDED_UP * steps / np.sqrt(HALF))
     return gone <= max(chance, SLOW * FINEST * usual) and _spread(values) <= max(2.0 * white, SLOW * usual)
+
+
+def _parts(values: Array) -> Array:
+    """Means of so many parts, one after the other, shape (2 HALF, n) or fewer."""
+    return np.array([part.mean(axis=0) for part in np.array_split(values, min(2 * HALF, len(values)))])
 
 
 def _spread(values: Array) -> float:
@@ -199,22 +204,27 @@ def _moved(column: Array, span: int) -> Array:
 
 
 def _slow(values: Array, shortest: int) -> list[tuple[int, int]]:
-    """Stretches that are slow beside the movement before and after."""
-    span = _span(values)
-    if span is None:
-        return []
-    usual = _usual(values, span)
-    near = np.maximum(NOISE * _noise(values), 0.3 * usual / span)
-    runs = _runs(values, span, SLOW * usual, shortest)
-    exact = [_around(values, *run, np.maximum(near, _trembling(values[slice(*run)]))) for run in runs]
-    return _left(exact, values, LEFT * np.ptp(values, axis=0))
+    """Stretches that are slow beside the movement before and after, told by as few rows as noise allows."""
+    noise, span = NOISE * _noise(values), _span(values)
+    while span is not None and span <= len(values) // 12:
+        usual = _usual(values, span)
+        near = np.maximum(noise, 0.3 * usual / span)
+        runs = _runs(values, span, SLOW * usual, shortest)
+        exact = [_around(values, *run, np.maximum(near, _trembling(values[slice(*run)]))) for run in runs]
+        long = [one for one, run in zip(exact, runs, strict=True) if 2 * (one[1] - one[0]) > run[1] - run[0]]
+        if found := _left(long, values, LEFT * np.ptp(values, axis=0)):
+            return found
+        span *= 2
+    return []
 
 
 def _trembling(values: Array) -> Array:
     """How far rows are from one place by their own noise, shape (n,): nothing for columns that go on meanwhile."""
-    width, middle = NOISE * _noise(values), len(values) // 2
-    moved = np.abs(np.median(values[:middle], axis=0) - np.median(values[middle:], axis=0))
-    return np.where(moved < width, width, 0.0)
+    inner = values[len(values) // 4 : -(len(values) // 4)]
+    parts = _parts(inner)
+    gone = np.abs(parts[HALF:].mean(axis=0) - parts[:HALF].mean(axis=0))
+    steps, noise = np.median(np.abs(np.diff(parts, axis=0)), axis=0), np.maximum(inner.std(axis=0), _noise(values))
+    return np.asarray(np.where(gone < ADDED_UP * steps / np.sqrt(HALF), NOISE * noise, 0.0))
 
 
 def _motionless(values: Array, shortest: int) -> list[tuple[int, int]]:
