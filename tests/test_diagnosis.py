@@ -452,7 +452,7 @@ def test_rest_is_named_where_noise_makes_the_last_samples_fast_or_nothing_moved_
     held.actions[-2:] *= last / held.actions[-1:].max() / 60.0  # as a filter makes them at an end
     demos = [CROSSING[2], held, *[stroke((2, 2), (2.001, 2), 0, "never")] * never]
     poor = verdicts.Verdict(verdicts.Mark.BAD, "Poor.", next="Look.")
-    said = about_recordings(poor, demos, uc.Recipe(("x", "y")), lambda states: np.full_like(states, 0.05 / 60.0))
+    said = about_recordings(poor, demos, uc.Recipe(("x", "y")), lambda states: np.full_like(states, 0.2 / 60.0))
     names = ["'held'"] * bool(rest) + ["'never'"] * never
     assert said.doubt.startswith(f"{', '.join(names)} ended slower" if names else "")
     assert bool(said.doubt) == bool(names)

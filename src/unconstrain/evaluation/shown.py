@@ -90,7 +90,9 @@ def _about_rest(
     slow = float(f"{SLOW * np.quantile(np.concatenate(speeds), 0.9):.2g}")
     rests, names = _rests(demos, speeds, slow), names_of(demos)
     goal = any(not by and together >= min(ENOUGH, max(len(rests), 2)) for _, by, together in rests)
-    kept = [(row, by) for row, by, _ in rests if np.linalg.norm(policy(demos[row].states[-1:])) < slow]
+    ends = [float(np.median(speed[-1 - int(LONG * len(speed)) :])) for speed in speeds]
+    goes = {row: float(np.linalg.norm(policy(demos[row].states[-1:]))) for row, *_ in rests}
+    kept = [(row, by) for row, by, _ in rests if goes[row] < slow > 2.0 * min(goes[row], ends[row])]
     harm = goal or 2 * len(rests) > len(demos) or any((speed >= slow).mean() < LONG for speed in speeds)
     for row in [row for row, by in kept if by][:1]:
         place = named(demos[row].states[-1], states)
