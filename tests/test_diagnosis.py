@@ -445,6 +445,20 @@ def test_where_a_policy_rests_by_mistake_is_told_and_trimmed_only_where_no_goal_
     assert about_recordings(poor, demos, uc.Recipe(("x", "y"), still=0.1), policy) == poor
 
 
+@pytest.mark.parametrize(("rest", "last"), [(40, 0.001), (40, 0.5), (0, 1.0)])
+@pytest.mark.parametrize("never", [False, True])
+def test_rest_is_named_where_noise_makes_the_last_samples_fast_or_nothing_moved_at_all(rest, last, never):
+    held = stroke((0, -1), (0, 0), rest, "held")
+    held.actions[-2:] *= last / held.actions[-1:].max() / 60.0  # as a filter makes them at an end
+    demos = [CROSSING[2], held, *[stroke((2, 2), (2.001, 2), 0, "never")] * never]
+    poor = verdicts.Verdict(verdicts.Mark.BAD, "Poor.", next="Look.")
+    said = about_recordings(poor, demos, uc.Recipe(("x", "y")), lambda states: np.full_like(states, 0.2 / 60.0))
+    names = ["'held'"] * bool(rest) + ["'never'"] * never
+    assert said.doubt.startswith(f"{', '.join(names)} ended slower" if names else "")
+    assert bool(said.doubt) == bool(names)
+    assert ("if so, --still 0.0067 leaves that out." in said.doubt) == (names == ["'held'"])
+
+
 def test_where_most_come_to_rest_that_is_a_goal_and_not_to_be_left_out():
     places = [(1, 0), (0, 1), (-1, 0)]
     demos = [stroke(place, (0.5 * place[0] + 0.1, 0.5 * place[1]), 40, f"rests {place}") for place in places]

@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.signal import butter, filtfilt
 
 import unconstrain as uc
 from test_cli import call, refused, run, write
@@ -467,12 +468,18 @@ def test_recordings_that_are_the_same_are_counted_and_left_out_as_said(tmp_path)
     assert "same-recording" not in call("fit", *asked, *fit, "--strict", "--leave-out", "copy,other").err
 
 
-def rounds(before, after, noise=0.2):
+def rounds(before, after, noise=0.2, highest=None, seed=0):
     """A round in five seconds at 50 Hz, between rests of so many seconds, with noise of a tracker in mm."""
     turn = np.concatenate([np.zeros(round(50 * before)), np.arange(250) / 250, np.ones(round(50 * after))])
     states = 80.0 * np.column_stack([np.cos(2 * np.pi * turn), np.sin(2 * np.pi * turn), 0.0 * turn])
-    states += noise * np.random.default_rng(0).standard_normal(states.shape)
-    return np.column_stack([0.02 * np.arange(len(turn)), states])
+    return np.column_stack([0.02 * np.arange(len(turn)), states + shaking(states.shape, noise, highest, seed)])
+
+
+def shaking(shape, noise, highest=None, seed=0):
+    """Noise of 50 Hz, white or, as motion capture gives it, filtered forth and back at so many Hz."""
+    white = np.random.default_rng(seed).standard_normal((shape[0] + 200, *shape[1:]))
+    found = white if highest is None else filtfilt(*butter(2, highest / 25.0), white, axis=0)
+    return noise * found[100:-100] / (1.0 if highest is None else found[100:-100].std(axis=0))
 
 
 @pytest.mark.parametrize(("before", "after"), [(0.6, 0.7), (0.6, 0.0), (0.0, 0.7), (0.0, 0.0)])
@@ -503,6 +510,46 @@ def test_a_goal_that_is_come_to_slowly_is_no_rest_at_the_end(tmp_path):
         table[:, 1:] += 0.2 * np.random.default_rng(0).standard_normal((300, 3))
         path = write(tmp_path / "r.csv", "t,x,y,z", table)
         assert "rest: " not in text(call("inspect", path, "--state", "x,y,z", "--differentiate"))
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.8])
+@pytest.mark.parametrize("highest", [6.0, 10.0, 18.0])
+def test_rest_is_seen_whatever_the_spectrum_of_the_noise(tmp_path, noise, highest):
+    for before, after in ((1.0, 1.5), (0.0, 0.0)):
+        table = rounds(before, after, noise, highest)
+        path = write(tmp_path / "r.csv", "t,x [mm],y [mm],z [mm]", table)
+        said = text(call("inspect", path, "--state", "x,y,z", "--differentiate"))
+        assert "stop: " not in said
+        assert ("rest: " in said) == bool(before)
+        if before:
+            first, last = map(float, re.search(r"\((\S+) s\) before it .*?\((\S+) s\) at its end", said).groups())
+            assert abs(first - before) < 0.2
+            assert abs(last - after) < 0.2
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.8])
+@pytest.mark.parametrize("still", [0.0, 1.5])
+def test_a_pause_is_left_out_whole_whatever_the_spectrum_of_the_noise(tmp_path, noise, still):
+    turn = 0.02 * np.concatenate([np.arange(125), np.full(round(50 * still), 125), np.arange(125, 250)])
+    way = 80.0 * np.column_stack([np.cos(turn), np.sin(turn)])
+    for seed in range(3):
+        table = np.column_stack([0.02 * np.arange(len(way)), way + shaking(way.shape, noise, 10.0, seed)])
+        said = text(call("inspect", write(tmp_path / "r.csv", "t,x,y", table), *READ))
+        found = re.search(r"stands still for (\d+) of \d+ rows .* in the middle", said)
+        assert bool(found) == bool(still)
+        assert not found or abs(int(found[1]) - 75) < 8
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.8])
+@pytest.mark.parametrize("rate", [1.0, 2.0, 4.0])
+def test_a_goal_that_is_come_to_slowly_is_neither_rest_nor_a_stop_whatever_the_noise(tmp_path, noise, rate):
+    times = 0.02 * np.arange(300)
+    for seed in range(4):
+        way = np.exp(-rate * times)[:, None] * [100.0, 50.0, 0.0] + shaking((300, 3), noise, 8.0, seed)
+        path = write(tmp_path / "r.csv", "t,x,y,z", np.column_stack([times, way]))
+        said = text(call("inspect", path, "--state", "x,y,z", "--differentiate"))
+        assert "rest: " not in said
+        assert "stop: " not in said
 
 
 # Units, columns and signs of actions, and of joints

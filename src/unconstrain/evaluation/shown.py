@@ -15,8 +15,9 @@ from .marks import ENOUGH, Mark, Verdict
 FLAT, ONE = 0.1, 0.03
 """Held are directions of less spread than the first share of the longest, and all on one plane below the second."""
 
-SLOW, LONG = 0.2, 0.1
-"""Slower than the first share of a usual speed is rest, for more than the second share of the samples a long one."""
+SLOW, LONG, MOSTLY = 0.2, 0.1, 0.9
+"""Slower than the first share of a usual speed is rest, for more than the second share of the samples a long one, of
+which the third is slow: at its end noise of positions has the largest velocities."""
 
 BESIDE, PASSING = 0.05, 0.5
 """Others that come nearer than the first share of the extents, faster than the second of a usual speed, move on there;
@@ -89,19 +90,25 @@ def _about_rest(
     slow = float(f"{SLOW * np.quantile(np.concatenate(speeds), 0.9):.2g}")
     rests, names = _rests(demos, speeds, slow), names_of(demos)
     goal = any(not by and together >= min(ENOUGH, max(len(rests), 2)) for _, by, together in rests)
-    kept = [(row, by) for row, by, _ in rests if 2.0 * np.linalg.norm(policy(demos[row].states[-1:])) < slow]
+    ends = [float(np.median(speed[-1 - int(LONG * len(speed)) :])) for speed in speeds]
+    goes = {row: float(np.linalg.norm(policy(demos[row].states[-1:]))) for row, *_ in rests}
+    kept = [(row, by) for row, by, _ in rests if goes[row] < slow > 2.0 * min(goes[row], ends[row])]
+    harm = goal or 2 * len(rests) > len(demos) or any((speed >= slow).mean() < LONG for speed in speeds)
     for row in [row for row, by in kept if by][:1]:
         place = named(demos[row].states[-1], states)
         said = f"The policy rests near {place}, where '{names[row]}' came to rest and others move on: likely something "
         found = found._replace(doubt=f"{said}stopped it. {found.doubt}".rstrip())
-        if goal or 2 * len(rests) > len(demos) or any((speed >= slow).mean() < LONG for speed in speeds):
-            return found
-        return found._replace(next=f"--still {slow} leaves out rest at an end. {found.next}".rstrip())
+        return (
+            found if harm else found._replace(next=f"--still {slow} leaves out rest at an end. {found.next}".rstrip())
+        )
     if found.mark is Mark.GOOD or goal or not kept:
         return found
     few = listed([f"'{names[row]}'" for row, _ in kept], 4)
     said = f"{few} ended slower than {SLOW:.0%} of a usual speed where no other moves on: whether something stopped "
-    return found._replace(doubt=f"{said}{'them' if kept[1:] else 'it'} cannot be told. {found.doubt}".rstrip())
+    said += (
+        f"{'them' if kept[1:] else 'it'} cannot be told{'' if harm else f'; if so, --still {slow} leaves that out'}."
+    )
+    return found._replace(doubt=f"{said} {found.doubt}".rstrip())
 
 
 def _rests(
@@ -110,8 +117,9 @@ def _rests(
     """Which end in a long rest; whether others move by there and end elsewhere, and how many rest there together."""
     wide = np.maximum(np.ptp(np.vstack([one.states for one in demonstrations]), axis=0), 1e-300)
     ends = np.array([one.states[-1] for one in demonstrations]) / wide
-    last = [np.flatnonzero(speed > slow).max(initial=-1) for speed in speeds]
-    rest = [row for row, at in enumerate(last) if at >= 0 and len(speeds[row]) - 1 - at > LONG * len(speeds[row])]
+    tails = [np.cumsum(speed[::-1] <= slow) / np.arange(1, len(speed) + 1) >= MOSTLY for speed in speeds]
+    rows = [int(np.flatnonzero(tail).max(initial=-1)) + 1 for tail in tails]
+    rest = [row for row, speed in enumerate(speeds) if rows[row] > LONG * len(speed)]
     found = []
     for row in rest:
         far = np.linalg.norm(ends - ends[row], axis=1)

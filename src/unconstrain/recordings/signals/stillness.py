@@ -26,9 +26,13 @@ SHORTEST = 10
 SHORTEST_STOP_S, STOP_ROWS = 0.3, 6
 """A stop takes so many seconds, and rows, at least: who turns a corner is slow for a shorter time."""
 
-HALVES, SUDDEN = 2.0, 5.0
-"""Means of both halves of a rest are nearer than so many standard errors of their difference. Who sets off suddenly is
-so many standard deviations of the noise away in half the time of the shortest stop."""
+HALVES, HALF, ADDED_UP = 2.0, 4, 3.0
+"""Means of both halves of a rest are nearer than so many standard errors of their difference, by white noise, or than
+the third number times the median step between its parts, so many in a half, over the root of those."""
+
+SUDDEN, FAR = 0.1, 4.0
+"""Who leaves a rest suddenly gets on, from one quarter of the time of the shortest stop to the next, by this share of
+usual movement in that time, and by so many standard deviations of the noise."""
 
 SHORTER = 60
 """Lengths of a rest that are tried, from the longest to the shortest."""
@@ -90,12 +94,14 @@ def stops(values: Array, shortest: int) -> list[tuple[int, int]]:
     """Half-open stretches of so many rows (T, n) or more in which nothing moves, however long the recording is.
 
     Means of neighbouring thirds of so many rows are compared in units of their noise. At a turning point these are near
-    each other, too, but not long before and after: there a stop is left at the usual pace.
+    each other, too, but not long before and after: there a stop is left at the usual pace, to go somewhere.
     """
     moved, runs, fast = _slow_runs(values, shortest)
     last = 1 - 2 * (shortest // 3)
     found = [run for run in runs if _is_sudden(moved, run[0], run[1] + last, shortest, fast)]
-    return _left(found, values, LEFT * np.ptp(values, axis=0))
+    left = _left(found, values, LEFT * np.ptp(values, axis=0))
+    least = SLOW * float(np.linalg.norm(_usual(values, shortest))) if left else 0.0
+    return [one for one in left if min(_spread(values[: one[1]]), _spread(values[one[0] :])) > least]
 
 
 def rest_at_ends(values: Array, interval: float = 0.0) -> tuple[int, int]:
@@ -116,28 +122,59 @@ def rest_at_ends(values: Array, interval: float = 0.0) -> tuple[int, int]:
 def _standing(values: Array, shortest: int, only_sudden: bool = False) -> int:
     """Rows (T, n) at the start, so many or more, that stay at one place but for noise; 0 where noise hides movement.
 
-    Whatever the speed after it, unless only what is sudden counts; of that half as many rows do. Those rows count that
-    are near the first ones, up to where the means of both halves would be farther apart than by chance.
+    Whatever the speed after it, unless only what is sudden counts; of that half as many rows do. The longest stretch
+    that goes nowhere counts, up to where rows leave the place of its first part for good.
     """
-    least = shortest // 2
-    if len(values) < 4 * shortest or not least:
+    least = max(shortest // 2, STOP_ROWS)
+    if len(values) < 4 * max(shortest, STOP_ROWS):
         return 0
-    noise, place = _noise(values), np.median(values[:least], axis=0)
+    white, usual = _noise(values), float(np.linalg.norm(_usual(values, shortest)))
+    loud = float(np.linalg.norm(white))
+    if 2.0 * HALVES * loud / np.sqrt(shortest) > LOUD * usual:
+        return 0
+    tried = np.geomspace(3 * len(values) // 4, least, SHORTER).astype(int).tolist()
+    rows = next((rows for rows in tried if _goes_nowhere(values[:rows], loud, usual)), tried[0])
+    if rows == tried[0]:
+        return 0
+    first = values[: 3 * rows // 4]
+    place, noise = first.mean(axis=0), np.maximum(first.std(axis=0), white)
+    longer = tried[tried.index(rows) - 1]
+    edge = len(first) + _near(values[len(first) : longer], place, NOISE * noise)
+    soon, later = (part.mean(axis=0) for part in np.array_split(values[edge : edge + least], 2))
+    sudden = (np.abs(later - soon) > FAR * noise).any() and np.linalg.norm(later - soon) > SUDDEN * usual
+    return edge if sudden or (min(rows, edge) >= shortest and not only_sudden) else 0
+
+
+def _goes_nowhere(values: Array, white: float, usual: float) -> bool:
+    """Whether a stretch (T, n) is near one place beside usual movement, and its halves differ by no more than noise.
+
+    Parts of it show what noise there is, white or not: by noise neighbours differ as much as halves do, but movement,
+    however slow, adds up.
+    """
+    parts = _parts(values)
+    half = len(parts) // 2
+    gone = float(np.linalg.norm(parts[half:].mean(axis=0) - parts[:half].mean(axis=0)))
+    steps = float(np.median(np.linalg.norm(np.diff(parts, axis=0), axis=1))) if len(values) >= 4 * HALF else 0.0
+    chance = max(2.0 * HALVES * white / np.sqrt(len(values)), ADDED_UP * steps / np.sqrt(HALF))
+    return gone <= max(chance, SLOW * FINEST * usual) and _spread(values) <= max(2.0 * white, SLOW * usual)
+
+
+def _parts(values: Array) -> Array:
+    """Means of so many parts, one after the other, shape (2 HALF, n) or fewer."""
+    return np.array([part.mean(axis=0) for part in np.array_split(values, min(2 * HALF, len(values)))])
+
+
+def _spread(values: Array) -> float:
+    return float(np.linalg.norm(values.std(axis=0)))
+
+
+def _near(values: Array, place: Array, far: Array) -> int:
+    """Rows (T, n), from the first on, of which no two in a row are farther from a place than some lengths (n,)."""
     off = np.zeros(len(values), dtype=bool)
-    for column, at, least_off in zip(values.T, place, NOISE * noise, strict=True):
-        off |= np.abs(column - at) > least_off
+    for column, at, least in zip(values.T, place, far, strict=True):
+        off |= np.abs(column - at) > least
     gone = np.flatnonzero(off & np.append(off[1:], True))
-    left = int(gone[0]) if len(gone) else len(values)
-    usual, chance = float(np.linalg.norm(_usual(values, shortest))), 2.0 * HALVES * float(np.linalg.norm(noise))
-    if left > 3 * len(values) // 4 or chance / np.sqrt(shortest) > LOUD * usual:
-        return 0
-    for rows in np.geomspace(max(left, 1), least, SHORTER).astype(int).tolist() if left >= least else []:
-        halves = values[: rows // 2].mean(axis=0) - values[rows // 2 : rows].mean(axis=0)
-        if np.linalg.norm(halves) <= max(chance / np.sqrt(rows), SLOW * FINEST * usual):
-            away = np.linalg.norm(values[rows : rows + least].mean(axis=0) - place)
-            sudden = away > SUDDEN * np.linalg.norm(noise) + SLOW * usual
-            return rows if sudden or (rows >= shortest and not only_sudden) else 0
-    return 0
+    return int(gone[0]) if len(gone) else len(values)
 
 
 def _slow_runs(values: Array, shortest: int) -> tuple[Array, list[tuple[int, int]], float]:
@@ -167,22 +204,27 @@ def _moved(column: Array, span: int) -> Array:
 
 
 def _slow(values: Array, shortest: int) -> list[tuple[int, int]]:
-    """Stretches that are slow beside the movement before and after."""
-    span = _span(values)
-    if span is None:
-        return []
-    usual = _usual(values, span)
-    near = np.maximum(NOISE * _noise(values), 0.3 * usual / span)
-    runs = _runs(values, span, SLOW * usual, shortest)
-    exact = [_around(values, *run, np.maximum(near, _trembling(values[slice(*run)]))) for run in runs]
-    return _left(exact, values, LEFT * np.ptp(values, axis=0))
+    """Stretches that are slow beside the movement before and after, told by as few rows as noise allows."""
+    noise, span = NOISE * _noise(values), _span(values)
+    while span is not None and span <= len(values) // 12:
+        usual = _usual(values, span)
+        near = np.maximum(noise, 0.3 * usual / span)
+        runs = _runs(values, span, SLOW * usual, shortest)
+        exact = [_around(values, *run, np.maximum(near, _trembling(values[slice(*run)]))) for run in runs]
+        long = [one for one, run in zip(exact, runs, strict=True) if 2 * (one[1] - one[0]) > run[1] - run[0]]
+        if found := _left(long, values, LEFT * np.ptp(values, axis=0)):
+            return found
+        span *= 2
+    return []
 
 
 def _trembling(values: Array) -> Array:
     """How far rows are from one place by their own noise, shape (n,): nothing for columns that go on meanwhile."""
-    width, middle = NOISE * _noise(values), len(values) // 2
-    moved = np.abs(np.median(values[:middle], axis=0) - np.median(values[middle:], axis=0))
-    return np.where(moved < width, width, 0.0)
+    inner = values[len(values) // 4 : -(len(values) // 4)]
+    parts = _parts(inner)
+    gone = np.abs(parts[HALF:].mean(axis=0) - parts[:HALF].mean(axis=0))
+    steps, noise = np.median(np.abs(np.diff(parts, axis=0)), axis=0), np.maximum(inner.std(axis=0), _noise(values))
+    return np.asarray(np.where(gone < ADDED_UP * steps / np.sqrt(HALF), NOISE * noise, 0.0))
 
 
 def _motionless(values: Array, shortest: int) -> list[tuple[int, int]]:
