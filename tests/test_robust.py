@@ -534,9 +534,9 @@ def test_an_unstable_candidate_shows_bias_where_it_is_the_more_consistent():
     assert any(one.variance > 1.0 for one in policy.solution_.candidates.values())
 
 
-@pytest.mark.parametrize("form", ["rulers", "plates"])
-def test_positions_that_were_filtered_hide_no_constraint(form):
-    data = draw_recorded("filtered positions", f"{form} #1", 1)
+@pytest.mark.parametrize("name", ["rulers #1", "plates #1"])
+def test_positions_as_they_are_measured_hide_no_constraint(name):
+    data = draw_recorded("measured positions", name, 1)
     policy = data.fit(uc.Robust())
     error = uc.nupe(policy, data.test)
     assert error < 0.5 * uc.nupe(data.fit(uc.Hybrid(alpha="auto")), data.test)

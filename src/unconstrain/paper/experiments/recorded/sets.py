@@ -135,7 +135,7 @@ SIMULATED = {
     "one plane for all": _Kind(simulated.one_plane, policy=_affine_policy),
     "near-parallel planes": _Kind(simulated.parallel_planes),
     "tilted plates": _Kind(simulated.tilted_plates),
-    "filtered positions": _Kind(simulated.filtered_positions, {"rulers": ("rulers",), "plates": ("plates",)}),
+    "measured positions": _Kind(simulated.measured_positions, {form: (form,) for form in ("rulers", "plates", "goal")}),
     "reaching": _Kind(simulated.reaching, {f"{share:.0%}": (share,) for share in (0.05, 0.1, 0.2)}),
     "turning planes": _Kind(simulated.turning_planes),
     "two demonstrations": _Kind(simulated.two_demonstrations),

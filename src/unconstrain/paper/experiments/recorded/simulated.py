@@ -64,6 +64,13 @@ def reach(states: Array) -> Array:
     return pull + 0.4 * np.column_stack([np.sin(2 * y), np.cos(2 * z) - 1.0, np.sin(2 * x)])
 
 
+def swirl_in(states: Array) -> Array:
+    """Round the origin and to it, at up to 0.2 m/s: velocities (N, 3) at positions (N, 3), m."""
+    turned = np.cross([0.15, -0.1, 1.0], states)
+    far = np.sqrt(np.vecdot(states, states) + 0.06**2)
+    return (0.16 * turned - 0.1 * states * [1.0, 1.0, 1.4]) / far[:, None]
+
+
 @dataclass(frozen=True, eq=False)
 class Oval:
     """Round an oval at some rad/s, and onto it: velocities (N, 2) at positions (N, 2).
@@ -289,20 +296,26 @@ def tilted_plates(rng: np.random.Generator) -> Simulated:
     return Simulated([_differentiated(one[::10], 0.05 * rng.standard_normal(one[::10].states.shape)) for one in demos])
 
 
-def filtered_positions(rng: np.random.Generator, form: str) -> Simulated:
-    """Velocities of positions as motion capture delivers them: at 100 Hz, with an error that is filtered at 10 Hz.
+def measured_positions(rng: np.random.Generator, form: str) -> Simulated:
+    """Velocities of positions as motion capture or a robot measures them.
 
-    It is 0.8 mm. Five demonstrators of four seconds are free on an oval, and five go along rulers; or ten are on plates
-    tilted by 10 to 40 degrees.
+    Five movements on an oval are free and five along rulers, or ten are on plates tilted by 10 to 40 degrees, at 100 Hz
+    with an error of 0.8 mm that a filter went over; or eight go to one goal in as many planes, at 250 Hz to 0.02 mm.
     """
     if form == "rulers":
         oval = Oval(rng.uniform(0.1, 0.2) * np.array([1.0, rng.uniform(0.5, 1.0)]), 1.8, "cubic")
         free = _rolled(oval, rng.uniform(-1.3, 1.3, (5, 2)) * oval.radii, 2000, 0.002, None)
         return Simulated([_captured(one[::5], 8e-4, rng) for one in (*free, *_strokes(oval, 5, rng, 2))])
-    normals = _tilted_by(rng, 10, 40, 10)
-    starts = _onto(normals, np.column_stack([rng.uniform(-120, 120, (10, 2)), np.zeros(10)]))
-    demos = _rolled(wipe_round, starts, 2000, 0.002, [uc.constraints.Plane(normal) for normal in normals])
-    return Simulated([_captured(one[::5], 0.8, rng) for one in demos])
+    if form == "plates":
+        normals = _tilted_by(rng, 10, 40, 10)
+        starts = _onto(normals, np.column_stack([rng.uniform(-120, 120, (10, 2)), np.zeros(10)]))
+        demos = _rolled(wipe_round, starts, 2000, 0.002, [uc.constraints.Plane(normal) for normal in normals])
+        return Simulated([_captured(one[::5], 0.8, rng) for one in demos])
+    normals, angles, sizes = _tilted_by(rng, 10, 60, 8), rng.uniform(0, 2 * np.pi, 8), rng.uniform(0.12, 0.25, 8)
+    around = np.column_stack([sizes * np.cos(angles), sizes * np.sin(angles), rng.uniform(-0.1, 0.1, 8)])
+    planes = [uc.constraints.Plane(normal) for normal in normals]
+    demos = _rolled(swirl_in, _onto(normals, around), 3000, 0.001, planes)
+    return Simulated([_differentiated(one[::4], 2e-5 * rng.standard_normal(one[::4].states.shape)) for one in demos])
 
 
 def reaching(rng: np.random.Generator, share: float) -> Simulated:
