@@ -93,7 +93,7 @@ def test_agreement_counts_only_where_nobody_predicts_what_is_held_out(share, tol
 @pytest.mark.slow
 @pytest.mark.parametrize("draw_of", [4, 10])
 def test_strokes_to_one_goal_in_as_many_planes_do_not_agree_on_a_wrong_model(draw_of):
-    """One cubic model agreed with all eight, with an error of 0.6 and 2.7 times the policy; local models predict them."""
+    """One cubic model agreed with all eight, and missed 0.6 and 2.7 times the policy; local models predict them."""
     data = draw("measured positions", f"goal #{draw_of}", 1)
     policy = data.fit(uc.Robust())
     assert policy.variance_ != "cubic"
