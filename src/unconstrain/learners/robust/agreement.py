@@ -6,20 +6,19 @@ fit, is no chance. Demonstration g tells ``E_g = tr H_g (H_g + B)⁻¹`` indepen
 Hessians H_g of its error and B of the prior; the sum of these, E, was fitted by ``P = tr H (H + B)⁻¹`` of them, with
 the Hessian H of all. What is new is then missed by ``E / (E − P)`` times as much as what was learnt from: generalised
 cross-validation (Golub, Heath and Wahba, *Technometrics* 21(2), 1979), by demonstration. It supposes that the policy
-has the form of the model: what another form would make of places between the strokes, none of them tells. Where any
-other policy predicts most of what is held out, the others do tell, and agreement says nothing instead.
+has the form of the model: what another form would make of places between the strokes, none of them tells. So what is
+missed must be no more than noise: of another form some is left, however little, and grows where nobody was.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ...base.arrays import Array
-from ...risks import unit_actions
 from ...training import Samples
 from .candidate import Candidate
-from .constants import AGREED, AGREED_OF_HELD_OUT, MOST_FITTED, MOST_MISSED
+from .constants import AGREED, AGREED_EXACTLY, AGREED_OF_HELD_OUT, MOST_FITTED, MOST_OF_NOISE
+from .noise import most_noise
 
 
 def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Candidate | None:
@@ -42,7 +41,8 @@ def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Cand
     residuals = np.einsum("nab,nb->na", projections, samples.actions - policy)
     held_out = np.einsum("nab,nb->na", projections, samples.actions - found.held_out)
     most = min(AGREED * motion, _square(samples, held_out))
-    if _square(samples, residuals) > most:
+    noise = most_noise(samples) * samples.mean(np.einsum("naa->n", projections))
+    if _square(samples, residuals) > min(most, MOST_OF_NOISE * (noise + AGREED_EXACTLY**2 * motion)):
         return None
     told, fitted = _numbers(found, samples, projections)
     if fitted >= MOST_FITTED * told:
@@ -52,32 +52,15 @@ def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Cand
     if _square(samples, missed) > most:
         return None
     from_noise, undetermined = found.posterior.covariances()
-    sure = replace(found, spread=_spread(samples, factor * from_noise[0] + undetermined[0]))
+    found = replace(found, spread=_spread(samples, factor * from_noise[0] + undetermined[0]))
     if _square(samples, missed) > AGREED_OF_HELD_OUT * _square(samples, held_out):
-        return sure
+        return found
     return replace(
-        sure,
+        found,
         held_out=policy + residuals - missed,
         refits=np.repeat(found.weights[None], len(found.refits), axis=0),
-        apart=found,
+        alone=_square(samples, held_out) / motion,
     )
-
-
-def as_told(candidates: Sequence[Candidate], samples: Samples) -> list[Candidate]:
-    """Candidates, each as its held-out predictions judge it where one without agreement predicts most of the motion."""
-
-    def missed(one: Candidate) -> float:
-        along, length = unit_actions(samples.actions)
-        return samples.mean((length - np.vecdot(one.held_out, along)) ** 2)
-
-    if not any(one.apart for one in candidates):
-        return list(candidates)
-    if all(missed(one) > MOST_MISSED * samples.energy for one in candidates if one.apart is None):
-        return list(candidates)
-    return [
-        replace(one.apart, name=one.name, softness=one.softness, by_segments=one.by_segments) if one.apart else one
-        for one in candidates
-    ]
 
 
 def _square(samples: Samples, residuals: Array) -> float:

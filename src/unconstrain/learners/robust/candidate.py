@@ -36,8 +36,8 @@ class Candidate:
         constraints than their actions.
     spread : float, optional
         Mean variance of the predictions, where refits do not tell it; see :mod:`.agreement`.
-    apart : Candidate, optional
-        The same as held-out predictions judge it, where ``held_out`` is what agreement expects; see :mod:`.agreement`.
+    alone : float
+        Share of the squared motion that was missed in demonstrations left out, where ``held_out`` is not about that.
     by_segments : bool
         Whether demonstrations that were held in the same way all the time show it more than samples along themselves.
     otherwise : tuple of Candidate and Samples, optional
@@ -53,7 +53,7 @@ class Candidate:
     refits: Array
     softness: float = 0.0
     spread: float | None = None
-    apart: Candidate | None = None
+    alone: float = 0.0
     by_segments: bool = False
     otherwise: tuple[Candidate, Samples] | None = None
 

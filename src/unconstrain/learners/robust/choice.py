@@ -69,7 +69,6 @@ from ...base.arrays import Array
 from ...risks import unit_actions
 from ...training import Samples
 from ..solution import Judged
-from .agreement import as_told
 from .candidate import Candidate
 from .constants import (
     AS_DIRECT,
@@ -110,9 +109,9 @@ class Comparison:
     """
 
     def __init__(self, candidates: Sequence[Candidate], noise: Array, samples: Samples | Sequence[Samples]) -> None:
+        self._candidates, self.noise = candidates, noise
         self._views = [samples] * len(candidates) if isinstance(samples, Samples) else list(samples)
         self._samples = samples = self._views[0]
-        self._candidates, self.noise = as_told(candidates, samples), noise
         self._held, self._seen = held_throughout(samples.actions, samples.groups, beyond_misfit(noise, samples))
         held, seen = held_throughout(samples.actions, samples.groups, noise)  # as far as noise tells, not misfit
         self._on_line = held & (np.einsum("naa->n", seen) < 1.5)

@@ -82,7 +82,7 @@ class SampleLearner(Learner):
             found = self._plain(training, samples, everything)
         else:
             chosen, more = self.candidate(samples, training)
-            agreed = () if chosen.apart is None else (BY_AGREEMENT.format(1.0 - _explained(samples, chosen.apart)),)
+            agreed = () if not chosen.alone else (BY_AGREEMENT.format(chosen.alone),)
             more["held_out_score"] = _explained(samples, chosen)
             second = None if self.secondary is None else on(self.secondary, training)(training.folds.whole)
             found = solution(chosen, samples, everything, training.model, second, **more)

@@ -26,9 +26,10 @@ SHORTEST = 10
 SHORTEST_STOP_S, STOP_ROWS = 0.3, 6
 """A stop takes so many seconds, and rows, at least: who turns a corner is slow for a shorter time."""
 
-HALVES, HALF, ADDED_UP = 2.0, 4, 3.0
-"""Means of both halves of a rest are nearer than so many standard errors of their difference, by white noise, or than
-the third number times the median step between its parts, so many in a half, over the root of those."""
+HALVES, HALF, ADDED_UP, SHARED = 2.0, 4, 3.0, 1.5
+"""Means of both halves of a rest are nearer than so many standard errors of their difference, by white noise; or, where
+steps between its parts, so many in a half, are the fourth number times as large as by that, than the third number times
+the median step over the root of how many they are."""
 
 SUDDEN, FAR = 0.1, 4.0
 """Who leaves a rest suddenly gets on, from one quarter of the time of the shortest stop to the next, by this share of
@@ -155,7 +156,8 @@ def _goes_nowhere(values: Array, white: float, usual: float) -> bool:
     half = len(parts) // 2
     gone = float(np.linalg.norm(parts[half:].mean(axis=0) - parts[:half].mean(axis=0)))
     steps = float(np.median(np.linalg.norm(np.diff(parts, axis=0), axis=1))) if len(values) >= 4 * HALF else 0.0
-    chance = max(2.0 * HALVES * white / np.sqrt(len(values)), ADDED_UP * steps / np.sqrt(HALF))
+    shared = steps > SHARED * white * np.sqrt(2.0 * len(parts) / len(values))
+    chance = max(2.0 * HALVES * white / np.sqrt(len(values)), shared * ADDED_UP * steps / np.sqrt(HALF))
     return gone <= max(chance, SLOW * FINEST * usual) and _spread(values) <= max(2.0 * white, SLOW * usual)
 
 
