@@ -46,6 +46,9 @@ ROUNDS = 1.5
 PASSING = 0.2
 """Nearer to the middle than this share of the usual distance from it, noise turns what goes straight."""
 
+FOLLOWED = 0.1
+"""A demonstration was free if the policy misses less than this share of its squared actions, across them, too."""
+
 AWAY = 10.0
 """Farther from the middle of demonstrations than this many times their extent, a run has no size: it ran away."""
 
@@ -66,7 +69,7 @@ class Replay(NamedTuple):
     apart: float
     """Mean distance of the states of the roll-out to the nearest of the demonstration, unit of the states."""
     held: bool
-    """Whether what held the demonstration is known: given, or seen as it is flat."""
+    """Whether what held the demonstration is known: given, seen as it is flat, or nothing, as the policy says."""
     done: Demonstration
     run: Demonstration
     away: float | None  # seconds until it goes beyond AWAY, where it ends; None where it stays
@@ -109,7 +112,7 @@ def replayed(
     measured = {"extent": extents, "pace": paces, "last_round": lasts, "apart": apart}
     finite = {name: values[np.isfinite(values)] for name, values in measured.items()}
     told = {name: float(np.median(values)) if len(values) else None for name, values in finite.items()}
-    alike = "" if held is not None else " that look flat (on a line, in a plane), as what was held and short strokes do"
+    alike = "" if held is not None else " that look flat (on a line, in a plane) or free"
     (words, strays), of = verdicts.moves(extents, paces, lasts), "of those that stay, " * bool(gone)
     if gone:
         named = listed([f"'{name}' (after {seconds:.2g} s)" for name, seconds in gone.items()], 4)
@@ -117,7 +120,7 @@ def replayed(
         words, strays = f"{away}{f'; else {words}' * bool(words)}", ["way", *strays]
     if len(known) < len(demos):
         some = f"{len(known)} of {len(demos)} demonstrations"
-        why = ", which look flat; what held the others, if anything, is not known" * (held is None and len(runs) < MOST)
+        why = ", which look flat or free; what held the others is not known" * (held is None and len(runs) < MOST)
         words, of = f"{words}, as far as compared ({some}{why})", f"for {some}{alike}, {of}"
     judged = _advised(verdicts.of_replays(found, words, strays, starts), found, policy, demos)
     return Replayed(judged, told | {"away": gone}, runs, verdicts.size_and_pace(extents, paces, lasts, of, said), words)
@@ -173,7 +176,8 @@ def replays(
 ) -> list[Replay]:
     """Compare at most twenty demonstrations; none where :func:`unlike` says why not."""
     chosen = [] if unlike(demos, recipe) else _moving(demos)
-    chosen = chosen if free or held is not None else [one for one in chosen if diagnosis.flat(one.states)[0].any()]
+    if not free and held is None:
+        chosen = [one for one in chosen if diagnosis.flat(one.states)[0].any() or _free(policy, one)]
     if not chosen:
         return []
     chosen = [chosen[k] for k in np.linspace(0, len(chosen) - 1, min(len(chosen), MOST)).astype(int)]
@@ -187,10 +191,17 @@ def replays(
     moving, near = bounded(policy, stack(demos).states)
     runs = rollout(moving, starts, steps, dt, own, task=task, least_support=0.0)
     cut = [run[: round(seconds / dt) + 1] for run, seconds in zip(runs, lasted, strict=True)]
+    known = [held is not None or bool(own.any()) or _free(policy, one) for one, (own, _) in zip(chosen, shapes)]
     return [
-        _compared(one, run, along, held is not None or bool(rows.any()), near(run.states))
-        for one, run, (rows, along) in zip(chosen, cut, shapes, strict=True)
+        _compared(one, run, along, how, near(run.states))
+        for one, run, (_, along), how in zip(chosen, cut, shapes, known, strict=True)
     ]
+
+
+def _free(policy: Any, demo: Demonstration) -> bool:
+    """Whether the policy was followed all along, so that nothing was taken away from it."""
+    off, actions = demo.actions - policy(demo.states), demo.actions
+    return bool(np.vecdot(off, off).sum() < FOLLOWED * np.vecdot(actions, actions).sum())
 
 
 def bounded(policy: Any, states: Array) -> tuple[Any, Callable[[Array], NDArray[np.bool_]]]:
