@@ -554,7 +554,7 @@ def test_what_a_page_cannot_draw_together_is_refused(folder, tmp_path):
 
 
 def test_free_demonstrations_are_run_from_the_same_starts_as_what_is_flat_is(tmp_path):
-    """Nothing was taken from who follows the policy all along; beside strokes along lines, of which it is known, too."""
+    """Nothing was taken from who follows the policy all along."""
 
     def round_an_oval(at):
         x, y = (at / [80.0, 60.0]).T

@@ -326,7 +326,8 @@ def test_a_fit_tells_programs_what_it_tells_people(folder):
     told = json.loads((folder / "fit.json").read_text())
     assert told["verdict"]["mark"] == "doubtful"  # one circle three times: nothing was seen across it
     assert told["verdict"]["said"].endswith(
-        "motion: good along the motion, but across it recordings tell too little. Run from the same starts, it keeps size."
+        "motion: good along the motion, but across it recordings tell too little. Run from the same starts, it keeps "
+        "size."
     )
     assert told["held_out"] == pytest.approx(1.0, abs=1e-6)
     assert (told["demonstrations"], told["samples"]) == (3, 120)

@@ -6,6 +6,7 @@ MIT licence.
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +51,9 @@ def load_contour(setup: str, *, download: bool = False, rate: float = 20.0) -> l
         As :func:`~unconstrain.datasets.load_rim_wiping`.
     """
     recordings = [_recording(SOURCE.path(f"data_demo_{setup}_{take}.dat", download)) for take in (1, 2)]
-    return uc.prepare(recordings, uc.Recipe(states=POSITION, differentiate="savgol", rate=rate))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "rest: ")  # it is known of these recordings
+        return uc.prepare(recordings, uc.Recipe(states=POSITION, differentiate="savgol", rate=rate))
 
 
 def _recording(path: Path) -> uc.Recording:
