@@ -14,6 +14,7 @@ import os
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from glob import glob
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from ...base.display import listed, meant
 from ...base.errors import NOTHING_LEFT, ReadError, SettingError
 from ...base.foreign import ours_alone, unchanged
 from ..demonstration import Recording
+from .blocks import continued, gathered
 from .folders import files_in
 from .formats import format_of
 from .reading import Reading
@@ -94,9 +96,9 @@ def read(
 
 
 def read_blocks(path: PathLike, reading: Reading | None = None, *, whole: bool = False) -> Iterator[Recording]:
-    """Read one file recording by recording, and larger ones by some rows at a time where the format can.
+    """Read one file recording by recording, each in one piece; very long ones by some rows where the format can.
 
-    Blocks of one recording have one name. Errors as in :func:`read`; with ``whole`` each recording comes in one piece.
+    Blocks of one recording have one name. Errors as in :func:`read`; with ``whole`` nothing is too long for one piece.
     """
     file, told = Path(path), reading or Reading()
     known = format_of(file)
@@ -107,8 +109,9 @@ def read_blocks(path: PathLike, reading: Reading | None = None, *, whole: bool =
     blocks = None if whole else known.blocks
     assembly = Assembly(file, told, blocks is not None)
     with ours_alone(file, known.expected), unchanged(file):
-        for table in (blocks or known.read)(file, told):
-            yield from assembly.recordings(table)
+        tables = known.read(file, told) if blocks is None else gathered(blocks(file, told))
+        found = (one for table in tables for one in assembly.recordings(table))
+        yield from found if known.blocks is None else continued(found, inf if whole else None)
 
 
 def check_left_out(names: Iterable[str], came: Collection[str]) -> None:

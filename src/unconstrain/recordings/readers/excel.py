@@ -15,11 +15,12 @@ from ...base.arrays import require_extra
 from ...base.display import meant
 from ...base.errors import ReadError
 from ...base.files import stem
+from .blocks import joined
 from .layout import find_block
 from .lines import Lines
 from .reading import Reading
 from .table import Format, Table
-from .text import joined, tables_of_text
+from .text import tables_of_text
 
 DELIMITER = "\t"
 

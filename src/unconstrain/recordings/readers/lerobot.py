@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -15,7 +15,6 @@ from ...base.errors import ReadError
 from .table import Table
 
 TASK = "task_index"
-EPISODE = "episode_index"
 
 
 @dataclass(frozen=True)
@@ -50,32 +49,6 @@ def data_set_of(path: Path) -> DataSet:
         return DataSet()
     info = root / "meta" / "info.json"
     return _data_set(root, info.stat().st_mtime_ns if info.is_file() else 0)
-
-
-def whole_episodes(tables: Iterable[Table]) -> Iterator[Table]:
-    """Blocks of rows cut where an episode ends; the rows of one stand together."""
-    rest: Table | None = None
-    for table in tables:
-        both = table if rest is None else _joined(rest, table)
-        episodes = both.words.get(EPISODE)
-        if episodes is None:
-            yield both
-            continue
-        start = next(at for at in range(len(episodes)) if episodes[at] == episodes[-1])
-        if start:
-            yield _rows(both, slice(0, start))
-        rest = _rows(both, slice(start, None))
-    if rest is not None:
-        yield rest
-
-
-def _joined(one: Table, other: Table) -> Table:
-    words = {name: [*cells, *other.words[name]] for name, cells in one.words.items()}
-    return replace(one, values=np.concatenate([one.values, other.values]), words=words)
-
-
-def _rows(table: Table, rows: slice) -> Table:
-    return replace(table, values=table.values[rows], words={name: cells[rows] for name, cells in table.words.items()})
 
 
 @lru_cache(maxsize=8)

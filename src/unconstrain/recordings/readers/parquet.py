@@ -15,16 +15,16 @@ from ...base.arrays import BLOCK_ROWS, Array, require_extra
 from ...base.display import listed
 from ...base.errors import ReadError
 from .clocks import UNITS
-from .lerobot import DataSet, data_set_of, whole_episodes
+from .lerobot import DataSet, data_set_of
 from .reading import Reading
 from .table import Format, Table, find_roles, numbers_of, unique_names
 
 
 def read_parquet(path: Path, reading: Reading) -> Iterator[Table]:
-    """Read one file whole, of a LeRobot data set episode by episode; see :class:`~.table.ReadFile`."""
+    """Read one file whole, of a LeRobot data set, with episodes, by blocks; see :class:`~.table.ReadFile`."""
     whole = data_set_of(path)
     if whole.has_episodes:
-        yield from whole_episodes(read_parquet_blocks(path, reading))
+        yield from read_parquet_blocks(path, reading)
         return
     with _opened(path) as file:
         yield _table(file.read(), path, reading, whole)

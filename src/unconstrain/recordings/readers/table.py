@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -181,6 +182,7 @@ class Assembly:
         self._parts: dict[str, int] = {}
         self._starts: dict[str, Start] = {}
         self._latest: dict[str, float | None] = {}
+        self._rows = Counter[str]()
 
     def recordings(self, table: Table) -> list[Recording]:
         """The recordings in a table, or in a block of it, as far as they are asked for."""
@@ -238,7 +240,9 @@ class Assembly:
     def _times_of_rate(self, table: Table) -> Array | None:
         if not table.rate or not np.isfinite(table.rate) or table.rate <= 0:
             return None
-        return np.arange(len(table.values)) / table.rate
+        begun = self._rows[table.name]
+        self._rows[table.name] += len(table.values)
+        return (begun + np.arange(len(table.values))) / table.rate
 
     def _hinted(self, found: list[Recording], table: Table, roles: Roles) -> list[Recording]:
         """Recordings, the first with a remark where another column takes apart more."""
