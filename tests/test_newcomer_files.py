@@ -52,6 +52,30 @@ def test_that_nothing_tells_the_time_is_said_before_fit_refuses(tmp_path):
     assert "Nothing tells the time" not in text(call("inspect", file, "--rate", 20))
 
 
+# Encoders
+
+
+def arrival(counts, seam=False, rest=0):
+    """Four joints (T, 5), the first hardly moved, that come slowly to a goal, in counts of an encoder of so many."""
+    clock = np.arange(2400) * 0.004
+    joints = [0.0012, 0.05, 0.08, 0.05] * np.exp(-clock[:, None] * [0.45, 0.5, 0.4, 0.45])
+    joints[1000:] += 0.02 * seam
+    joints = np.insert(joints, [600] * rest, joints[600], axis=0)
+    joints = np.round((joints + 0.4) * counts / (2 * np.pi)) * 2 * np.pi / counts
+    return np.column_stack([np.arange(len(joints)) * 0.004, joints])
+
+
+@pytest.mark.parametrize("bits", [12, 14])
+def test_single_counts_of_an_encoder_are_no_jumps_and_a_slow_arrival_is_no_pause(tmp_path, bits):
+    how = ("--state", "q0,q1,q2,q3", "--differentiate")
+    for kind, given in {"plain": {}, "seam": {"seam": True}, "rest": {"rest": 800}}.items():
+        file = write(tmp_path / f"{kind}.csv", "t,q0,q1,q2,q3", arrival(2**bits, **given))
+        [found] = json.loads(call("inspect", file, *how, "--json").out)["demonstrations"]
+        codes = {one["code"] for one in found["warnings"]}
+        assert ("seam" in codes) == (kind == "seam")
+        assert ("pause" in codes) == (kind == "rest")
+
+
 # Rows without numbers
 
 

@@ -22,6 +22,9 @@ AROUND = 10
 LONGEST_GLITCH = 30
 """Samples that are off their neighbours together for longer are no glitch but a place."""
 
+COUNTS = 3.0
+"""So many counts of an encoder, or fewer, are no jump, and no way from a pause: one that moves slowly stands between."""
+
 MOST_COLUMNS = 100
 """Of more columns, so many show whether rows are at two places."""
 
@@ -100,17 +103,24 @@ def seams(values: Array) -> list[int]:
     values : ndarray, shape (T, n)
         Without glitches.
     """
-    far = _far(steps := _steps(values))
+    far = _far(steps := _steps(values, resolution(values)), _steps(values))
     alone = [start for start, stop in stretches(far) if stop - start == 1 and _stands_out(steps, far, start, stop)]
     return [start + 1 for start in alone if AROUND / 2 <= start + 1 <= len(values) - AROUND / 2]
 
 
-def _steps(values: Array) -> Array:
-    """Lengths (T − 1,) of steps, each column in its extent."""
-    extent = np.ptp(values, axis=0)
+def resolution(values: Array) -> Array:
+    """What some counts of an encoder make in each column, by its smallest steps, shape (n,); 0 where nothing moves."""
+    steps = (np.abs(np.diff(column)) for column in values.T)
+    return COUNTS * np.array([np.quantile(one[one > 0], 0.1) if one.any() else 0.0 for one in steps])
+
+
+def _steps(values: Array, least: Array | None = None) -> Array:
+    """Lengths (T − 1,) of steps, each column in its extent, without those of at most some lengths (n,)."""
+    extent, least = np.ptp(values, axis=0), np.zeros(values.shape[1]) if least is None else least
     squares = np.zeros(len(values) - 1)
     for column in np.flatnonzero(extent > 0):
-        squares += (np.diff(values[:, column]) / extent[column]) ** 2
+        steps = np.diff(values[:, column])
+        squares += np.where(np.abs(steps) > least[column], steps / extent[column], 0.0) ** 2
     return np.sqrt(squares)
 
 
@@ -166,8 +176,10 @@ def _bursts(signal: Array) -> Iterator[tuple[int, int]]:
             yield away + 1, back + 1
 
 
-def _far(sizes: Array) -> NDArray[np.bool_]:
-    moving = sizes[sizes > 0]
+def _far(sizes: Array, every: Array | None = None) -> NDArray[np.bool_]:
+    """Which steps are far beyond most of all, by default of the same."""
+    every = sizes if every is None else every
+    moving = every[every > 0]
     usual = float(np.quantile(moving, 0.9)) if moving.size >= AROUND else np.inf
     far: NDArray[np.bool_] = sizes > FAR * usual
     return far
