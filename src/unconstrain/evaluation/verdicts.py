@@ -441,6 +441,7 @@ def of_early_end(found: Verdict, why: str) -> Verdict:
 
 
 PLAIN = {"seam": "jumps to another place", "stale": "values that repeat", "clock-gap": "gaps in time"}
+PLAIN |= {"empty-cells": "rows without numbers"}
 """Codes of remarks that are no words, in words."""
 
 SAME_CAUSE = ("clock-gap", "seam", "few-demonstrations")
@@ -455,7 +456,7 @@ def of_surveys(surveys: Sequence[Any], needed: str = "", then: str = "unconstrai
     """
     count, few = _count(len(surveys)), len(surveys) < ENOUGH
     fewer = f"{count}: 'fit' tells what was free from {ENOUGH} or more, held in different ways." if few else ""
-    warned = [found for found in surveys if {one.code for one in found.warnings} - {"clock-gap"}]
+    warned = [found for found in surveys if {one.code for one in found.warnings} - {"clock-gap", "empty-cells"}]
     odd = {one.code: one for found in reversed(surveys) for one in reversed(found.warnings)}
     kept = [code for code in odd if "several-in-one" not in odd or code not in SAME_CAUSE]
     said = f"{len(warned)} of {count} not as it should be: "
