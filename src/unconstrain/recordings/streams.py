@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cached_property
-from itertools import chain, groupby, pairwise
+from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ from ..base.arrays import BLOCK_ROWS, Array, check_at_least
 from ..base.errors import NOTHING_LEFT, ReadError
 from ..base.foreign import Stamp, unchanged
 from ..models import spaces
-from .demonstration import Demonstration, Recording, noise_of, stack, times_of
+from .demonstration import Demonstration, Recording, noise_of, times_of
 from .preparation import Recipe, decide, prepare
 from .preparation.movements import prepare_one, warn
 from .preparation.plausibility.outlines import Outline
@@ -56,7 +56,7 @@ class Stream:
 
     One file is in memory at a time. Of text, Parquet, HDF5 and NumPy arrays it is at most 262,144 rows at once, where
     the recipe treats each row by itself (actions are columns, nothing is resampled, trimmed or centred): a longer
-    demonstration is prepared in parts, whose rest and pauses are kept. What is small is kept.
+    demonstration is prepared in parts, and rest after the first is kept. What is small is held.
 
     Parameters
     ----------
@@ -166,12 +166,15 @@ class Stream:
             self._say_what_differs()
             check_left_out(sorted(self.leave_out), self._came)
         self._walked = True
-        self._begun = _whole(held)
+        self._begun = _begins(held)
         if size <= HELD_BYTES:
             self._held = held
 
     def beginning(self) -> list[Demonstration]:
-        """Demonstrations, as many from the first on as :data:`HELD_BYTES` hold: what a page can show."""
+        """Demonstrations, as many from the first on as :data:`HELD_BYTES` hold: what a page can show.
+
+        Of very long ones it is the first part.
+        """
         if self._begun:
             return list(self._begun)
         shown: list[tuple[str, Demonstration]] = []
@@ -181,7 +184,7 @@ class Stream:
             if shown and size > HELD_BYTES:
                 break
             shown.append(named)
-        return _whole(shown)
+        return _begins(shown)
 
     def parts(self) -> list[Stream]:
         """One stream for each file, which together say the same; they can be sent to other processes."""
@@ -202,14 +205,13 @@ class Stream:
         self._outlines.clear()  # of a walk that was left
         for number, path in enumerate(self.paths, start=self._first_file):
             before = Counter[str]()
-            for recording, goes_on in _with_next(self._blocks(path, whole=not by_rows)):
-                in_parts = goes_on or before[recording.name] > 0
+            for recording in self._blocks(path, whole=not by_rows):
                 with warnings.catch_warnings():
                     if self._walked:  # it was said on the first walk
                         warnings.simplefilter("ignore", UserWarning)
-                    elif in_parts:  # that it stands still in a part says nothing of the whole
+                    elif before[recording.name]:  # that it stands still in a part says nothing of the whole
                         warnings.filterwarnings("ignore", "(rest|pause|stop): ", UserWarning)
-                    demonstration = self._prepared(recording, before[recording.name], in_parts)
+                    demonstration = self._prepared(recording, before[recording.name])
                 name = f"{number}/{recording.name}"
                 contents[name] = recording.content(self.recipe, contents.get(name))
                 before[recording.name] += len(recording)
@@ -226,13 +228,13 @@ class Stream:
                 if recording.name not in self.leave_out:
                     yield recording
 
-    def _prepared(self, recording: Recording, before: int, in_parts: bool) -> Demonstration:
-        """A recording, or a part of it after so many rows, whose ends may be in its middle, as a demonstration."""
-        subject = Subject(recording, replace(self.recipe, pauses="keep") if in_parts else self.recipe)
+    def _prepared(self, recording: Recording, before: int) -> Demonstration:
+        """A recording, or a part of it after so many rows, whose start is in the middle, as a demonstration."""
+        subject = Subject(recording, replace(self.recipe, pauses="keep") if before else self.recipe)
         if not self._walked and not before and len(self._outlines) < MOST_OUTLINES:
             self._outlines.append((recording.title, outline(subject)))
-        if in_parts and not before:
-            said = f"has more than {WHOLE_ROWS:,} rows, so it is prepared in parts; rest and pauses in it are kept."
+        if before:
+            said = f"has more than {WHOLE_ROWS:,} rows, so it is prepared in parts; rest after the first is kept."
             warn(recording.title, [Remark("in-parts", said)])
         prepared = prepare_one(subject)
         source = prepared.source
@@ -264,19 +266,6 @@ class Stream:
         return {**self.__dict__, "_held": None, "_begun": [], "_progress": None}
 
 
-def _whole(named: Iterable[tuple[str, Demonstration]]) -> list[Demonstration]:
-    """Demonstrations with their parts, one after the other under one name, end to end."""
-    return [_end_to_end([one for _, one in parts]) for _, parts in groupby(named, itemgetter(0))]
-
-
-def _end_to_end(parts: list[Demonstration]) -> Demonstration:
-    states, actions, _ = stack(parts)
-    long = replace(parts[0], states=states, actions=actions, times=times_of(parts), source=None)
-    return parts[0] if len(parts) == 1 else long
-
-
-def _with_next(recordings: Iterable[Recording]) -> Iterator[tuple[Recording, bool]]:
-    """Recordings, and whether the next is a further part of the same."""
-    for one, following in pairwise(chain(recordings, [None])):
-        if one is not None:
-            yield one, following is not None and following.name == one.name
+def _begins(named: Iterable[tuple[str, Demonstration]]) -> list[Demonstration]:
+    """Demonstrations, of very long ones the first part."""
+    return [next(parts)[1] for _, parts in groupby(named, itemgetter(0))]

@@ -87,12 +87,13 @@ def prepare(recordings: Recording | Sequence[Recording], recipe: Recipe | None =
     PreparationWarning
         For what is not what it seems, with its code; for irregular stamps that had to be resampled before they could
         be differentiated, for a smoothing window that holds too few samples, for stamps that occur twice (the first
-        row is kept), for rows without numbers, left out where there are times, and for pieces between gaps that are too short for the smoothing window.
+        row is kept), for rows without numbers, left out where there are times, and for pieces between gaps that are
+        too short for the smoothing window.
 
     Raises
     ------
     InvalidDataError
-        If a selected cell is empty or not finite and there are no times, stamps are not finite or run backwards, or nothing is left.
+        If a stamp is not finite, or without times a selected cell, stamps run backwards, or nothing is left.
     SettingError
         If the columns do not tell what is what, or times are needed and missing.
 

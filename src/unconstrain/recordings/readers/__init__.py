@@ -22,7 +22,7 @@ from ...base.display import listed, meant
 from ...base.errors import NOTHING_LEFT, ReadError, SettingError
 from ...base.foreign import ours_alone, unchanged
 from ..demonstration import Recording
-from .blocks import continued, gathered
+from . import blocks
 from .folders import files_in
 from .formats import format_of
 from .reading import Reading
@@ -106,12 +106,12 @@ def read_blocks(path: PathLike, reading: Reading | None = None, *, whole: bool =
         raise SettingError(f"columns: {file} says itself what its columns are called; leave them off.")
     if told.topic is not None and not known.has_topics:
         raise SettingError(f"topic: {file} has none; ROS recordings have topics, and workbooks sheets.")
-    blocks = None if whole else known.blocks
-    assembly = Assembly(file, told, blocks is not None)
+    assembly, most = Assembly(file, told), inf if whole else blocks.WHOLE_ROWS
     with ours_alone(file, known.expected), unchanged(file):
-        tables = known.read(file, told) if blocks is None else gathered(blocks(file, told))
-        found = (one for table in tables for one in assembly.recordings(table))
-        yield from found if known.blocks is None else continued(found, inf if whole else None)
+        tables = known.read(file, told)
+        gathered = blocks.gathered(tables, most) if known.in_blocks else tables
+        found = (one for table in gathered for one in assembly.recordings(table))
+        yield from blocks.continued(found, most) if known.in_blocks else found
 
 
 def check_left_out(names: Iterable[str], came: Collection[str]) -> None:

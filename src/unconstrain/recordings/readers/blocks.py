@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -13,18 +12,15 @@ from .table import Table
 WHOLE_ROWS = 2**18
 """What has no more rows than this is read whole; a longer table or demonstration comes by so many rows at a time."""
 
-RESERVED = 2**28
-"""Bytes of addresses for a table, so that it grows in its place; none that is not used takes memory."""
+
+def gathered(tables: Iterable[Table], most: float) -> Iterator[Table]:
+    """Blocks of rows as tables: whole where they have at most so many rows, else so many at a time."""
+    return _merged(tables, lambda one, other: _head(one) == _head(other), _joined, most)
 
 
-def gathered(tables: Iterable[Table]) -> Iterator[Table]:
-    """Blocks of rows as tables: whole where they have at most :data:`WHOLE_ROWS`, else so many rows at a time."""
-    return _merged(tables, lambda one, other: _head(one) == _head(other), lambda parts: joined(iter(parts)), WHOLE_ROWS)
-
-
-def continued(recordings: Iterable[Recording], most: float | None = None) -> Iterator[Recording]:
+def continued(recordings: Iterable[Recording], most: float) -> Iterator[Recording]:
     """Recordings of which one block may end with what the next goes on with, up to so many rows at once."""
-    return _merged(recordings, _goes_on, _end_to_end, WHOLE_ROWS if most is None else most)
+    return _merged(recordings, _goes_on, _end_to_end, most)
 
 
 def _merged(
@@ -33,36 +29,25 @@ def _merged(
     waiting, rows = list[Any](), 0
     for part in parts:
         if waiting and (rows + len(part.values) > most or not goes_on(waiting[-1], part)):
-            yield join(waiting)
+            yield join(waiting) if waiting[1:] else waiting[0]
             waiting, rows = [], 0
         waiting.append(part)
         rows += len(part.values)
     if waiting:
-        yield join(waiting)
+        yield join(waiting) if waiting[1:] else waiting[0]
 
 
-def joined(tables: Iterator[Table]) -> Table:
-    """Blocks of one table, end to end, with no more than one of them in memory twice; one alone as it is."""
-    first = next(tables)
-    second = next(tables, None)
-    if second is None:
-        return first
-    width = first.values.shape[1]
-    values = np.empty((RESERVED // (8 * max(width, 1)), width))
-    words: dict[str, list[Any]] = {name: [] for name in first.words}
-    breaks, lines, rows = list[int](), list[Any](), 0
-    for table in chain([first, second], tables):
-        breaks += [rows + at for at in table.breaks]
-        lines.append(table.lines)
-        stop = rows + len(table.values)
-        if stop > len(values):
-            values.resize((stop, width), refcheck=False)
-        values[rows:stop], rows = table.values, stop
-        for name, cells in table.words.items():
-            words[name] += cells
-    values.resize((rows, width), refcheck=False)
-    known = None if lines[0] is None else np.concatenate(lines)
-    return replace(first, values=values, words=words, breaks=tuple(breaks), lines=known)
+def _joined(tables: list[Table]) -> Table:
+    starts = np.cumsum([0, *(len(one.values) for one in tables)])
+    return replace(
+        tables[0],
+        values=np.concatenate([one.values for one in tables]),
+        words={name: [cell for one in tables for cell in one.words[name]] for name in tables[0].words},
+        breaks=tuple(int(start) + at for start, one in zip(starts, tables, strict=False) for at in one.breaks),
+        lines=None
+        if tables[0].lines is None
+        else np.concatenate([one.lines for one in tables if one.lines is not None]),
+    )
 
 
 def _head(table: Table) -> tuple[Any, ...]:

@@ -24,7 +24,6 @@ class DataSet:
     names: Mapping[str, list[str]] = field(default_factory=dict)
     fps: float | None = None
     tasks: Mapping[int, str] = field(default_factory=dict)
-    has_episodes: bool = False
 
     def described(self, table: Table) -> Table:
         """A table with its rate, and its tasks in words."""
@@ -59,7 +58,7 @@ def _data_set(root: Path, _changed: int) -> DataSet:
     features = described if isinstance(described, dict) else {}
     names = {title: _names(feature.get("names")) for title, feature in features.items() if isinstance(feature, dict)}
     fps = info.get("fps")
-    return DataSet(names, float(fps) if isinstance(fps, int | float) else None, dict(_tasks(root / "meta")), True)
+    return DataSet(names, float(fps) if isinstance(fps, int | float) else None, dict(_tasks(root / "meta")))
 
 
 def _read_json(path: Path) -> dict[str, Any]:

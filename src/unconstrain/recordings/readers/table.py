@@ -68,8 +68,8 @@ class ReadFile(Protocol):
 class Format(NamedTuple):
     """A file format: how to know it, and how to read it.
 
-    ``suffixes`` in small letters with the dot; ``recognises`` looks at the first bytes of a file; ``read`` reads it
-    whole, ``blocks``, if given, by some rows at a time. A format ``by_content`` is known by its first bytes whatever
+    ``suffixes`` in small letters with the dot; ``recognises`` looks at the first bytes of a file; ``read`` reads it,
+    ``in_blocks`` by some rows at a time. A format ``by_content`` is known by its first bytes whatever
     the suffix says; one that ``has_names`` says itself what its columns are called, one that ``has_topics`` holds
     several recordings of which one is chosen. ``expected`` is what errors say that such a file is.
     """
@@ -77,7 +77,7 @@ class Format(NamedTuple):
     suffixes: tuple[str, ...]
     recognises: Callable[[bytes], bool]
     read: ReadFile
-    blocks: ReadFile | None = None
+    in_blocks: bool = False
     by_content: bool = True
     has_names: bool = False
     has_topics: bool = False
@@ -170,14 +170,11 @@ class Assembly:
     ----------
     path : Path
     reading : Reading
-    in_blocks : bool
-        Whether a table is only some rows of one.
     """
 
-    def __init__(self, path: Path, reading: Reading, in_blocks: bool = False) -> None:
+    def __init__(self, path: Path, reading: Reading) -> None:
         self.path = path
         self.reading = reading
-        self._in_blocks = in_blocks
         self._clocks: dict[str, Clock] = {}
         self._parts: dict[str, int] = {}
         self._starts: dict[str, Start] = {}
@@ -248,7 +245,7 @@ class Assembly:
         """Recordings, the first with a remark where another column takes apart more."""
         first, *others = found
         name, count = _labels(table, roles)
-        said = f"has {'several' if self._in_blocks else count} values, a stroke each by its jumps: give group={name!r}."
+        said = f"has {count} values, a stroke each by its jumps: give group={name!r}."
         hint = (Remark("several-in-one", said, name),) if count > 1 + len(others) else ()
         return [replace(first, remarks=(*first.remarks, *hint)), *others]
 

@@ -20,7 +20,6 @@ from ...base.display import listed
 from ...base.errors import ReadError
 from ...base.files import stem
 from ..remarks import Remark
-from .blocks import joined
 from .cells import Cells, Parser
 from .layout import Layout, find_layout, is_comment, split
 from .lines import Lines, head_of, lines_of, texts
@@ -32,12 +31,7 @@ DELIMITERS = ",\t;|"
 
 
 def read_text(path: Path, reading: Reading) -> Iterator[Table]:
-    """Read one text whole; see :class:`~.table.ReadFile`. Errors name the line and the column too."""
-    yield joined(read_text_blocks(path, reading))
-
-
-def read_text_blocks(path: Path, reading: Reading) -> Iterator[Table]:
-    """Go through one text by some megabytes at a time."""
+    """Read one text by some megabytes at a time; see :class:`~.table.ReadFile`. Errors name the line and column too."""
     try:
         with opened(path) as file:
             blocks = lines_of(file, path)
@@ -141,5 +135,5 @@ def _recognises(head: bytes) -> bool:
 SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".trc", ".mot", ".sto", ".log", ".asc", ".ssv", ".data", ".out")
 
 FORMAT = Format(
-    SUFFIXES, _recognises, read_text, read_text_blocks, by_content=False, expected="a table as text, in UTF-8"
+    SUFFIXES, _recognises, read_text, in_blocks=True, by_content=False, expected="a table as text, in UTF-8"
 )

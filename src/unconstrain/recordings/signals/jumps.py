@@ -23,7 +23,7 @@ LONGEST_GLITCH = 30
 """Samples that are off their neighbours together for longer are no glitch but a place."""
 
 COUNTS = 3.0
-"""So many counts of an encoder, or fewer, are no jump, and no way from a pause: one that moves slowly stands between."""
+"""So many counts of an encoder, or fewer, are no jump, and no way from a pause: it moves slowly."""
 
 MOST_COLUMNS = 100
 """Of more columns, so many show whether rows are at two places."""
