@@ -44,6 +44,20 @@ def test_a_first_column_that_rises_as_a_clock_is_told_and_the_command_that_follo
     assert "clock-untold" not in text(call("inspect", write(bare / "w0.csv", "x,y,vx,vy", grid)))  # one that is named
 
 
+def test_a_count_of_rows_that_is_told_as_the_time_is_answered_with_the_column_that_tells_it(tmp_path):
+    counted = np.column_stack([np.arange(1000.0, 1040.0), stroke(0)])
+    file = write(tmp_path / "w.csv", "seq,stamp,x,y", counted)
+    said = text(call("inspect", file, *READ, "--time", "seq"))
+    assert "counts rows, one by one, so it tells no time; name one that does with --time stamp." in said
+    assert "--time-unit" not in said
+    [typed] = re.findall(r"Then: unconstrain (fit .*) -o policy.npz", said)
+    assert "--time stamp" in typed
+    assert "seq" not in typed
+    assert "clock-unit" not in text(call("inspect", file, *READ, "--time", "stamp"))
+    alone = text(call("inspect", write(tmp_path / "v.csv", "seq,x,y", counted[:, [0, 2, 3]]), *READ, "--time", "seq"))
+    assert "1 samples a second; if all are so, say the unit" in alone
+
+
 def test_that_nothing_tells_the_time_is_said_before_fit_refuses(tmp_path):
     file = write(tmp_path / "w.csv", "x,y", stroke(0)[:, 1:])
     said = text(call("inspect", file))

@@ -441,7 +441,6 @@ def of_early_end(found: Verdict, why: str) -> Verdict:
 
 
 PLAIN = {"seam": "jumps to another place", "stale": "values that repeat", "clock-gap": "gaps in time"}
-PLAIN |= {"empty-cells": "rows without numbers"}
 """Codes of remarks that are no words, in words."""
 
 SAME_CAUSE = ("clock-gap", "seam", "few-demonstrations")

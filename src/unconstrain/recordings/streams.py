@@ -54,9 +54,8 @@ class Block(NamedTuple):
 class Stream:
     """Files as batches, for :meth:`~unconstrain.ParametricPolicy.fit_batches`; can be walked through many times.
 
-    One file is in memory at a time. Of text, Parquet, HDF5 and NumPy arrays it is at most 262,144 rows at once, where
-    the recipe treats each row by itself (actions are columns, nothing is resampled, trimmed or centred): a longer
-    demonstration is prepared in parts, and rest after the first is kept. What is small is held.
+    One file is in memory at a time; of text, Parquet, HDF5 and NumPy arrays at most 262,144 rows, where the recipe
+    treats each by itself (actions are columns, nothing is resampled, trimmed or centred). What is small is kept.
 
     Parameters
     ----------
@@ -171,10 +170,7 @@ class Stream:
             self._held = held
 
     def beginning(self) -> list[Demonstration]:
-        """Demonstrations, as many from the first on as :data:`HELD_BYTES` hold: what a page can show.
-
-        Of very long ones it is the first part.
-        """
+        """Demonstrations, of long ones the first part, as many as :data:`HELD_BYTES` hold: what a page can show."""
         if self._begun:
             return list(self._begun)
         shown: list[tuple[str, Demonstration]] = []

@@ -106,12 +106,10 @@ def read_blocks(path: PathLike, reading: Reading | None = None, *, whole: bool =
         raise SettingError(f"columns: {file} says itself what its columns are called; leave them off.")
     if told.topic is not None and not known.has_topics:
         raise SettingError(f"topic: {file} has none; ROS recordings have topics, and workbooks sheets.")
-    assembly, most = Assembly(file, told), inf if whole else blocks.WHOLE_ROWS
+    assembly, most = Assembly(file, told), (inf if whole else blocks.WHOLE_ROWS) if known.in_blocks else -1
     with ours_alone(file, known.expected), unchanged(file):
-        tables = known.read(file, told)
-        gathered = blocks.gathered(tables, most) if known.in_blocks else tables
-        found = (one for table in gathered for one in assembly.recordings(table))
-        yield from blocks.continued(found, most) if known.in_blocks else found
+        tables = blocks.gathered(known.read(file, told), most)
+        yield from blocks.continued((one for table in tables for one in assembly.recordings(table)), most)
 
 
 def check_left_out(names: Iterable[str], came: Collection[str]) -> None:

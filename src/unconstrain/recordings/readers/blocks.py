@@ -1,6 +1,6 @@
 """Tables and recordings that came by some rows at a time, put together again as far as memory should hold them."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +15,7 @@ WHOLE_ROWS = 2**18
 
 def gathered(tables: Iterable[Table], most: float) -> Iterator[Table]:
     """Blocks of rows as tables: whole where they have at most so many rows, else so many at a time."""
-    return _merged(tables, lambda one, other: _head(one) == _head(other), _joined, most)
+    return _merged(tables, _is_more, _joined, most)
 
 
 def continued(recordings: Iterable[Recording], most: float) -> Iterator[Recording]:
@@ -37,22 +37,17 @@ def _merged(
         yield join(waiting) if waiting[1:] else waiting[0]
 
 
+def _is_more(one: Table, other: Table) -> bool:
+    """Whether a block is of the same table."""
+    same = all(getattr(one, name) == getattr(other, name) for name in ("name", "columns", "labels"))
+    return same and [*one.words] == [*other.words]
+
+
 def _joined(tables: list[Table]) -> Table:
-    starts = np.cumsum([0, *(len(one.values) for one in tables)])
-    return replace(
-        tables[0],
-        values=np.concatenate([one.values for one in tables]),
-        words={name: [cell for one in tables for cell in one.words[name]] for name in tables[0].words},
-        breaks=tuple(int(start) + at for start, one in zip(starts, tables, strict=False) for at in one.breaks),
-        lines=None
-        if tables[0].lines is None
-        else np.concatenate([one.lines for one in tables if one.lines is not None]),
-    )
-
-
-def _head(table: Table) -> tuple[Any, ...]:
-    """What blocks of one table have in common."""
-    return table.name, table.columns, (*table.words,), table.labels
+    starts = np.cumsum([0, *(len(one.values) for one in tables)]).tolist()
+    breaks = tuple(start + at for start, one in zip(starts, tables, strict=False) for at in one.breaks)
+    words = {name: [cell for one in tables for cell in one.words[name]] for name in tables[0].words}
+    return replace(tables[0], words=words, breaks=breaks, **_rows(tables, "values", "lines"))
 
 
 def _goes_on(one: Recording, other: Recording) -> bool:
@@ -61,6 +56,10 @@ def _goes_on(one: Recording, other: Recording) -> bool:
 
 
 def _end_to_end(parts: list[Recording]) -> Recording:
-    tables = {name: [getattr(one, name) for one in parts] for name in ("values", "times", "lines")}
-    rows: dict[str, Any] = {name: None if each[0] is None else np.concatenate(each) for name, each in tables.items()}
-    return replace(parts[0], **rows, remarks=tuple(remark for one in parts for remark in one.remarks))
+    remarks = tuple(remark for one in parts for remark in one.remarks)
+    return replace(parts[0], remarks=remarks, **_rows(parts, "values", "times", "lines"))
+
+
+def _rows(parts: Sequence[Any], *names: str) -> dict[str, Any]:
+    every = {name: [getattr(one, name) for one in parts] for name in names}
+    return {name: None if each[0] is None else np.concatenate(each) for name, each in every.items()}

@@ -237,9 +237,8 @@ class Assembly:
     def _times_of_rate(self, table: Table) -> Array | None:
         if not table.rate or not np.isfinite(table.rate) or table.rate <= 0:
             return None
-        begun = self._rows[table.name]
         self._rows[table.name] += len(table.values)
-        return (begun + np.arange(len(table.values))) / table.rate
+        return np.arange(self._rows[table.name] - len(table.values), self._rows[table.name]) / table.rate
 
     def _hinted(self, found: list[Recording], table: Table, roles: Roles) -> list[Recording]:
         """Recordings, the first with a remark where another column takes apart more."""

@@ -127,7 +127,7 @@ def _steps(values: Array, least: Array | None = None) -> Array:
 def _unseen(values: Array) -> Iterator[Glitch]:
     """Rows at an end that repeat one value in all columns, a jump away: a tracker did not see yet, or any more."""
     steps = _steps(values) if len(values) else np.zeros(0)
-    far, moved = _far(steps), np.flatnonzero(steps)
+    far, moved = _far(steps, steps), np.flatnonzero(steps)
     ends = [(moved[0], 0, moved[0] + 1), (moved[-1], moved[-1] + 1, len(values))] if moved.size else []
     for jump, start, stop in ends:
         if 1 < stop - start <= len(values) / 2 and far[jump] and _stands_out(steps, far, jump, jump + 1):
@@ -164,7 +164,7 @@ def _is_impulse(residual: Array, row: int) -> bool:
 def _bursts(signal: Array) -> Iterator[tuple[int, int]]:
     """Several samples off together: a jump away, and the same one back."""
     steps = np.diff(signal)
-    far = _far(np.abs(steps))
+    far = _far(np.abs(steps), np.abs(steps))
     runs = [(start, stop) for start, stop in stretches(far) if _stands_out(np.abs(steps), far, start, stop)]
     for start, stop in runs:
         if 2 <= stop - start <= 4 and abs(steps[start:stop].sum()) < 0.3 * np.abs(steps[start:stop]).max():
@@ -176,9 +176,7 @@ def _bursts(signal: Array) -> Iterator[tuple[int, int]]:
             yield away + 1, back + 1
 
 
-def _far(sizes: Array, every: Array | None = None) -> NDArray[np.bool_]:
-    """Which steps are far beyond most of all, by default of the same."""
-    every = sizes if every is None else every
+def _far(sizes: Array, every: Array) -> NDArray[np.bool_]:
     moving = every[every > 0]
     usual = float(np.quantile(moving, 0.9)) if moving.size >= AROUND else np.inf
     far: NDArray[np.bool_] = sizes > FAR * usual

@@ -9,7 +9,7 @@ import numpy as np
 
 from ....base.arrays import Array
 from ....base.display import counted, listed
-from ...readers.clocks import UNITS, usual
+from ...readers.clocks import UNITS, find_clock, usual
 from ...remarks import Remark
 from ...signals.orientations import TURNS, wraps
 from ...signals.stillness import SHORTEST_STOP_S, STOP_ROWS, is_noise, noise_share, rest_at_ends, stops
@@ -55,6 +55,9 @@ def clock_unit(subject: Subject) -> Remark | None:
     rates = 1.0 / typical, float(len(intervals) / (stamps[-1] - stamps[0]))
     if max(rates) > SLOWEST and min(rates) < FASTEST:
         return None
+    if typical == 1.0 and (stamps == np.round(stamps)).all() and (other := find_clock(subject.recording.columns)):
+        said = "the column of time counts rows, one by one, so it tells no time; name one that does with time="
+        return Remark("clock-unit", f"{said}{other.whole!r}.")
     unit = next((unit for unit, seconds in UNITS.items() if seconds / max(rates) < 1.0 / SLOWEST), "ns")
     cure = f"such as time_unit={unit!r}" if max(rates) <= SLOWEST else "time_unit=, or the right column with time="
     said = f"{rates[0]:.3g} samples a second; if all are so, say the unit of the time stamps, {cure}."
@@ -80,10 +83,10 @@ def empty_cells(subject: Subject) -> Remark | None:
     """Rows without numbers, where the clock shows that they are missing."""
     if not subject.skips:
         return None
-    rows, used = np.flatnonzero(~subject.filled), (*(subject.recipe.states or ()), *(subject.recipe.actions or ()))
-    names = [name for name in used if not np.isfinite(subject.recording.select((name,))).all()]
-    said = f"{counted(len(rows), 'row')} without numbers in {listed(names, 8)}, empty or NaN, left out: a gap in time."
-    return Remark("empty-cells", said, row=int(rows[0]))
+    rows, used = np.flatnonzero(~subject.filled), {*(subject.recipe.states or ()), *(subject.recipe.actions or ())}
+    names = sorted(one for one in used if not np.isfinite(subject.recording.select((one,))).all())
+    said = f"{counted(len(rows), 'row')} without numbers in {listed(names, 8)}, empty or NaN, left out; "
+    return Remark("empty-cells", f"{said}longer gaps are cut (max_gap_s=).", row=int(rows[0]), cured=True)
 
 
 def clock_untold(subject: Subject) -> Remark | None:
