@@ -290,14 +290,24 @@ def stale(rng):
     return Fault(*recorded(tables, dt), "stale", which, None)
 
 
-def missing(rng):
+def empty_cells(rng):
     recordings, recipe = recorded(*movements(rng))
     which = int(rng.integers(len(recordings)))
     steps, n = recordings[which].values.shape
     at = int(rng.integers(steps - 1))
     values = recordings[which].values.copy()
-    values[at : at + int(rng.choice([1, 5, 20])), rng.integers(n)] = np.nan
+    values[at : at + int(rng.choice([1, 3])), rng.integers(n)] = np.nan
     recordings[which] = replace(recordings[which], values=values)
+    return Fault(recordings, recipe, "empty-cells", which, at)
+
+
+def missing(rng):
+    recordings, recipe = recorded(*movements(rng))
+    which = int(rng.integers(len(recordings)))
+    times = recordings[which].times.copy()
+    at = int(rng.integers(len(times) - 1))
+    times[at : at + int(rng.choice([1, 3]))] = np.nan
+    recordings[which] = replace(recordings[which], times=times)
     return Fault(recordings, recipe, "missing", which, at)
 
 
@@ -342,7 +352,7 @@ def not_velocities(rng):
 FAULTS = (
     nothing, nothing_with_actions, angle_wrap, quaternion_flip, rotation_vector_flip, seam, glitch, clock_unit,
     clock_gap, targets, mixed_units, unit_differs, pause, backwards, at_rest, all_zero, few_demonstrations, row_order,
-    other_topic, clock_differs, columns_differ, clock_untold, stale, missing, refused,
+    other_topic, clock_differs, columns_differ, clock_untold, stale, empty_cells, missing, refused,
     angle_unused, same_recording, not_velocities,
 )  # fmt: skip
 

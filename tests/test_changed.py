@@ -64,7 +64,8 @@ def replaced(path, originals):
 
 @pytest.mark.parametrize("change", [shrunk, rewritten, replaced])
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_file_that_changes_while_it_is_read_is_said(originals, tmp_path, kind, change):
+def test_a_file_that_changes_while_it_is_read_is_said(originals, tmp_path, monkeypatch, kind, change):
+    monkeypatch.setattr(readers.blocks, "WHOLE_ROWS", 2**16)
     path = shutil.copy(originals / f"whole.{kind}", tmp_path / f"a.{kind}")
     blocks = readers.read_blocks(path)
     assert len(next(blocks)) < ROWS
@@ -86,7 +87,8 @@ def test_a_file_that_changes_between_two_walks_is_said(originals, tmp_path, kind
         list(stream)
 
 
-def test_an_array_is_read_by_rows_as_it_is_whole(tmp_path):
+def test_an_array_is_read_by_rows_as_it_is_whole(tmp_path, monkeypatch):
+    monkeypatch.setattr(readers.blocks, "WHOLE_ROWS", 2**16)
     table = np.random.default_rng(0).normal(size=(ROWS, 2))
     for kind in ("f8", "f4", ">f8", "i4"):
         np.save(tmp_path / "a.npy", (100 * table).astype(kind))

@@ -910,9 +910,9 @@ def bad(folder, what):
     path = folder / f"{what}.csv"
     rows = [[f"{value:.6f}" for value in row] for row in record((0.5, 0.5))]
     if what == "hole":
-        rows[7][2] = ""
+        rows[7][0] = ""
     if what == "nan":
-        rows[7][2] = "nan"
+        rows[7][0] = "nan"
     if what == "word":
         rows[7][2] = "left"
     if what == "backwards":
@@ -930,14 +930,14 @@ def bad(folder, what):
         (
             lambda at: bad(at, "hole"),
             (
-                "{at}/hole.csv, row 7 (line 9), column 'y': found nan (1 such cell in the selected columns), "
+                "{at}/hole.csv, row 7 (line 9), column 'time': found nan (1 such cell in the selected columns), "
                 "expected finite numbers. Remove or repair these rows first."
             ),
         ),
         (
             lambda at: bad(at, "nan"),
             (
-                "{at}/nan.csv, row 7 (line 9), column 'y': found nan (1 such cell in the selected columns), "
+                "{at}/nan.csv, row 7 (line 9), column 'time': found nan (1 such cell in the selected columns), "
                 "expected finite numbers. Remove or repair these rows first."
             ),
         ),

@@ -44,6 +44,20 @@ def test_a_first_column_that_rises_as_a_clock_is_told_and_the_command_that_follo
     assert "clock-untold" not in text(call("inspect", write(bare / "w0.csv", "x,y,vx,vy", grid)))  # one that is named
 
 
+def test_a_count_of_rows_that_is_told_as_the_time_is_answered_with_the_column_that_tells_it(tmp_path):
+    counted = np.column_stack([np.arange(1000.0, 1040.0), stroke(0)])
+    file = write(tmp_path / "w.csv", "seq,stamp,x,y", counted)
+    said = text(call("inspect", file, *READ, "--time", "seq"))
+    assert "counts rows, one by one, so it tells no time; name one that does with --time stamp." in said
+    assert "--time-unit" not in said
+    [typed] = re.findall(r"Then: unconstrain (fit .*) -o policy.npz", said)
+    assert "--time stamp" in typed
+    assert "seq" not in typed
+    assert "clock-unit" not in text(call("inspect", file, *READ, "--time", "stamp"))
+    alone = text(call("inspect", write(tmp_path / "v.csv", "seq,x,y", counted[:, [0, 2, 3]]), *READ, "--time", "seq"))
+    assert "1 samples a second; if all are so, say the unit" in alone
+
+
 def test_that_nothing_tells_the_time_is_said_before_fit_refuses(tmp_path):
     file = write(tmp_path / "w.csv", "x,y", stroke(0)[:, 1:])
     said = text(call("inspect", file))
@@ -52,20 +66,87 @@ def test_that_nothing_tells_the_time_is_said_before_fit_refuses(tmp_path):
     assert "Nothing tells the time" not in text(call("inspect", file, "--rate", 20))
 
 
+# Encoders
+
+
+def arrival(counts, seam=False, rest=0):
+    """Four joints (T, 5), the first hardly moved, that come slowly to a goal, in counts of an encoder of so many."""
+    clock = np.arange(2400) * 0.004
+    joints = [0.0012, 0.05, 0.08, 0.05] * np.exp(-clock[:, None] * [0.45, 0.5, 0.4, 0.45])
+    joints[1000:] += 0.02 * seam
+    joints = np.insert(joints, [600] * rest, joints[600], axis=0)
+    joints = np.round((joints + 0.4) * counts / (2 * np.pi)) * 2 * np.pi / counts
+    return np.column_stack([np.arange(len(joints)) * 0.004, joints])
+
+
+@pytest.mark.parametrize("bits", [12, 14])
+def test_single_counts_of_an_encoder_are_no_jumps_and_a_slow_arrival_is_no_pause(tmp_path, bits):
+    how = ("--state", "q0,q1,q2,q3", "--differentiate")
+    for kind, given in {"plain": {}, "seam": {"seam": True}, "rest": {"rest": 800}}.items():
+        file = write(tmp_path / f"{kind}.csv", "t,q0,q1,q2,q3", arrival(2**bits, **given))
+        [found] = json.loads(call("inspect", file, *how, "--json").out)["demonstrations"]
+        codes = {one["code"] for one in found["warnings"]}
+        assert ("seam" in codes) == (kind == "seam")
+        assert ("pause" in codes) == (kind == "rest")
+
+
 # Rows without numbers
 
 
-def test_rows_without_numbers_are_no_gap_of_the_clock(tmp_path):
-    rows = stroke(0)
-    rows[12:22, 1:] = np.nan
+def warned_of(file, *how):
+    """Codes with the rows that a look at one recording warns of."""
+    [found] = json.loads(run("inspect", file, *how, "--json"))["demonstrations"]
+    return {one["code"]: one["row"] for one in found["warnings"] if one["code"] != "few-demonstrations"}
+
+
+def test_rows_without_numbers_are_left_out_as_rows_that_the_clock_misses(tmp_path):
+    whole = [stroke(k, jitter=0.0) for k in range(4)]
+    empty, absent = whole[0].copy(), np.delete(whole[0], slice(12, 22), axis=0)
+    empty[12:22, 1:] = np.nan
+    policies = []
+    for name, first in {"empty": empty, "absent": absent}.items():
+        (tmp_path / name).mkdir()
+        files = [write(tmp_path / name / f"w{k}.csv", "t,x,y", one) for k, one in enumerate([first, *whole[1:]])]
+        said = text(call("inspect", *files, *READ))
+        assert said.startswith("✔ 4 demonstrations, nothing odd but gaps in time")
+        typed = re.search(r"Next: unconstrain (fit .* -o) policy.npz", said)[1]
+        ran = call(*shlex.split(typed), tmp_path / f"{name}.npz", *LINEAR)
+        assert ran.code == 0
+        assert ("empty-cells: 'w0', row 12 (line 14): 10 rows without numbers in x, y" in text(ran)) == (
+            name == "empty"
+        )
+        assert "clock-gap: 'w0'" in text(ran)
+        policies.append(uc.load(tmp_path / f"{name}.npz"))
+        told = warned_of(files[0], *READ)
+        assert told == ({"empty-cells": 12, "clock-gap": 22} if name == "empty" else {"clock-gap": 12})
+    assert np.array_equal(*(policy.predict(whole[1][:, 1:]) for policy in policies))
+    strict = call("fit", tmp_path / "empty", *READ, *LINEAR, "-o", tmp_path / "p.npz", "--strict")
+    assert strict.code == 2
+    assert not (tmp_path / "p.npz").exists()
+
+
+def test_rows_without_numbers_are_refused_where_no_clock_shows_that_they_are_missing(tmp_path):
+    rows = np.column_stack([stroke(0)[:, 1:], stroke(1)[:, 1:]])
+    rows[12, 0] = np.nan
+    file, how = write(tmp_path / "w.csv", "x,y,vx,vy", rows), ("--state", "x,y", "--action", "vx,vy")
+    assert "column 'x': found nan" in refused("fit", file, *how, "-o", tmp_path / "p.npz")
+    assert warned_of(file, *how) == {"missing": 12}
+    assert warned_of(file, *how, "--rate", "20") == {"empty-cells": 12}
+
+
+@pytest.mark.parametrize("absent", [3, 7])
+def test_rows_that_are_missing_among_regular_stamps_are_said_and_counted_in_one_way(tmp_path, absent):
+    rows = np.delete(stroke(0, jitter=0.0), slice(12, 12 + absent), axis=0)
     [found] = json.loads(run("inspect", write(tmp_path / "w.csv", "t,x,y", rows), *READ, "--json"))["demonstrations"]
-    told = {one["code"]: one for one in found["warnings"]}
-    assert set(told) == {"missing", "few-demonstrations"}
-    assert told["missing"]["row"] == 12
-    assert told["missing"]["message"].startswith("10 rows without numbers in x, y, empty or NaN,")
-    late = np.delete(stroke(0), slice(12, 22), axis=0)  # they are not there at all
-    [found] = json.loads(run("inspect", write(tmp_path / "w.csv", "t,x,y", late), *READ, "--json"))["demonstrations"]
-    assert "clock-gap" in [one["code"] for one in found["warnings"]]
+    codes = {one["code"] for one in found["warnings"]}
+    notes = {one["code"]: one["message"] for one in found["notes"]}
+    assert len(found["gaps"]) == ("clock-gap" in codes) == (absent > 4)
+    assert ("rows-missing" in notes) == (absent == 3)
+    assert "3 rows are missing" in notes.get("rows-missing", "3 rows are missing")
+    assert "irregular" not in notes
+    assert found["jitter"] < 0.001
+    jittered = write(tmp_path / "w.csv", "t,x,y", stroke(0, jitter=0.2))
+    assert "irregular: 'w': time stamps are irregular" in text(call("inspect", jittered, *READ))
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -127,7 +208,7 @@ def test_messages_name_the_line_of_the_file(tmp_path, kind):
         cells = [line.split(",") for line in lines]
         typed = [[float(cell) if cell else None for cell in line] for line in cells[1:]]
         file = workbook(tmp_path / "w.xlsx", Messung=[cells[0], *typed])
-    assert f"(line {at + 1}), column 'y': found nan" in refused("fit", file, *READ, "-o", tmp_path / "p.npz")
+    assert f"(line {at + 1}): 1 row without numbers in y" in text(call("fit", file, *READ, "-o", tmp_path / "p.npz"))
     assert f"(line {at + 1}): 1 row without numbers in y" in text(call("inspect", file, *READ))
 
 
@@ -170,10 +251,10 @@ def test_a_recording_that_ends_a_fit_is_named_with_what_leaves_it_out_and_then_f
 def test_what_a_file_is_called_does_not_change_what_cures_it(tmp_path, name):
     write(tmp_path / "w0.csv", "t,x,y", stroke(0))
     odd = stroke(1)
-    odd[3, 1] = np.nan
+    odd[3, 0] = np.nan
     file = write(tmp_path / f"{name}.csv", "t,x,y", odd)
     said = refused("fit", tmp_path, *READ, "-o", tmp_path / "p.npz")
-    assert said.startswith(f"{file}, row 3 (line 5), column 'x': found nan")
+    assert said.startswith(f"{file}, row 3 (line 5), column 'time': found nan")
     assert said.endswith(f" Or leave it out: --leave-out {shlex.quote(name)}")
     said = refused("fit", tmp_path, "--state", "x,z", "--differentiate", "-o", tmp_path / "p.npz")
     assert "has no column 'z'" in said

@@ -94,7 +94,8 @@ def test_nothing_is_said_of_real_recordings(recordings, every):
 @needs_data
 def test_a_tracker_that_is_slower_than_its_clock_is_found_in_real_recordings():
     for recording in contours(every=True):
-        assert codes([recording], uc.Recipe(recording.columns, differentiate="savgol")) == [["stale"]], recording.name
+        [found] = codes([recording], uc.Recipe(recording.columns, differentiate="savgol"))
+        assert {*found} - {"clock-gap"} == {"stale"}, recording.name  # the stamps of one come in pairs
 
 
 @pytest.mark.slow

@@ -15,10 +15,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 import unconstrain as uc
 from conftest import POLICIES
 from samples import draw
+from test_cli import call
+from test_newcomer import text
 from unconstrain.base.errors import InvalidDataError, MissingExtraError, ReadError, SettingError
 from unconstrain.recordings import streams
 from unconstrain.recordings.preparation import Recipe
-from unconstrain.recordings.readers import hdf5, parquet, read_blocks
+from unconstrain.recordings.readers import blocks, hdf5, parquet, read_blocks
 from unconstrain.training import Batch, FirstLook, batches, first_look
 
 DATA = draw(samples=400, groups=7)
@@ -244,6 +246,7 @@ def test_content_tells_them_without_a_suffix(tmp_path, table, suffix):
     assert len(uc.read(path)) == 3
 
 
+@pytest.mark.filterwarnings("ignore:in-parts")
 @pytest.mark.parametrize("suffix", WRITERS)
 def test_a_stream_of_files_is_the_same_as_reading_them_all(tmp_path, table, suffix, monkeypatch):
     for number, rows in enumerate((slice(0, 120), slice(120, 400))):
@@ -253,6 +256,7 @@ def test_a_stream_of_files_is_the_same_as_reading_them_all(tmp_path, table, suff
     whole = uc.LocallyLinearPolicy(0.5, learner=uc.Hybrid()).fit_demonstrations(
         uc.prepare(uc.read(files), recipe), speed_power=1.0
     )
+    monkeypatch.setattr(blocks, "WHOLE_ROWS", 50)
     for module in (streams, parquet, hdf5):
         monkeypatch.setattr(module, "BLOCK_ROWS", 50)
     for held in (0, 2**20):
@@ -288,15 +292,55 @@ def test_parts_of_a_stream_say_what_the_stream_says(tmp_path, table):
         assert_array_equal(mine, theirs)
 
 
-@pytest.mark.filterwarnings("ignore:at-rest")
+@pytest.mark.filterwarnings("ignore:at-rest", "ignore:in-parts")
 def test_a_recipe_that_needs_neighbours_keeps_recordings_whole(tmp_path, table, monkeypatch):
     path = write_parquet(tmp_path / "wipes.parquet", table)
     monkeypatch.setattr(parquet, "BLOCK_ROWS", 50)
+    whole = uc.Stream(path, Recipe(states=("x", "y"), actions=("vx", "vy")))
+    assert [len(demo) for _, demo in whole.named_demonstrations()] == [120, 180, 100]
+    monkeypatch.setattr(blocks, "WHOLE_ROWS", 50)
     by_rows = uc.Stream(path, Recipe(states=("x", "y"), actions=("vx", "vy")))
     smoothed = uc.Stream(path, Recipe(states=("x", "y"), differentiate="savgol"))
     assert max(len(demo) for _, demo in by_rows.named_demonstrations()) == 50
     assert [len(demo) for _, demo in smoothed.named_demonstrations()] == [120, 180, 100]
     assert len({name for name, _ in by_rows.named_demonstrations()}) == 3
+
+
+@pytest.fixture
+def rested(tmp_path, monkeypatch):
+    """Three demonstrations that stand still for 60 of 200 rows before they start, in a text of several blocks each."""
+    monkeypatch.setattr("unconstrain.recordings.readers.lines.BLOCK_BYTES", 2000)
+    monkeypatch.setattr("unconstrain.recordings.readers.lines.HEAD_BYTES", 2000)
+    clock, rng = np.arange(200) * 0.02, np.random.default_rng(0)
+    for number in range(3):
+        angle = np.maximum(clock - 60 * 0.02, 0.0)
+        place = np.column_stack([np.cos(angle), np.sin(angle)]) * (number + 1)
+        place += 1e-4 * rng.standard_normal(place.shape)
+        columns = zip(("t", "x", "y", "vx", "vy"), (clock, *place.T, *np.gradient(place, 0.02, axis=0).T), strict=True)
+        write_csv(tmp_path / f"arc{number}.csv", dict(columns))
+    return sorted(tmp_path.glob("arc*.csv"))
+
+
+def test_a_text_of_several_blocks_is_one_demonstration_with_its_rest(rested):
+    said = text(call("fit", *rested, "--model", "affine", "--learner", "direct", "-o", rested[0].with_name("p.npz")))
+    assert "'arc0': stands still for 61 of 200 rows (1.22 s) before it starts, left out" in said
+    assert "3 demonstrations, 417 samples" in said
+    assert "at its end" not in said
+    assert "in-parts" not in said
+
+
+@pytest.mark.filterwarnings("ignore:at-rest")
+def test_a_demonstration_too_long_to_hold_is_one_whose_parts_keep_their_rest(rested, monkeypatch):
+    monkeypatch.setattr(blocks, "WHOLE_ROWS", 90)
+    stream = uc.Stream(rested)
+    with pytest.warns(uc.preparation.PreparationWarning) as said:
+        parts = [(name, len(demo)) for name, demo in stream.named_demonstrations()]
+    told = [one.message.remark.code for one in said]
+    assert told.count("in-parts") >= 3
+    assert told.count("rest") == 3  # where each begins
+    assert len({name for name, _ in parts}) == 3 < len(parts)
+    assert 400 < sum(rows for _, rows in parts) < 600
+    assert [demo.name for demo in stream.beginning()] == ["arc0", "arc1", "arc2"]
 
 
 def test_a_folder_stands_for_the_parquet_files_in_it(tmp_path, table):

@@ -247,8 +247,10 @@ def test_rows_are_those_of_the_recording_whatever_is_left_out_between(recipe):
     assert np.abs(times[order][demo.source.rows] - demo.times).max() <= most + 1e-9
 
 
+@pytest.mark.filterwarnings("ignore:in-parts")
 def test_rows_of_blocks_go_on_from_block_to_block(tmp_path, monkeypatch):
     monkeypatch.setattr(parquet, "BLOCK_ROWS", 8)
+    monkeypatch.setattr("unconstrain.recordings.readers.blocks.WHOLE_ROWS", 8)
     columns = {name: np.arange(20.0) + at for at, name in enumerate(("t", "x", "vx"))}
     pq.write_table(pa.table(columns), tmp_path / "a.parquet")
     blocks = [demo for _, demo in uc.Stream(tmp_path / "a.parquet").named_demonstrations()]

@@ -455,7 +455,7 @@ def of_surveys(surveys: Sequence[Any], needed: str = "", then: str = "unconstrai
     """
     count, few = _count(len(surveys)), len(surveys) < ENOUGH
     fewer = f"{count}: 'fit' tells what was free from {ENOUGH} or more, held in different ways." if few else ""
-    warned = [found for found in surveys if {one.code for one in found.warnings} - {"clock-gap"}]
+    warned = [found for found in surveys if {one.code for one in found.warnings} - {"clock-gap", "empty-cells"}]
     odd = {one.code: one for found in reversed(surveys) for one in reversed(found.warnings)}
     kept = [code for code in odd if "several-in-one" not in odd or code not in SAME_CAUSE]
     said = f"{len(warned)} of {count} not as it should be: "

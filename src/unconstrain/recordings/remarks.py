@@ -14,6 +14,7 @@ WARNINGS = (
     "clock-unit",
     "clock-differs",
     "clock-gap",
+    "empty-cells",
     "clock-untold",
     "stale",
     "missing",

@@ -1,4 +1,4 @@
-"""From files to batches to learn from, with no more in memory than a block of rows or one file."""
+"""From files to batches to learn from, with no more in memory than one file, or the rows of a part of a long one."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cached_property
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,12 +27,14 @@ from .preparation.plausibility.outlines import Outline
 from .preparation.plausibility.sets import compare, outline
 from .preparation.plausibility.subject import Subject
 from .readers import Reading, check_left_out, expand, read_blocks
+from .readers.blocks import WHOLE_ROWS
+from .remarks import Remark
 
 HELD_BYTES = 2**25
 """Demonstrations that take no more than this in all are kept after the first walk, so files are walked through once."""
 
 MOST_OUTLINES = 1000
-"""So many demonstrations, or blocks of rows of them, are compared with each other."""
+"""So many demonstrations, of very long ones their first rows, are compared with each other."""
 
 
 class Block(NamedTuple):
@@ -50,8 +54,8 @@ class Block(NamedTuple):
 class Stream:
     """Files as batches, for :meth:`~unconstrain.ParametricPolicy.fit_batches`; can be walked through many times.
 
-    One file is in memory at a time; of Parquet and HDF5 files a block of rows, where the recipe treats each row by
-    itself (actions are columns, nothing is resampled, trimmed or centred). What is small is kept.
+    One file is in memory at a time; of text, Parquet, HDF5 and NumPy arrays at most 262,144 rows, where the recipe
+    treats each by itself (actions are columns, nothing is resampled, trimmed or centred). What is small is kept.
 
     Parameters
     ----------
@@ -107,7 +111,7 @@ class Stream:
 
     @cached_property
     def first(self) -> Recording:
-        """The first recording, or the first block of it; a ReadError where none is left."""
+        """The first recording, or the first rows of a very long one; a ReadError where none is left."""
         blocks = (block for path in self.paths for block in self._blocks(path))
         try:
             return next(blocks)
@@ -128,7 +132,7 @@ class Stream:
 
     @cached_property
     def unit(self) -> float:
-        """Speeds are taken relative to the largest of the first block."""
+        """Speeds are taken relative to the largest of the first recording."""
         actions = prepare(self.first, self.recipe)[0].actions if self.speed_power else np.zeros((1, 1))
         return float(np.linalg.norm(actions, axis=1).max()) or 1.0
 
@@ -146,7 +150,7 @@ class Stream:
             yield self._batch(waiting)
 
     def named_demonstrations(self) -> Iterator[tuple[str, Demonstration]]:
-        """Demonstrations, or blocks of rows of them, each with a name that no other demonstration has."""
+        """Demonstrations, very long ones in parts, each with a name that no other demonstration has."""
         if self._held is not None:
             yield from self._held
             return
@@ -161,22 +165,22 @@ class Stream:
             self._say_what_differs()
             check_left_out(sorted(self.leave_out), self._came)
         self._walked = True
-        self._begun = [demonstration for _, demonstration in held]
+        self._begun = _begins(held)
         if size <= HELD_BYTES:
             self._held = held
 
     def beginning(self) -> list[Demonstration]:
-        """Demonstrations, as many from the first on as :data:`HELD_BYTES` hold: what a page can show."""
+        """Demonstrations, of long ones the first part, as many as :data:`HELD_BYTES` hold: what a page can show."""
         if self._begun:
             return list(self._begun)
-        shown: list[Demonstration] = []
+        shown: list[tuple[str, Demonstration]] = []
         size = 0
-        for _, demonstration in self.named_demonstrations():
-            size += demonstration.states.nbytes + demonstration.actions.nbytes
+        for named in self.named_demonstrations():
+            size += named[1].states.nbytes + named[1].actions.nbytes
             if shown and size > HELD_BYTES:
                 break
-            shown.append(demonstration)
-        return shown
+            shown.append(named)
+        return _begins(shown)
 
     def parts(self) -> list[Stream]:
         """One stream for each file, which together say the same; they can be sent to other processes."""
@@ -201,6 +205,8 @@ class Stream:
                 with warnings.catch_warnings():
                     if self._walked:  # it was said on the first walk
                         warnings.simplefilter("ignore", UserWarning)
+                    elif before[recording.name]:  # that it stands still in a part says nothing of the whole
+                        warnings.filterwarnings("ignore", "(rest|pause|stop): ", UserWarning)
                     demonstration = self._prepared(recording, before[recording.name])
                 name = f"{number}/{recording.name}"
                 contents[name] = recording.content(self.recipe, contents.get(name))
@@ -219,10 +225,13 @@ class Stream:
                     yield recording
 
     def _prepared(self, recording: Recording, before: int) -> Demonstration:
-        """A recording, or a block of it after so many rows, as a demonstration."""
-        subject = Subject(recording, self.recipe)
-        if not self._walked and len(self._outlines) < MOST_OUTLINES:
+        """A recording, or a part of it after so many rows, whose start is in the middle, as a demonstration."""
+        subject = Subject(recording, replace(self.recipe, pauses="keep") if before else self.recipe)
+        if not self._walked and not before and len(self._outlines) < MOST_OUTLINES:
             self._outlines.append((recording.title, outline(subject)))
+        if before:
+            said = f"has more than {WHOLE_ROWS:,} rows, so it is prepared in parts; rest after the first is kept."
+            warn(recording.title, [Remark("in-parts", said)])
         prepared = prepare_one(subject)
         source = prepared.source
         return replace(prepared, source=None if source is None else source._replace(rows=source.rows + before))
@@ -251,3 +260,8 @@ class Stream:
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_held": None, "_begun": [], "_progress": None}
+
+
+def _begins(named: Iterable[tuple[str, Demonstration]]) -> list[Demonstration]:
+    """Demonstrations, of very long ones the first part."""
+    return [next(parts)[1] for _, parts in groupby(named, itemgetter(0))]

@@ -87,12 +87,13 @@ def prepare(recordings: Recording | Sequence[Recording], recipe: Recipe | None =
     PreparationWarning
         For what is not what it seems, with its code; for irregular stamps that had to be resampled before they could
         be differentiated, for a smoothing window that holds too few samples, for stamps that occur twice (the first
-        row is kept), and for pieces between gaps that are too short for the smoothing window.
+        row is kept), for rows without numbers, left out where there are times, and for pieces between gaps that are
+        too short for the smoothing window.
 
     Raises
     ------
     InvalidDataError
-        If a selected cell is empty or not finite, stamps run backwards, or nothing is left.
+        If a stamp is not finite, or without times a selected cell, stamps run backwards, or nothing is left.
     SettingError
         If the columns do not tell what is what, or times are needed and missing.
 
@@ -276,10 +277,11 @@ def _prepare(subject: Subject) -> tuple[Demonstration, list[Remark]]:
     recording, recipe = subject.recording, subject.recipe
     if not len(recording):
         raise InvalidDataError(f"'{recording.name}' has no samples, expected at least one.")
-    states = _finite(recording, recipe.states or (), recipe)
+    kept = np.flatnonzero(subject.filled) if subject.skips else slice(None)
+    states = _finite(recording, recipe.states or (), recipe, kept)
     if subject.isolated:
-        states[subject.rows] = repaired(subject.states, subject.isolated)
-    actions = None if recipe.actions is None else _finite(recording, recipe.actions, recipe)
+        states[(np.cumsum(subject.filled) - 1)[subject.rows]] = repaired(subject.states, subject.isolated)
+    actions = None if recipe.actions is None else _finite(recording, recipe.actions, recipe, kept)
     times = stamps(recording, recipe)
     _check_finite(recording, np.empty((0, 0)) if times is None else times[:, None], ("time",))
     notes: list[Remark] = []
@@ -287,12 +289,12 @@ def _prepare(subject: Subject) -> tuple[Demonstration, list[Remark]]:
     if times is None:
         at, states, actions = _in_rows(states, actions, recipe)
     else:
-        stamped = times
+        stamped = times = times[kept]
         piece, notes = _without_repeats(_Piece(*_sorted(times, states, actions, recipe)), recording)
         pieces = _split(_without_glitches(piece._replace(states=continuous(piece.states, recipe)), recipe), recipe)
         (times, states, actions, noise), more = _repair(pieces, recipe, recording.name)
         notes += more
-        at = _nearest(stamped, times)
+        at = np.arange(len(recording))[kept][_nearest(stamped, times)]
     if actions is None:
         raise LackingError(
             f"'{recording.name}' has no times, which are needed to differentiate: "
@@ -318,8 +320,8 @@ def _about_centre(states: Array) -> list[Remark]:
     return [Remark("centred", said)]
 
 
-def _finite(recording: Recording, names: Sequence[str], recipe: Recipe) -> Array:
-    return _check_finite(recording, select(recording, names, recipe), names)
+def _finite(recording: Recording, names: Sequence[str], recipe: Recipe, rows: slice | NDArray[np.intp]) -> Array:
+    return _check_finite(recording, select(recording, names, recipe)[rows], names)
 
 
 def _check_finite(recording: Recording, values: Array, names: Sequence[str]) -> Array:

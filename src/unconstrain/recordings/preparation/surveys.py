@@ -13,7 +13,7 @@ from ..demonstration import Recording
 from ..remarks import Remark, titled
 from .decisions import in_radians, may_be_degrees, unused
 from .movements import Gap, find_gaps, prepare_one, window_used
-from .plausibility.checks import examine, once
+from .plausibility.checks import examine, once, rows_missing
 from .plausibility.sets import compare, outline, too_few
 from .plausibility.subject import Subject
 from .recipes import Recipe, complete_recipe, stamps
@@ -120,7 +120,7 @@ def _survey(subject: Subject, asked: Recipe) -> Survey:
     recording, acts = subject.recording, subject.recipe.actions
     times = stamps(recording, asked)
     known = np.empty(0) if times is None else times[np.isfinite(times)]
-    gaps = find_gaps(known - known[:1], asked.max_gap_s)
+    gaps = find_gaps((known if subject.stamps is None else subject.stamps) - known[:1].sum(), asked.max_gap_s)
     left, refused = _prepared(subject)
     guessed = (*may_be_degrees(asked, subject.recipe, recording), *unused(asked, subject.recipe, recording))
     remarks = (*examine(subject), *guessed, *refused)
@@ -150,7 +150,7 @@ def _prepared(subject: Subject) -> tuple[int | None, tuple[Remark, ...]]:
     """How many samples are left where it is trimmed, and why it is refused; what is long is prepared for no other."""
     recording, recipe = subject.recording, subject.recipe
     used, trimmed = (*(recipe.states or ()), *(recipe.actions or ())), (recipe.trim, recipe.still) != (None, None)
-    missing = ~np.isfinite(recording.select(used))
+    missing = ~np.isfinite(recording.select(used)) & (not subject.skips)
     if subject.times is not None:
         missing = np.column_stack([missing, ~np.isfinite(subject.times)])
     if rows := np.flatnonzero(missing.any(axis=1)).tolist():
@@ -192,4 +192,6 @@ def _completed(recipe: Recipe, recording: Recording) -> Recipe:
 def _steady_intervals(times: Array, gaps: tuple[Gap, ...]) -> Array:
     intervals = np.diff(times)
     shortest_gap = min((gap.length for gap in gaps), default=np.inf)
-    return intervals[(intervals > 0) & (intervals < shortest_gap)]
+    steady = intervals[(intervals > 0) & (intervals < shortest_gap)]
+    typical = float(np.median(steady)) if steady.size else 0.0
+    return steady[steady < 1.5 * typical] if rows_missing(steady, typical) else steady

@@ -14,6 +14,7 @@ import os
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from glob import glob
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from ...base.display import listed, meant
 from ...base.errors import NOTHING_LEFT, ReadError, SettingError
 from ...base.foreign import ours_alone, unchanged
 from ..demonstration import Recording
+from . import blocks
 from .folders import files_in
 from .formats import format_of
 from .reading import Reading
@@ -94,9 +96,9 @@ def read(
 
 
 def read_blocks(path: PathLike, reading: Reading | None = None, *, whole: bool = False) -> Iterator[Recording]:
-    """Read one file recording by recording, and larger ones by some rows at a time where the format can.
+    """Read one file recording by recording, each in one piece; very long ones by some rows where the format can.
 
-    Blocks of one recording have one name. Errors as in :func:`read`; with ``whole`` each recording comes in one piece.
+    Blocks of one recording have one name. Errors as in :func:`read`; with ``whole`` nothing is too long for one piece.
     """
     file, told = Path(path), reading or Reading()
     known = format_of(file)
@@ -104,11 +106,10 @@ def read_blocks(path: PathLike, reading: Reading | None = None, *, whole: bool =
         raise SettingError(f"columns: {file} says itself what its columns are called; leave them off.")
     if told.topic is not None and not known.has_topics:
         raise SettingError(f"topic: {file} has none; ROS recordings have topics, and workbooks sheets.")
-    blocks = None if whole else known.blocks
-    assembly = Assembly(file, told, blocks is not None)
+    assembly, most = Assembly(file, told), (inf if whole else blocks.WHOLE_ROWS) if known.in_blocks else -1
     with ours_alone(file, known.expected), unchanged(file):
-        for table in (blocks or known.read)(file, told):
-            yield from assembly.recordings(table)
+        tables = blocks.gathered(known.read(file, told), most)
+        yield from blocks.continued((one for table in tables for one in assembly.recordings(table)), most)
 
 
 def check_left_out(names: Iterable[str], came: Collection[str]) -> None:

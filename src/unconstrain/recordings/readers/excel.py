@@ -19,7 +19,7 @@ from .layout import find_block
 from .lines import Lines
 from .reading import Reading
 from .table import Format, Table
-from .text import joined, tables_of_text
+from .text import tables_of_text
 
 DELIMITER = "\t"
 
@@ -59,7 +59,7 @@ def _of_sheet(title: str, lines: list[str], path: Path, reading: Reading, severa
     layout = found[1]
     text = "".join(f"{line}\n" for line in lines[layout.first :]).encode()
     name = f"{stem(path)}/{title}" if several else stem(path)
-    yield joined(tables_of_text(layout, iter([Lines(layout.first, text)]), path, reading, name))
+    yield from tables_of_text(layout, iter([Lines(layout.first, text)]), path, reading, name)
 
 
 def _is_workbook(head: bytes) -> bool:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -45,12 +44,12 @@ _CONTROL_RATE = re.compile(r'"control_freq"\s*:\s*([\d.]+)')
 _ROLES = {"groups": "group"}
 
 
-def read_hdf5(path: Path, reading: Reading, rows: int | None = None) -> Iterator[Table]:
-    """Read one file whole, or by so many rows at a time; see :class:`~.table.ReadFile`."""
-    return apart(_read, path, reading, rows)
+def read_hdf5(path: Path, reading: Reading) -> Iterator[Table]:
+    """Read one file by some rows at a time; see :class:`~.table.ReadFile`."""
+    return apart(_read, path, reading, BLOCK_ROWS)
 
 
-def _read(place: Path, path: Path, reading: Reading, rows: int | None) -> Iterator[Table]:
+def _read(place: Path, path: Path, reading: Reading, rows: int) -> Iterator[Table]:
     h5py = require_extra("h5py", "data")
     with ours_alone(path, EXPECTED), h5py.File(place, "r") as file:
         branch = _branch(file, path.stem, reading, _masks(file, Visit(h5py)), Visit(h5py))
@@ -132,6 +131,6 @@ FORMAT = Format(
     (".h5", ".hdf5", ".hdf", ".he5"),
     lambda head: head.startswith(b"\x89HDF\r\n\x1a\n"),
     read_hdf5,
-    partial(read_hdf5, rows=BLOCK_ROWS),
+    in_blocks=True,
     expected=EXPECTED,
 )

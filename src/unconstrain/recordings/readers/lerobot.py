@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -15,7 +15,6 @@ from ...base.errors import ReadError
 from .table import Table
 
 TASK = "task_index"
-EPISODE = "episode_index"
 
 
 @dataclass(frozen=True)
@@ -25,7 +24,6 @@ class DataSet:
     names: Mapping[str, list[str]] = field(default_factory=dict)
     fps: float | None = None
     tasks: Mapping[int, str] = field(default_factory=dict)
-    has_episodes: bool = False
 
     def described(self, table: Table) -> Table:
         """A table with its rate, and its tasks in words."""
@@ -52,32 +50,6 @@ def data_set_of(path: Path) -> DataSet:
     return _data_set(root, info.stat().st_mtime_ns if info.is_file() else 0)
 
 
-def whole_episodes(tables: Iterable[Table]) -> Iterator[Table]:
-    """Blocks of rows cut where an episode ends; the rows of one stand together."""
-    rest: Table | None = None
-    for table in tables:
-        both = table if rest is None else _joined(rest, table)
-        episodes = both.words.get(EPISODE)
-        if episodes is None:
-            yield both
-            continue
-        start = next(at for at in range(len(episodes)) if episodes[at] == episodes[-1])
-        if start:
-            yield _rows(both, slice(0, start))
-        rest = _rows(both, slice(start, None))
-    if rest is not None:
-        yield rest
-
-
-def _joined(one: Table, other: Table) -> Table:
-    words = {name: [*cells, *other.words[name]] for name, cells in one.words.items()}
-    return replace(one, values=np.concatenate([one.values, other.values]), words=words)
-
-
-def _rows(table: Table, rows: slice) -> Table:
-    return replace(table, values=table.values[rows], words={name: cells[rows] for name, cells in table.words.items()})
-
-
 @lru_cache(maxsize=8)
 def _data_set(root: Path, _changed: int) -> DataSet:
     """What the metadata says, read once for all files until it changes."""
@@ -86,7 +58,7 @@ def _data_set(root: Path, _changed: int) -> DataSet:
     features = described if isinstance(described, dict) else {}
     names = {title: _names(feature.get("names")) for title, feature in features.items() if isinstance(feature, dict)}
     fps = info.get("fps")
-    return DataSet(names, float(fps) if isinstance(fps, int | float) else None, dict(_tasks(root / "meta")), True)
+    return DataSet(names, float(fps) if isinstance(fps, int | float) else None, dict(_tasks(root / "meta")))
 
 
 def _read_json(path: Path) -> dict[str, Any]:

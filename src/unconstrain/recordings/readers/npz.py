@@ -7,7 +7,6 @@ x1..xn and u1..ud. Other arrays are read as :mod:`~.trees` says, and so are thos
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -40,15 +39,15 @@ def read_npz(path: Path, reading: Reading) -> Iterator[Table]:
         raise ReadError(f"{path}: {str(error).removeprefix(f'{path}: ')} {_EXPECTED}.") from error
 
 
-def read_npy(path: Path, reading: Reading, rows: int | None = None) -> Iterator[Table]:
-    """Read one array whole, or go through it by so many rows at a time."""
+def read_npy(path: Path, reading: Reading) -> Iterator[Table]:
+    """Go through one array by some rows at a time."""
     array: Any = OnDisk(path)
-    if rows is None or not array.is_by_rows:
+    if not array.is_by_rows:
         with _nothing_unpickled(path):
             array = np.load(path, allow_pickle=False)
     fields = array.dtype.names
     members = {UNNAMED: array} if fields is None else {name: array[name] for name in fields}
-    yield from tables_of(Branch(members, path.stem), path, reading, rows)
+    yield from tables_of(Branch(members, path.stem), path, reading, BLOCK_ROWS)
 
 
 class OnDisk:
@@ -134,6 +133,6 @@ ARRAY = Format(
     (".npy",),
     lambda head: head.startswith(b"\x93NUMPY"),
     read_npy,
-    partial(read_npy, rows=BLOCK_ROWS),
+    in_blocks=True,
     expected="an array, as from numpy.save",
 )

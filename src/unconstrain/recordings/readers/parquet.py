@@ -1,6 +1,6 @@
 """Parquet files: columns of numbers, or of lists of one length (``state`` becomes ``state1..stateN``).
 
-Read by some rows at a time where asked for. Columns of words are left out, unless one names the demonstrations.
+Read by some rows at a time. Columns of words are left out, unless one names the demonstrations.
 """
 
 from __future__ import annotations
@@ -15,29 +15,21 @@ from ...base.arrays import BLOCK_ROWS, Array, require_extra
 from ...base.display import listed
 from ...base.errors import ReadError
 from .clocks import UNITS
-from .lerobot import DataSet, data_set_of, whole_episodes
+from .lerobot import DataSet, data_set_of
 from .reading import Reading
 from .table import Format, Table, find_roles, numbers_of, unique_names
 
 
 def read_parquet(path: Path, reading: Reading) -> Iterator[Table]:
-    """Read one file whole, of a LeRobot data set episode by episode; see :class:`~.table.ReadFile`."""
-    whole = data_set_of(path)
-    if whole.has_episodes:
-        yield from whole_episodes(read_parquet_blocks(path, reading))
-        return
-    with _opened(path) as file:
-        yield _table(file.read(), path, reading, whole)
-
-
-def read_parquet_blocks(path: Path, reading: Reading) -> Iterator[Table]:
-    """Go through one file by some rows at a time."""
+    """Read one file by some rows at a time; see :class:`~.table.ReadFile`."""
     whole = data_set_of(path)
     with _opened(path) as file:
         rows = 0
         for batch in file.iter_batches(batch_size=BLOCK_ROWS, use_threads=False):
             rows += batch.num_rows
             yield _table(batch, path, reading, whole)
+        if not rows:
+            raise ReadError(f"{path}: no rows, expected at least one.")
         if rows != file.metadata.num_rows:
             raise ReadError(f"{path}: says that it has {file.metadata.num_rows:,} rows, but {rows:,} could be read.")
 
@@ -50,8 +42,6 @@ def _opened(path: Path) -> Any:
 
 def _table(table: Any, path: Path, reading: Reading, whole: DataSet) -> Table:
     titles = unique_names(table.schema.names)
-    if not table.num_rows:
-        raise ReadError(f"{path}: no rows, expected at least one.")
     roles = find_roles(titles, reading, path)
     names: list[str] = []
     columns: list[Array] = []
@@ -134,7 +124,7 @@ FORMAT = Format(
     (".parquet", ".pq"),
     lambda head: head.startswith(b"PAR1"),
     read_parquet,
-    read_parquet_blocks,
+    in_blocks=True,
     has_names=True,
     expected="a Parquet file",
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -67,8 +68,8 @@ class ReadFile(Protocol):
 class Format(NamedTuple):
     """A file format: how to know it, and how to read it.
 
-    ``suffixes`` in small letters with the dot; ``recognises`` looks at the first bytes of a file; ``read`` reads it
-    whole, ``blocks``, if given, by some rows at a time. A format ``by_content`` is known by its first bytes whatever
+    ``suffixes`` in small letters with the dot; ``recognises`` looks at the first bytes of a file; ``read`` reads it,
+    ``in_blocks`` by some rows at a time. A format ``by_content`` is known by its first bytes whatever
     the suffix says; one that ``has_names`` says itself what its columns are called, one that ``has_topics`` holds
     several recordings of which one is chosen. ``expected`` is what errors say that such a file is.
     """
@@ -76,7 +77,7 @@ class Format(NamedTuple):
     suffixes: tuple[str, ...]
     recognises: Callable[[bytes], bool]
     read: ReadFile
-    blocks: ReadFile | None = None
+    in_blocks: bool = False
     by_content: bool = True
     has_names: bool = False
     has_topics: bool = False
@@ -169,18 +170,16 @@ class Assembly:
     ----------
     path : Path
     reading : Reading
-    in_blocks : bool
-        Whether a table is only some rows of one.
     """
 
-    def __init__(self, path: Path, reading: Reading, in_blocks: bool = False) -> None:
+    def __init__(self, path: Path, reading: Reading) -> None:
         self.path = path
         self.reading = reading
-        self._in_blocks = in_blocks
         self._clocks: dict[str, Clock] = {}
         self._parts: dict[str, int] = {}
         self._starts: dict[str, Start] = {}
         self._latest: dict[str, float | None] = {}
+        self._rows = Counter[str]()
 
     def recordings(self, table: Table) -> list[Recording]:
         """The recordings in a table, or in a block of it, as far as they are asked for."""
@@ -238,13 +237,14 @@ class Assembly:
     def _times_of_rate(self, table: Table) -> Array | None:
         if not table.rate or not np.isfinite(table.rate) or table.rate <= 0:
             return None
-        return np.arange(len(table.values)) / table.rate
+        self._rows[table.name] += len(table.values)
+        return np.arange(self._rows[table.name] - len(table.values), self._rows[table.name]) / table.rate
 
     def _hinted(self, found: list[Recording], table: Table, roles: Roles) -> list[Recording]:
         """Recordings, the first with a remark where another column takes apart more."""
         first, *others = found
         name, count = _labels(table, roles)
-        said = f"has {'several' if self._in_blocks else count} values, a stroke each by its jumps: give group={name!r}."
+        said = f"has {count} values, a stroke each by its jumps: give group={name!r}."
         hint = (Remark("several-in-one", said, name),) if count > 1 + len(others) else ()
         return [replace(first, remarks=(*first.remarks, *hint)), *others]
 

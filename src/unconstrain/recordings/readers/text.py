@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,17 +29,9 @@ from .table import Format, Table, find_roles, named_by
 
 DELIMITERS = ",\t;|"
 
-RESERVED = 2**28
-"""Bytes of addresses for a table, so that it grows in its place; none that is not used takes memory."""
-
 
 def read_text(path: Path, reading: Reading) -> Iterator[Table]:
-    """Read one text whole; see :class:`~.table.ReadFile`. Errors name the line and the column too."""
-    yield joined(read_text_blocks(path, reading))
-
-
-def read_text_blocks(path: Path, reading: Reading) -> Iterator[Table]:
-    """Go through one text by some megabytes at a time."""
+    """Read one text by some megabytes at a time; see :class:`~.table.ReadFile`. Errors name the line and column too."""
     try:
         with opened(path) as file:
             blocks = lines_of(file, path)
@@ -54,26 +45,6 @@ def read_text_blocks(path: Path, reading: Reading) -> Iterator[Table]:
         raise ReadError(f"{path}: not UTF-8 text ({error.reason}). Save it as a CSV file in UTF-8.") from error
     except csv.Error as error:
         raise ReadError(f"{path}: not a table of comma-separated values ({error}). Check its quotes.") from error
-
-
-def joined(tables: Iterator[Table]) -> Table:
-    """Blocks of one table, end to end, with no more than one of them in memory twice."""
-    first = next(tables)
-    width = first.values.shape[1]
-    values = np.empty((RESERVED // (8 * max(width, 1)), width))
-    words: dict[str, list[Any]] = {name: [] for name in first.words}
-    breaks, lines, rows = list[int](), list[Any](), 0
-    for table in chain([first], tables):
-        breaks += [rows + at for at in table.breaks]
-        lines.append(table.lines)
-        stop = rows + len(table.values)
-        if stop > len(values):
-            values.resize((stop, width), refcheck=False)
-        values[rows:stop], rows = table.values, stop
-        for name, cells in table.words.items():
-            words[name] += cells
-    values.resize((rows, width), refcheck=False)
-    return replace(first, values=values, words=words, breaks=tuple(breaks), lines=np.concatenate(lines))
 
 
 def tables_of_text(layout: Layout, blocks: Iterator[Lines], path: Path, reading: Reading, name: str) -> Iterator[Table]:
@@ -164,5 +135,5 @@ def _recognises(head: bytes) -> bool:
 SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".trc", ".mot", ".sto", ".log", ".asc", ".ssv", ".data", ".out")
 
 FORMAT = Format(
-    SUFFIXES, _recognises, read_text, read_text_blocks, by_content=False, expected="a table as text, in UTF-8"
+    SUFFIXES, _recognises, read_text, in_blocks=True, by_content=False, expected="a table as text, in UTF-8"
 )

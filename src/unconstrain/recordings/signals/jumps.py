@@ -22,6 +22,9 @@ AROUND = 10
 LONGEST_GLITCH = 30
 """Samples that are off their neighbours together for longer are no glitch but a place."""
 
+COUNTS = 3.0
+"""So many counts of an encoder, or fewer, are no jump, and no way from a pause: it moves slowly."""
+
 MOST_COLUMNS = 100
 """Of more columns, so many show whether rows are at two places."""
 
@@ -100,24 +103,31 @@ def seams(values: Array) -> list[int]:
     values : ndarray, shape (T, n)
         Without glitches.
     """
-    far = _far(steps := _steps(values))
+    far = _far(steps := _steps(values, resolution(values)), _steps(values))
     alone = [start for start, stop in stretches(far) if stop - start == 1 and _stands_out(steps, far, start, stop)]
     return [start + 1 for start in alone if AROUND / 2 <= start + 1 <= len(values) - AROUND / 2]
 
 
-def _steps(values: Array) -> Array:
-    """Lengths (T − 1,) of steps, each column in its extent."""
-    extent = np.ptp(values, axis=0)
+def resolution(values: Array) -> Array:
+    """What some counts of an encoder make in each column, by its smallest steps, shape (n,); 0 where nothing moves."""
+    steps = (np.abs(np.diff(column)) for column in values.T)
+    return COUNTS * np.array([np.quantile(one[one > 0], 0.1) if one.any() else 0.0 for one in steps])
+
+
+def _steps(values: Array, least: Array | None = None) -> Array:
+    """Lengths (T − 1,) of steps, each column in its extent, without those of at most some lengths (n,)."""
+    extent, least = np.ptp(values, axis=0), np.zeros(values.shape[1]) if least is None else least
     squares = np.zeros(len(values) - 1)
     for column in np.flatnonzero(extent > 0):
-        squares += (np.diff(values[:, column]) / extent[column]) ** 2
+        steps = np.diff(values[:, column])
+        squares += np.where(np.abs(steps) > least[column], steps / extent[column], 0.0) ** 2
     return np.sqrt(squares)
 
 
 def _unseen(values: Array) -> Iterator[Glitch]:
     """Rows at an end that repeat one value in all columns, a jump away: a tracker did not see yet, or any more."""
     steps = _steps(values) if len(values) else np.zeros(0)
-    far, moved = _far(steps), np.flatnonzero(steps)
+    far, moved = _far(steps, steps), np.flatnonzero(steps)
     ends = [(moved[0], 0, moved[0] + 1), (moved[-1], moved[-1] + 1, len(values))] if moved.size else []
     for jump, start, stop in ends:
         if 1 < stop - start <= len(values) / 2 and far[jump] and _stands_out(steps, far, jump, jump + 1):
@@ -154,7 +164,7 @@ def _is_impulse(residual: Array, row: int) -> bool:
 def _bursts(signal: Array) -> Iterator[tuple[int, int]]:
     """Several samples off together: a jump away, and the same one back."""
     steps = np.diff(signal)
-    far = _far(np.abs(steps))
+    far = _far(np.abs(steps), np.abs(steps))
     runs = [(start, stop) for start, stop in stretches(far) if _stands_out(np.abs(steps), far, start, stop)]
     for start, stop in runs:
         if 2 <= stop - start <= 4 and abs(steps[start:stop].sum()) < 0.3 * np.abs(steps[start:stop]).max():
@@ -166,8 +176,8 @@ def _bursts(signal: Array) -> Iterator[tuple[int, int]]:
             yield away + 1, back + 1
 
 
-def _far(sizes: Array) -> NDArray[np.bool_]:
-    moving = sizes[sizes > 0]
+def _far(sizes: Array, every: Array) -> NDArray[np.bool_]:
+    moving = every[every > 0]
     usual = float(np.quantile(moving, 0.9)) if moving.size >= AROUND else np.inf
     far: NDArray[np.bool_] = sizes > FAR * usual
     return far

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import BLOCK_ROWS, Array, slices
-from .jumps import stretches
+from .jumps import resolution, stretches
 
 SLOW = 0.08
 """Whoever moves by less than this share of a usual movement in the same time stands still."""
@@ -277,7 +277,8 @@ def _around(values: Array, start: int, stop: int, near: Array) -> tuple[int, int
 
 def _left(runs: list[tuple[int, int]], values: Array, far: Array) -> list[tuple[int, int]]:
     """Those with movement from elsewhere before, and to elsewhere after, farther than some lengths (n,)."""
-    return [run for run in runs if _is_left(values, *run, far)]
+    least = np.maximum(far, resolution(values)) if runs else far
+    return [run for run in runs if _is_left(values, *run, least)]
 
 
 def _is_left(values: Array, start: int, stop: int, far: Array) -> bool:

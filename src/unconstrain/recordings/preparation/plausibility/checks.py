@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 
 from ....base.arrays import Array
-from ....base.display import listed
-from ...readers.clocks import UNITS, usual
+from ....base.display import counted, listed
+from ...readers.clocks import UNITS, find_clock, usual
 from ...remarks import Remark
 from ...signals.orientations import TURNS, wraps
 from ...signals.stillness import SHORTEST_STOP_S, STOP_ROWS, is_noise, noise_share, rest_at_ends, stops
@@ -19,14 +19,8 @@ from .subject import FLIPS, GAP_INTERVALS, LEAST_ROWS, Subject
 SLOWEST, FASTEST = 2.0, 2e4
 """Samples per second that a movement is recorded with; others are a clock in another unit."""
 
-SHORTEST_GAP_S = 0.1
-"""Shorter gaps are the jitter of a computer."""
-
 IRREGULAR = 0.01
 """Intervals that differ from the median by more than this share are no uniform sampling."""
-
-SHORTEST_PIECE = 5
-"""Rows before and after a gap; fewer are a stray row at an end."""
 
 STEADY = 0.05
 """Steps of a clock, nine of ten, are within this share of the median one: those of 226 of 237 recorded clocks, and of
@@ -61,6 +55,9 @@ def clock_unit(subject: Subject) -> Remark | None:
     rates = 1.0 / typical, float(len(intervals) / (stamps[-1] - stamps[0]))
     if max(rates) > SLOWEST and min(rates) < FASTEST:
         return None
+    if typical == 1.0 and (stamps == np.round(stamps)).all() and (other := find_clock(subject.recording.columns)):
+        said = "the column of time counts rows, one by one, so it tells no time; name one that does with time="
+        return Remark("clock-unit", f"{said}{other.whole!r}.")
     unit = next((unit for unit, seconds in UNITS.items() if seconds / max(rates) < 1.0 / SLOWEST), "ns")
     cure = f"such as time_unit={unit!r}" if max(rates) <= SLOWEST else "time_unit=, or the right column with time="
     said = f"{rates[0]:.3g} samples a second; if all are so, say the unit of the time stamps, {cure}."
@@ -69,20 +66,27 @@ def clock_unit(subject: Subject) -> Remark | None:
 
 def clock_gap(subject: Subject) -> Remark | None:
     """Time without samples in the middle of a recording."""
-    if subject.times is None or len(subject.rows) < LEAST_ROWS or not subject.is_in_order:
+    stamps = subject.stamps
+    if stamps is None or len(stamps) < LEAST_ROWS or not subject.is_in_order:
         return None
-    at = np.flatnonzero(np.isfinite(subject.times))  # rows without other cells have their time
-    stamps = subject.times[at]
     intervals = np.diff(stamps)
-    longest = subject.recipe.max_gap_s or max(GAP_INTERVALS * usual(intervals), SHORTEST_GAP_S)
-    rows = np.flatnonzero(intervals > longest) + 1
-    rows = rows[(rows >= SHORTEST_PIECE) & (rows <= len(stamps) - SHORTEST_PIECE)]
+    rows = np.flatnonzero(intervals > (subject.recipe.max_gap_s or GAP_INTERVALS * usual(intervals))) + 1
     if not rows.size:
         return None
     worst = int(rows[np.argmax(intervals[rows - 1])])
     said = f"{rows.size} gap{'s' * (rows.size > 1)} in the time stamps, the longest {intervals[worst - 1]:.3g} s after "
     said += f"{stamps[worst - 1] - stamps[0]:.6g} s; nothing is smoothed or interpolated across (max_gap_s=)."
-    return Remark("clock-gap", said, row=int(at[rows[0]]))
+    return Remark("clock-gap", said, row=subject.row(rows[0]))
+
+
+def empty_cells(subject: Subject) -> Remark | None:
+    """Rows without numbers, where the clock shows that they are missing."""
+    if not subject.skips:
+        return None
+    rows, used = np.flatnonzero(~subject.filled), {*(subject.recipe.states or ()), *(subject.recipe.actions or ())}
+    names = sorted(one for one in used if not np.isfinite(subject.recording.select((one,))).all())
+    said = f"{counted(len(rows), 'row')} without numbers in {listed(names, 8)}, empty or NaN, left out; "
+    return Remark("empty-cells", f"{said}longer gaps are cut (max_gap_s=).", row=int(rows[0]), cured=True)
 
 
 def clock_untold(subject: Subject) -> Remark | None:
@@ -123,9 +127,9 @@ def stale(subject: Subject) -> Remark | None:
 def irregular(subject: Subject) -> Remark | None:
     """Stamps that have to be made uniform before they are differentiated."""
     recipe = subject.recipe
-    if subject.times is None or not np.isfinite(subject.times).all():
+    if subject.stamps is None or (subject.times is not None and not np.isfinite(subject.times).all()):
         return None
-    intervals = np.diff(np.sort(subject.times) if recipe.sort else subject.times)
+    intervals = np.diff(np.sort(subject.stamps) if recipe.sort else subject.stamps)
     intervals = intervals[intervals != 0.0]
     typical = float(np.median(intervals)) if recipe.differentiate == "savgol" and intervals.size else 0.0
     steady = intervals[intervals <= (recipe.max_gap_s or GAP_INTERVALS * typical)]
@@ -133,8 +137,18 @@ def irregular(subject: Subject) -> Remark | None:
     unknown = not typical or not SLOWEST < 1.0 / typical < FASTEST  # a clock in another unit, whose steps are rounded
     if unknown or asked or (intervals < 0.0).any() or not is_irregular(steady, typical):
         return None
-    said = f"time stamps are irregular, so it is resampled to its median rate of {1 / typical:.4g} Hz."
-    return Remark("irregular", said)
+    to = f"so it is resampled to its median rate of {1 / typical:.4g} Hz."
+    if rows := rows_missing(steady, typical):
+        said = f"{'1 row is' if rows == 1 else f'{rows} rows are'} missing between the gaps"
+        return Remark("rows-missing", f"{said}, as the time stamps show, {to}")
+    return Remark("irregular", f"time stamps are irregular, {to}")
+
+
+def rows_missing(intervals: Array, typical: float) -> int:
+    """How many rows are missing where all intervals are whole numbers of the typical one; 0 where they are not."""
+    steps = np.round(intervals / typical) if typical else np.zeros(0)
+    regular = bool(steps.size and (steps >= 1).all() and (np.abs(intervals - steps * typical) <= 0.05 * typical).all())
+    return int((steps - 1).sum()) if regular else 0
 
 
 def is_irregular(intervals: Array, typical: float | None = None) -> bool:
@@ -318,6 +332,7 @@ def all_zero(subject: Subject) -> Remark | None:
 CHECKS: tuple[Callable[[Subject], Remark | None], ...] = (
     clock_unit,
     clock_gap,
+    empty_cells,
     clock_untold,
     stale,
     irregular,

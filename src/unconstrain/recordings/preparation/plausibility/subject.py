@@ -66,15 +66,23 @@ class Subject:
         return stamps(self.recording, self.recipe)
 
     @cached_property
-    def rows(self) -> NDArray[np.intp]:
-        """Rows of the recording whose used cells are finite, the first of each stamp, shape (R,)."""
+    def filled(self) -> NDArray[np.bool_]:
+        """Rows of the recording whose used cells are finite, whatever their stamp, shape (T,)."""
         finite = np.ones(len(self.recording), dtype=bool)
         for used in (self.recipe.states, self.recipe.actions):
             for name in used or ():
                 finite &= np.isfinite(self.recording.select((name,))[:, 0])
-        if self.times is not None:
-            finite &= np.isfinite(self.times)
-        rows = np.flatnonzero(finite)
+        return finite
+
+    @cached_property
+    def skips(self) -> bool:
+        """Whether rows without numbers are left out, as the clock then shows that something is missing there."""
+        return self.times is not None and not self.filled.all() and bool(self.filled.any())
+
+    @cached_property
+    def rows(self) -> NDArray[np.intp]:
+        """Rows of the recording whose used cells and stamps are finite, the first of each stamp, shape (R,)."""
+        rows = np.flatnonzero(self.filled if self.times is None else self.filled & np.isfinite(self.times))
         return rows if self.times is None else rows[np.append(True, np.diff(self.times[rows]) != 0)[: len(rows)]]
 
     @cached_property
