@@ -1,6 +1,10 @@
 """``unconstrain constraint``, its file and its page, and the commands that take the file."""
 
 import json
+import os
+import subprocess
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,9 +15,10 @@ from scipy.ndimage import gaussian_filter1d
 
 import unconstrain as uc
 from seen import below
-from unconstrain import cli, storage
+from unconstrain import cli
 from unconstrain.base.errors import ModelFileError, SettingError
 from unconstrain.pages.constraint import constraint_page
+from unconstrain.paper.systems.arm import Arm
 
 NORMAL = np.array([0.0, 0.6, 0.8])
 
@@ -136,7 +141,7 @@ ROBOT = """<robot name="two">
 def test_an_arm_is_held_by_its_hand(tmp_path):
     (tmp_path / "robot.urdf").write_text(ROBOT)
     rng = np.random.default_rng(3)
-    arm = uc.systems.arm.Arm.from_urdf(tmp_path / "robot.urdf", "hand")
+    arm = Arm.from_urdf(tmp_path / "robot.urdf", "hand")
     for k in range(4):
         postures, wanted = rng.uniform(0.3, 1.8, (60, 2)), rng.standard_normal((60, 2))
         free = uc.null_space_projection(arm.jacobian(postures)[:, :1])
@@ -144,9 +149,12 @@ def test_an_arm_is_held_by_its_hand(tmp_path):
     options = ("--jacobian", tmp_path / "robot.urdf", "--tip", "hand", "-o", tmp_path / "c.npz")
     said = run("constraint", tmp_path / "*.csv", *options)
     assert "1 of 2 directions held, by constant features." in said
-    storage.register(uc.systems.arm.Arm)
     found = uc.load(tmp_path / "c.npz", uc.LearntConstraint)
     assert_allclose(found.projection(postures), free, atol=1e-9)
+    code = "import unconstrain as uc; print(uc.load('c.npz', uc.LearntConstraint).rank_)"  # where nothing is imported
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, check=False,
+                          env=os.environ | {"PYTHONPATH": str(Path(uc.__file__).parents[1])})  # fmt: skip
+    assert (done.stdout, done.stderr) == ("1\n", "")
     said = refused("constraint", tmp_path / "*.csv", "--tip", "hand", "-o", tmp_path / "d.npz")
     assert "--jacobian and --tip belong together" in said
 
