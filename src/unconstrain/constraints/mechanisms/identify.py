@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import factorial, log, prod
+from math import comb, factorial, log, prod
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -247,8 +248,10 @@ def identify(
     track, order, scale, origin = _track(positions, orientations, groups)
     pushed = None if forces is None else _as_long(forces, "forces", track.positions.shape)[order]
     every = _fits(track)
+    apart = _strays(every[1:])
     times = [min(max(fit.time for fit in fits) for fits in one.values() if fits[0].mechanism.count) for one in every]
-    time, white = min(times[0], max(times[1:] or times)), noise_by_differences(track.positions, track.groups)
+    usual = [time for k, time in enumerate(times[1:]) if k not in apart]
+    time, white = min(times[0], max(usual or times)), noise_by_differences(track.positions, track.groups)
     twice = zip([*every, *every[1:]], [*len(every) * [time], *times[1:]], strict=True)
     found = [(fits, log_evidences(fits, each, white)) for fits, each in twice]
     whole, *alone = ([_candidate(one[key], worth[key], scale, origin, unit) for key in one] for one, worth in found)
@@ -257,6 +260,7 @@ def identify(
     free = next(one.log_evidence for one in whole if one.kind == "free")
     most = {kind: free - lead for kind, lead in leads.items()}  # where free ones end on one cycle, it seems to hold all
     whole = [replace(one, log_evidence=min(one.log_evidence, most.get(one.kind, np.inf))) for one in whole]
+    mixed += _beside_free(every[1:], apart, (time, white), (scale, origin, unit))
     ranked = tuple(sorted([*whole, *mixed], key=lambda one: -one.log_evidence))
     places = origin + scale * track.positions
     said = [] if pushed is None or ranked[0].odds else witnesses(ranked[0].mechanisms, places, pushed, track.groups)
@@ -347,6 +351,34 @@ def _free(alone: list[list[Candidate]]) -> dict[str, float]:
     told = [(*_own(found), moves) for found, moves in zip(alone, wide, strict=True)]
     leads = [leads for own, odds, leads, moves in told if moves and own.kind == "free" and odds >= LIKELY]
     return {kind: sum(lead[kind] for lead in leads) for kind in leads[0]} if leads else {}
+
+
+def _strays(alone: Sequence[Explained]) -> list[int]:
+    """Those that stray from each kind by more than others do, and far from the straight ones: noise is common."""
+    missed = [{key.form.kind: noise(fits)[:1] ** 0.5 for (key, _), fits in one.items()} for one in alone]
+    least = [min(float(each[0]) for each in one.values() if len(each)) for one in missed]
+    flat = [min(float(each[0]) for kind, each in one.items() if kind in ("line", "plane")) for one in missed]
+    usual = BEYOND * float(np.median(least or [0.0]))
+    return [k for k in range(len(alone)) if least[k] > usual and flat[k] > BEYOND * usual]
+
+
+def _beside_free(
+    every: Sequence[Explained], apart: Sequence[int], known: tuple[float, float], place: tuple[float, Array, str]
+) -> list[Candidate]:
+    """Those that stray are free, and the others of one kind, each with a mechanism of its own and all with one noise."""
+    held = [k for k in range(len(every)) if k not in apart]
+    if not 0 < len(apart) < len(held):
+        return []
+    fits = {key: _turned([every[k][key][0] for k in held]) for key in every[0]}
+    loose = {key: [every[k][key][0] for k in apart] for key in every[0] if key[0].form.kind == "free"}
+    worth, (rest,) = log_evidences(fits, *known), log_evidences(loose, *known).values()
+    own, odds, leads = _own([_candidate(fits[key], worth[key], *place) for key in fits])
+    price = log(comb(len(every), len(apart)) * len(leads))
+    [free] = [_candidate(fits, rest, *place) for fits in loose.values()]
+    told = {k: (one, odds, leads["free"]) for k, one in zip(held, own.mechanisms, strict=True)}
+    told |= {k: (one, float(np.exp(MOST_CERTAIN)), 0.0) for k, one in zip(apart, free.mechanisms, strict=True)}
+    mechanisms, sure, lead = zip(*(told[k] for k in sorted(told)), strict=True)
+    return [Candidate(mechanisms, own.log_evidence + rest - price, np.nan, sure, lead)] * (own.kind != "free")
 
 
 def _candidate(fits: list[Fit], evidence: float, scale: float, origin: Array, unit: str) -> Candidate:
