@@ -479,3 +479,15 @@ def test_one_that_nothing_holds_is_told_among_plates_of_other_tilts_and_makes_no
     assert "in each of 7" not in said
     assert "--leave-out other" in said
     assert [line.split()[0] for line in said.splitlines() if " free " in line and "of 3" in line] == ["other"]
+
+
+@pytest.mark.parametrize(("radius", "flat"), [(40.0, True), (25.0, True), (0.5, False)])
+def test_a_plane_is_decided_where_only_a_sphere_too_large_to_matter_does_as_well(tmp_path, radius, flat):
+    normal = np.array([0.0, 0.3, 1.0]) / np.linalg.norm([0.0, 0.3, 1.0])
+    stroke = wiping(np.random.default_rng(1), normal, 400)
+    bent = stroke + np.outer((stroke**2).sum(axis=1) / (2 * radius), normal)
+    write(tmp_path / "one.csv", "t,x,y,z", [0.02 * np.arange(400), bent])
+    said = run("constraint", tmp_path / "one.csv", "--state", "x,y,z", "--differentiate", "-o", tmp_path / "c.npz")
+    assert ("a plane through" in said) == ("or a sphere so large that it looks flat (" in said) == flat
+    assert "undecided" not in said
+    assert "Positions do not decide it" not in said

@@ -779,3 +779,23 @@ def test_a_report_says_that_it_learns_again(folder, tmp_path):
     with listening(lambda *told: heard.append(told)):
         fit_page.policy_page(policy, demos, "A page")
     assert heard == [("report: learning again, each time without some demonstrations:", k, 5) for k in range(1, 6)]
+
+
+def test_where_nothing_is_left_to_record_no_places_are_listed(tmp_path):
+    rng = np.random.default_rng(0)
+    for k in range(8):  # free, from everywhere
+        states = rng.uniform(-1, 1, (60, 2))
+        actions = 0.01 * rng.standard_normal((60, 2)) - states
+        write(tmp_path / f"{k}.csv", "t,x,y,vx,vy", np.column_stack([0.1 * np.arange(60), states, actions]))
+    asked = ("diagnose", tmp_path / "*.csv", "--state", "x,y", "--action", "vx,vy")
+    said = run(*asked)
+    assert "No place needs another demonstration" in said
+    assert "places where least is known" not in said
+    assert "places where least is known" in run(*asked, "-v")
+    told = run(*asked, "--leave-out", "2,3,4,5,6,7")
+    assert "No place needs another demonstration" not in told
+    assert "places where least is known" in told
+
+
+def test_help_says_for_what_a_robot_can_be_shown():
+    assert "With --live or --rrd: states are joint angles of this robot" in " ".join(run("look", "--help").split())

@@ -297,14 +297,9 @@ def _plain(notes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _known(name: str) -> type | None:
-    """The class that is stored under a name, if any."""
     if name == "Arm" and name not in _KNOWN:  # imported only where a constraint knows one
         register(import_module(".paper.systems.arm", __package__).Arm)
     return _KNOWN.get(name)
-
-
-def _a(name: str) -> str:
-    return f"a{'n' * name.startswith(tuple('AEIOUaeiou'))} {name}"
 
 
 def _pack(value: Any, arrays: dict[str, np.ndarray[Any, Any]]) -> Any:
@@ -330,7 +325,7 @@ def _pack(value: Any, arrays: dict[str, np.ndarray[Any, Any]]) -> Any:
     kind = type(value)
     if _known(kind.__name__) is not kind:
         raise ModelFileError(
-            f"cannot store {_a(kind.__name__)}: only classes that are known by name can be read back without running "
+            f"cannot store a {kind.__name__}: only classes that are known by name can be read back without running "
             f"code. Known are {', '.join(sorted(_KNOWN))}; add a dataclass of your own with storage.register."
         )
     parts = (
@@ -361,8 +356,8 @@ def _unpack(value: Any, arrays: Mapping[str, np.ndarray[Any, Any]]) -> Any:
         return _unpack(value["jacobian"], arrays).jacobian
     if (kind := _known(value["class"])) is None:
         raise ModelFileError(
-            f"holds {_a(value['class'])}, which is not known here. Import the module that defines it and pass it to "
-            "storage.register before loading."
+            f"holds the class {value['class']}, which is not known here. Import the module that defines it and pass it "
+            "to storage.register before loading."
         )
     parts = {name: _unpack(part, arrays) for name, part in value["parts"].items()}
     if is_dataclass(kind):

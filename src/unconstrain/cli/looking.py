@@ -55,7 +55,7 @@ def play(output: str, force: bool, as_json: bool) -> None:
 @click.option("--rrd", type=click.Path(dir_okay=False), help="Also write a recording for the viewer rerun there.")
 @click.option("--live", is_flag=True, help="In place of a page, show all in the browser until Ctrl-C.")
 @click.option("--port", type=click.IntRange(0, 65535), help="With --live: where to listen, or the next that is free.")
-@click.option("--robot", metavar="URDF", help="States are joint angles of this robot: show it (--live), and its hand.")
+@click.option("--robot", metavar="URDF", help="With --live or --rrd: states are joint angles of this robot; show it.")
 @click.option("--tip", help="With --robot: the link that is its hand.")
 @option_for_force
 @option_for_json

@@ -261,8 +261,7 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
             _say_suspects(solution.belief.suspects, stream)
     elif learner != "direct":
         _say_determined(solution, learner)
-    for note in solution.notes:
-        click.echo(note)
+    click.echo("".join(f"{note}\n" for note in solution.notes), nl=False)
     seen = f"{judged.training:.4g} on the training data, " if known else ""
     rest = f"{judged.held_out:.4g} where held out." if isfinite(judged.held_out) else "nothing could be held out."
     click.echo(f"Share of the motion explained, where slow samples count less, as in the verdict: {seen}{rest}")

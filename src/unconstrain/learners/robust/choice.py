@@ -106,15 +106,11 @@ class Comparison:
         Variance σ² of the noise on each action coordinate of each sample.
     samples : Samples or sequence of K Samples
         Those of all candidates, or of each.
-
-    Attributes
-    ----------
-    unused : str
-        Why none uses a Jacobian that was given, if that is so.
     """
 
     def __init__(self, candidates: Sequence[Candidate], noise: Array, samples: Samples | Sequence[Samples]) -> None:
-        self._candidates, self.noise, self.unused = candidates, noise, ""
+        self._candidates, self.noise = candidates, noise
+        self.unused = ""  # why no candidate uses a Jacobian that was given
         self._views = [samples] * len(candidates) if isinstance(samples, Samples) else list(samples)
         self._samples = samples = self._views[0]
         self._held, self._seen = held_throughout(samples.actions, samples.groups, beyond_misfit(noise, samples))

@@ -51,7 +51,6 @@ BY_AGREEMENT = (
     "since all agree on one (generalised cross-validation). Recordings at other places would test that."
 )
 UNUSED = "The Jacobian that was given is not used: {}."
-NOT_HELD = "no demonstration shows that rows of it were held"
 OUTDONE = "no policy that uses it is of less estimated error"
 INCONSISTENT = "policies that use it miss at least {:.2g}% of held-out motion, this one {:.2g}%"
 
@@ -86,8 +85,7 @@ class SampleLearner(Learner):
             found = self._plain(training, samples, everything)
         else:
             chosen, more = self.candidate(samples, training)
-            agreed = more.pop("notes", ())
-            agreed += () if not chosen.alone else (BY_AGREEMENT.format(chosen.alone),)
+            agreed = (*more.pop("notes", ()), *(BY_AGREEMENT.format(one) for one in [chosen.alone] if one))
             more["held_out_score"] = _explained(samples, chosen)
             second = None if self.secondary is None else on(self.secondary, training)(training.folds.whole)
             found = solution(chosen, samples, everything, training.model, second, **more)
@@ -310,9 +308,9 @@ class Robust(_Maximising):
     def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
         """The candidate of least estimated error."""
         compared = self.compared(samples, training)
-        best, unused = compared.best, compared.unused or OUTDONE
-        notes = () if self.jacobian is None or best.softness == KNOWING else (UNUSED.format(unused),)
-        return best, {"candidates": compared.judged(), "notes": notes}
+        used = self.jacobian is None or compared.best.softness == KNOWING
+        notes = () if used else (UNUSED.format(compared.unused or OUTDONE),)
+        return compared.best, {"candidates": compared.judged(), "notes": notes}
 
     def compared(self, samples: Samples, training: Training) -> Comparison:
         """All candidates; those that use the Jacobian if they are as consistent as the best that does not, or more."""
@@ -343,7 +341,7 @@ class Robust(_Maximising):
         if beside := both.as_consistent if held else []:
             return Comparison([*learnt, *beside], found.noise, samples)
         own, *its = (100.0 * max(one.loss, 0.0) for one in both.judged().values())
-        found.unused = INCONSISTENT.format(min(its), own) if held else NOT_HELD
+        found.unused = INCONSISTENT.format(min(its), own) if held else "no demonstration shows rows of it held"
         return found
 
     def suited(self, begun: Mapping[str, Training], seen: Iterable[Batch], usual: str | None = None) -> str:
