@@ -141,7 +141,7 @@ def test_demonstrations_keep_their_noise():
 @pytest.mark.parametrize("method", ["savgol", "central"])
 @pytest.mark.parametrize("size", [0.003, 0.03])
 def test_the_noise_of_velocities_is_that_of_positions_after_the_filter(method, size):
-    """Of smoothed velocities differences of neighbours show a fraction of it, and those of samples farther apart all."""
+    """Of smoothed velocities differences of neighbours show a fraction of it, and those farther apart all."""
     exact, recipe = noisy(0.0, 3), Recipe(("x", "y"), differentiate=method)
     [found] = prepare(uc.Recording(("x", "y"), noisy(size, 3), TIMES), recipe)
     off = (found.actions - prepare(uc.Recording(("x", "y"), exact, TIMES), recipe)[0].actions)[10:-10]
