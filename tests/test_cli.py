@@ -8,6 +8,7 @@ import os
 import pickle
 import pstats
 import re
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -890,6 +891,36 @@ def test_export_as_json_says_the_same(policy, tmp_path):
     assert {"C source": str(tmp_path / "swing.c"), "header": str(tmp_path / "swing.h")}.items() <= told.items()
     assert told["verdict"]["mark"] == json.loads(run("info", policy, "--json"))["verdict"]["mark"] == "good"
     assert f"-DSWING_SELF_TEST {tmp_path / 'swing.c'}" in told["verdict"]["next"]
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
+@pytest.mark.parametrize(
+    ("file", "named", "name"),
+    [
+        ("plate-wipe.c", (), "plate_wipe"),
+        ("a.b.c", (), "a_b"),
+        ("two words.c", (), "two_words"),
+        ("9-9.c", (), "policy_9_9"),
+        ("swing.c", ("--name", "Left"), "Left"),
+    ],
+)
+def test_the_printed_self_test_runs_whatever_the_file_is_called(policy, tmp_path, monkeypatch, file, named, name):
+    monkeypatch.chdir(tmp_path)
+    said = run("export", policy, "-o", file, *named)
+    assert f"Stop the robot where {name}_support() is near 0." in " ".join(said.split())
+    assert f"double {name}_support(" in (tmp_path / file).read_text()
+    command = next(line for line in said.splitlines() if line.strip().startswith("cc -std=c99"))
+    subprocess.run(["sh", "-c", command], cwd=tmp_path, check=True, capture_output=True)
+
+
+@pytest.mark.parametrize("file", ["plate-wipe", "a.b", "two words", "9-9"])
+def test_what_is_printed_of_other_targets_names_nothing_that_is_not_there(policy, tmp_path, monkeypatch, file):
+    monkeypatch.chdir(tmp_path)
+    told = json.loads(run("export", policy, "-o", f"{file}.js", "--ros2", file, "--json"))
+    assert told["verdict"]["next"] == "Import 'policy' and 'support' from it."
+    assert "export const { policy, support, under } =" in (tmp_path / f"{file}.js").read_text()
+    assert f"'scale' in {file}/config makes them" in told["verdict"]["doubt"]
+    assert "scale:" in "".join(one.read_text() for one in (tmp_path / file / "config").iterdir())
 
 
 def test_export_refuses_other_suffixes_and_names_where_there_are_none(policy, tmp_path):

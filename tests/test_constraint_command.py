@@ -1,6 +1,10 @@
 """``unconstrain constraint``, its file and its page, and the commands that take the file."""
 
 import json
+import os
+import subprocess
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,9 +15,10 @@ from scipy.ndimage import gaussian_filter1d
 
 import unconstrain as uc
 from seen import below
-from unconstrain import cli, storage
+from unconstrain import cli
 from unconstrain.base.errors import ModelFileError, SettingError
 from unconstrain.pages.constraint import constraint_page
+from unconstrain.paper.systems.arm import Arm
 
 NORMAL = np.array([0.0, 0.6, 0.8])
 
@@ -136,7 +141,7 @@ ROBOT = """<robot name="two">
 def test_an_arm_is_held_by_its_hand(tmp_path):
     (tmp_path / "robot.urdf").write_text(ROBOT)
     rng = np.random.default_rng(3)
-    arm = uc.systems.arm.Arm.from_urdf(tmp_path / "robot.urdf", "hand")
+    arm = Arm.from_urdf(tmp_path / "robot.urdf", "hand")
     for k in range(4):
         postures, wanted = rng.uniform(0.3, 1.8, (60, 2)), rng.standard_normal((60, 2))
         free = uc.null_space_projection(arm.jacobian(postures)[:, :1])
@@ -144,9 +149,12 @@ def test_an_arm_is_held_by_its_hand(tmp_path):
     options = ("--jacobian", tmp_path / "robot.urdf", "--tip", "hand", "-o", tmp_path / "c.npz")
     said = run("constraint", tmp_path / "*.csv", *options)
     assert "1 of 2 directions held, by constant features." in said
-    storage.register(uc.systems.arm.Arm)
     found = uc.load(tmp_path / "c.npz", uc.LearntConstraint)
     assert_allclose(found.projection(postures), free, atol=1e-9)
+    code = "import unconstrain as uc; print(uc.load('c.npz', uc.LearntConstraint).rank_)"  # where nothing is imported
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, check=False,
+                          env=os.environ | {"PYTHONPATH": str(Path(uc.__file__).parents[1])})  # fmt: skip
+    assert (done.stdout, done.stderr) == ("1\n", "")
     said = refused("constraint", tmp_path / "*.csv", "--tip", "hand", "-o", tmp_path / "d.npz")
     assert "--jacobian and --tip belong together" in said
 
@@ -435,3 +443,51 @@ def test_what_is_learnt_of_one_recording_holds_no_more_than_its_plane_as_among_o
     assert {one["rank"] for one in told["each"].values() or [told]} == {1}
     asked = run("constraint", files[0], "--features", "affine", "-o", tmp_path / "a.npz", "--json")
     assert json.loads(asked)["rank"] == 2  # as asked for
+
+
+def wiping(rng, normal, samples=250, noise=1e-3):
+    """Somebody wipes a plate of its own tilt in loops that wander."""
+    turn, begun = np.linspace(0, 6 * np.pi, samples), rng.uniform(0, 6, 2)
+    loops = np.column_stack([0.2 * np.cos(turn) + 0.03 * np.sin(0.37 * turn + begun[0]),
+                             0.12 * np.sin(turn) + 0.05 * np.cos(0.61 * turn + begun[1])])  # fmt: skip
+    up = np.array(normal) / np.linalg.norm(normal)
+    across = np.cross([0.0, 1.0, 0.0], up) / np.linalg.norm(np.cross([0.0, 1.0, 0.0], up))
+    return loops @ np.stack([across, np.cross(up, across)]) + noise * rng.standard_normal((samples, 3))
+
+
+def waving(rng, samples=250):
+    """The same loops in the air, on a cylinder but for a little more than noise: alone they look held."""
+    turn = np.linspace(0, 6 * np.pi, samples)
+    path = [0.2 * np.cos(turn), 0.12 * np.sin(turn), 0.02 * np.sin(2 * turn + 1) + 0.02 * np.cos(0.5 * turn)]
+    return np.column_stack(path) + 1e-3 * rng.standard_normal((samples, 3))
+
+
+@pytest.mark.parametrize("last", ["in the air", "on a plate", "on a plate, by another sensor"])
+def test_one_that_nothing_holds_is_told_among_plates_of_other_tilts_and_makes_nothing_else_of_them(tmp_path, last):
+    rng = np.random.default_rng(0)
+    for k in range(6):
+        normal = (0.4 * np.cos(k), 0.4 * np.sin(k), 1.0)
+        write(tmp_path / f"plate{k}.csv", "t,x,y,z", [0.02 * np.arange(250), wiping(rng, normal)])
+    noise = 2e-3 if "sensor" in last else 1e-3
+    seventh = waving(rng) if last == "in the air" else wiping(rng, (0.3, 0.1, 1.0), noise=noise)
+    write(tmp_path / "other.csv", "t,x,y,z", [0.02 * np.arange(250), seventh])
+    said = run("constraint", tmp_path / "*.csv", "--state", "x,y,z", "--differentiate", "-o", tmp_path / "c.npz")
+    if last != "in the air":
+        assert "a plane for each of 7 demonstrations, against nothing held" in said
+        return
+    assert "Demonstrations differ: free for 1, plane for 6 of 7 demonstrations" in " ".join(said.split())
+    assert "in each of 7" not in said
+    assert "--leave-out other" in said
+    assert [line.split()[0] for line in said.splitlines() if " free " in line and "of 3" in line] == ["other"]
+
+
+@pytest.mark.parametrize(("radius", "flat"), [(40.0, True), (25.0, True), (0.5, False)])
+def test_a_plane_is_decided_where_only_a_sphere_too_large_to_matter_does_as_well(tmp_path, radius, flat):
+    normal = np.array([0.0, 0.3, 1.0]) / np.linalg.norm([0.0, 0.3, 1.0])
+    stroke = wiping(np.random.default_rng(1), normal, 400)
+    bent = stroke + np.outer((stroke**2).sum(axis=1) / (2 * radius), normal)
+    write(tmp_path / "one.csv", "t,x,y,z", [0.02 * np.arange(400), bent])
+    said = run("constraint", tmp_path / "one.csv", "--state", "x,y,z", "--differentiate", "-o", tmp_path / "c.npz")
+    assert ("a plane through" in said) == ("or a sphere so large that it looks flat (" in said) == flat
+    assert "undecided" not in said
+    assert "Positions do not decide it" not in said

@@ -119,7 +119,11 @@ def test_where_the_jacobian_explains_nothing_the_result_is_as_without(case, nois
         else:
             demos = demonstrate([[[0.8, 0.6]]], noise=noise, seed=seed)
             jacobian = lambda states: planar(np.roll(states, 1, axis=1) + 1.0)  # noqa: E731
-        ratios.append(error(learnt(demos, jacobian)) / error(learnt(demos, None)))
+        policy, without = learnt(demos, jacobian), learnt(demos, None)
+        said = [note for note in policy.solution_.notes if note.startswith("The Jacobian that was given is not used: ")]
+        assert bool(said) == (policy.solution_.method == without.solution_.method)
+        assert not any("Jacobian" in note for note in without.solution_.notes)
+        ratios.append(error(policy) / error(without))
     assert np.exp(np.log(ratios).mean()) < 1.01
     assert max(ratios) < 1.05
 
@@ -176,8 +180,23 @@ def test_on_the_command_line_it_is_that_of_a_robot_file(tmp_path):
     known = ("--jacobian", tmp_path / "robot.urdf", "--tip", "hand")
     assert "rows of the Jacobian" not in run(*asked)
     without = error(uc.load(tmp_path / "p.npz"))
-    assert "Learnt as rows of the Jacobian (within 0.5%) held: 1:" in run(*asked, *known)
+    said = run(*asked, *known, "-v")
+    assert "Learnt as rows of the Jacobian (within 0.5%) held: 1: with so many directions of the task held" in said
+    assert all(
+        line.strip().endswith("kind of demonstration") for line in said.splitlines() if line.startswith("rows of")
+    )
+    assert "is not used" not in said
     assert error(uc.load(tmp_path / "p.npz")) < 0.1 * without
+    rng, starts = np.random.default_rng(0), "t,a,b,c,va,vb,vc"
+    for k in range(8):  # held along a direction of joint angles, which is none of the hand's
+        one = demonstrate([None], count=8, seed=5)[k]
+        across = np.eye(3)[k % 3] + 0.1 * rng.standard_normal(3)
+        held = uc.project(uc.null_space_projection(across[None, None]), one.actions)
+        write(tmp_path / f"{k}.csv", starts, np.column_stack([one.times, one.states, held]))
+    said = run(*asked, *known).splitlines()
+    after = said[next(k for k, line in enumerate(said) if line.startswith("Learnt as")) + 1]
+    assert "The Jacobian that was given is not used: " in after
+    assert "is not used" not in run(*asked)
     assert "--jacobian and --tip belong together" in refused(*asked, *known[:2])
     assert "--jacobian: belongs to the robust learner, got --learner direct." in refused(
         *asked, *known, "--learner", "direct"

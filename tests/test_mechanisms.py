@@ -361,7 +361,7 @@ def test_a_hinge_turns_its_tool_and_a_circle_does_not():
     ("arguments", "sentence"),
     [
         ({"positions": np.zeros((20, 4))}, "positions: got 4 columns, expected two or three"),
-        ({"positions": np.zeros((9, 3))}, "a demonstration of 9 samples, expected at least 10 of each"),
+        ({"positions": np.zeros((9, 3))}, "a demonstration of 9 samples, expected at least 10"),
         ({"positions": np.ones((20, 3))}, "positions: all rows are the same"),
         ({"positions": noise((20, 3)), "forces": np.zeros((19, 3))}, r"forces: got an array of shape \(19, 3\)"),
         ({"positions": noise((20, 3)), "orientations": np.zeros((20, 4))}, "quaternions that are not zero"),

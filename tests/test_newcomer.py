@@ -11,6 +11,7 @@ import click
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.linalg import expm
 
 import unconstrain as uc
 from test_cli import call, refused, run, write
@@ -779,3 +780,24 @@ def test_a_report_says_that_it_learns_again(folder, tmp_path):
     with listening(lambda *told: heard.append(told)):
         fit_page.policy_page(policy, demos, "A page")
     assert heard == [("report: learning again, each time without some demonstrations:", k, 5) for k in range(1, 6)]
+
+
+def test_where_nothing_is_left_to_record_no_places_are_listed(tmp_path):
+    rng = np.random.default_rng(0)
+    for k in range(8):  # free, to a goal from everywhere, in spirals
+        start, turn = rng.uniform(-1, 1, 2), np.array([[-1.0, 2.0], [-2.0, -1.0]])
+        states = np.stack([expm(0.05 * step * turn) @ start for step in range(60)])
+        actions = 0.01 * rng.standard_normal((60, 2)) + states @ turn.T
+        write(tmp_path / f"{k}.csv", "t,x,y,vx,vy", np.column_stack([0.05 * np.arange(60), states, actions]))
+    asked = ("diagnose", tmp_path / "*.csv", "--state", "x,y", "--action", "vx,vy", "--model", "affine")
+    said = run(*asked)
+    assert "No place needs another demonstration" in said
+    assert "places where least is known" not in said
+    assert "places where least is known" in run(*asked, "-v")
+    told = run(*asked, "--leave-out", "2,3,4,5,6,7")
+    assert "No place needs another demonstration" not in told
+    assert "places where least is known" in told
+
+
+def test_help_says_for_what_a_robot_can_be_shown():
+    assert "With --live or --rrd: states are joint angles of this robot" in " ".join(run("look", "--help").split())

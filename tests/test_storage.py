@@ -306,7 +306,7 @@ def test_a_class_that_is_not_known_is_refused_by_name(parts, tmp_path, name):
     with pytest.raises(ModelFileError) as caught:
         uc.load(path)
     assert str(caught.value) == (
-        f"{path}: holds a {name}, which is not known here. Import the module that defines it and pass it to "
+        f"{path}: holds the class {name}, which is not known here. Import the module that defines it and pass it to "
         "storage.register before loading."
     )
 
@@ -672,7 +672,9 @@ def test_a_feature_map_has_to_be_registered_before_loading_too(powers, tmp_path,
     with monkeypatch.context() as patch:
         patch.setattr(storage, "_KNOWN", storage._KNOWN | {"Powers": Powers})
         uc.save(powers, tmp_path / "p.npz")
-    with pytest.raises(ModelFileError, match=r"holds a Powers, which is not known here\. Import the module that"):
+    with pytest.raises(
+        ModelFileError, match=r"holds the class Powers, which is not known here\. Import the module that"
+    ):
         uc.load(tmp_path / "p.npz")
 
 

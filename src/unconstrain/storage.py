@@ -24,6 +24,7 @@ import zipfile
 from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import fields, is_dataclass
+from importlib import import_module
 from pathlib import Path
 from types import MethodType
 from typing import Any, TypeVar, overload
@@ -111,7 +112,7 @@ def save(
         Fitted or not. A policy's moments go along, so that it can learn on from sums. Samples do not: what was fitted
         by a learner that looks at them, such as :class:`~unconstrain.Robust`, predicts as before, and to learn more has
         to be fitted anew, or copied or pickled in place of saved. A constraint goes without what it was learnt from,
-        and with its Jacobian if that is the method of a registered dataclass, such as an arm.
+        and with its Jacobian if that is the method of an arm, or of another registered dataclass.
     path : str or path-like
         Usually ends in ``.npz``. An existing file is replaced in one step.
     notes : mapping, optional
@@ -295,6 +296,12 @@ def _plain(notes: Mapping[str, Any]) -> dict[str, Any]:
         raise ModelFileError(f"notes: {error}; expected what JSON can say: text, numbers, lists, mappings.") from error
 
 
+def _known(name: str) -> type | None:
+    if name == "Arm" and name not in _KNOWN:  # imported only where a constraint knows one
+        register(import_module(".paper.systems.arm", __package__).Arm)
+    return _KNOWN.get(name)
+
+
 def _pack(value: Any, arrays: dict[str, np.ndarray[Any, Any]]) -> Any:
     """Turn a value into JSON, laying arrays aside."""
     if value is None or isinstance(value, bool | int | float | str):
@@ -316,7 +323,7 @@ def _pack(value: Any, arrays: dict[str, np.ndarray[Any, Any]]) -> Any:
     if isinstance(value, MethodType) and value.__name__ == "jacobian":
         return {"jacobian": _pack(value.__self__, arrays)}
     kind = type(value)
-    if _KNOWN.get(kind.__name__) is not kind:
+    if _known(kind.__name__) is not kind:
         raise ModelFileError(
             f"cannot store a {kind.__name__}: only classes that are known by name can be read back without running "
             f"code. Known are {', '.join(sorted(_KNOWN))}; add a dataclass of your own with storage.register."
@@ -347,12 +354,11 @@ def _unpack(value: Any, arrays: Mapping[str, np.ndarray[Any, Any]]) -> Any:
         return {_unpack(key, arrays): _unpack(item, arrays) for key, item in value["pairs"]}
     if "jacobian" in value:
         return _unpack(value["jacobian"], arrays).jacobian
-    if value["class"] not in _KNOWN:
+    if (kind := _known(value["class"])) is None:
         raise ModelFileError(
-            f"holds a {value['class']}, which is not known here. Import the module that defines it and pass it to "
-            "storage.register before loading."
+            f"holds the class {value['class']}, which is not known here. Import the module that defines it and pass it "
+            "to storage.register before loading."
         )
-    kind = _KNOWN[value["class"]]
     parts = {name: _unpack(part, arrays) for name, part in value["parts"].items()}
     if is_dataclass(kind):
         texts = [one.name for one in fields(kind) if one.type in ("str", str) and one.name in parts]

@@ -258,7 +258,6 @@ def held_of(
             return uc.constraints.Plane(np.array(plane))
     if path is None:
         return None
-    known_arms()
     learnt = loaded(path, uc.LearntConstraint)
     found = learnt.choice_.columns, learnt.choice_.actions
     if found != (states := len(at[0]), actions):
@@ -293,17 +292,11 @@ def _said_states(recipe: uc.Recipe) -> str:
     return f"{', '.join(recipe.states or ())}{', centred' if recipe.centre else ''}"
 
 
-def arm_of(urdf: str, tip: str | None) -> Any:
+def arm_of(urdf: str, tip: Any) -> Any:
     """The chain of a robot up to a link."""
-    return known_arms().from_urdf(urdf, tip)
-
-
-def known_arms() -> Any:
-    """The class of arms; a learnt constraint that knows one can then be loaded."""
     from ..paper.systems.arm import Arm
 
-    uc.storage.register(Arm)
-    return Arm
+    return Arm.from_urdf(urdf, tip)
 
 
 class Named(NamedTuple):

@@ -78,6 +78,20 @@ def diagnose(
 def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequence[str], unit: str, all_: bool) -> None:
     for line in uc.evaluation.diagnosis.sentences(found, states, actions, unit):
         click.echo(line)
+    if all_ or found.states_determined < 1.0 or found.regions[0].along > uc.evaluation.diagnosis.SMALL:
+        _say_places(found, states, actions, all_)
+    else:
+        click.echo("\nNo place needs another demonstration: three or more tell the policy at each (-v lists all).")
+    told = [one for one in found.movements if one.looks in uc.evaluation.diagnosis.COUNTED]
+    if not (free := sorted(told, key=lambda one: -(one.free or 0.0))):
+        return
+    click.echo("\nMean probability that a sample was free, of the freest and the most constrained demonstrations:")
+    ends = free if len(free) <= MOST_ROWS else [*free[: MOST_ROWS // 2], *free[-MOST_ROWS // 2 :]]
+    rows = [[one.name, str(one.samples), percent(one.free or 0.0), percent(one.determined)] for one in ends]
+    print_table(["demonstration", "samples", "free", "by three"], rows)
+
+
+def _say_places(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequence[str], all_: bool) -> None:
     every = uc.evaluation.diagnosis.places(found.regions)
     shown = found.regions if all_ else every[:MOST_ROWS]
     count = f"{len(every)} ({len(found.regions)} regions)"
@@ -92,19 +106,10 @@ def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequenc
         for one in shown
     ]  # fmt: skip
     print_table(head, rows)
-    click.echo(
-        "told: share of samples there at which all tell the policy: what they leave open is at most a tenth of a"
-    )
-    click.echo("  typical action, or below noise, if that is below a typical action (lengths over the coordinates).")
+    click.echo("told: share of samples there at which all tell the policy: what they leave open is a tenth of a")
+    click.echo("  typical action at most, or below noise, where that is below it (lengths over the coordinates).")
     click.echo("by three: the same whichever two are left out, so that it hangs on no one or two; in Python")
     click.echo("  'undetermined' and 'from_noise' of policy.uncertainty(states).")
     click.echo("spread: how far it may be off along 'leave free', with any two left out; 100% is a typical action.")
     click.echo("  Large although all tell the policy, it hangs on one or two demonstrations, which others may confirm.")
     click.echo("shown by: demonstrations that moved along 'leave free' in this region.")
-    told = [one for one in found.movements if one.looks in uc.evaluation.diagnosis.COUNTED]
-    if not (free := sorted(told, key=lambda one: -(one.free or 0.0))):
-        return
-    click.echo("\nMean probability that a sample was free, of the freest and the most constrained demonstrations:")
-    ends = free if len(free) <= MOST_ROWS else [*free[: MOST_ROWS // 2], *free[-MOST_ROWS // 2 :]]
-    rows = [[one.name, str(one.samples), percent(one.free or 0.0), percent(one.determined)] for one in ends]
-    print_table(["demonstration", "samples", "free", "by three"], rows)

@@ -84,8 +84,7 @@ def export(
         written |= {"messages": taken if as_json else _MEANT[taken].format(names), "ROS 2 package": ros2}
     if output is not None:
         target, options = TARGETS[kind], {"name": name, "single": single, "notes": notes}
-        getattr(learnt, target.method)(output, **{option: options[option] for option in target.takes})
-        called = name or Path(output).stem
+        called = getattr(learnt, target.method)(output, **{option: options[option] for option in target.takes}) or ""
         then = target.next.format(NAME=called.upper(), name=called, file=shlex.quote(output))
         written[target.what] = output
     if header is not None:

@@ -16,7 +16,7 @@ import unconstrain as uc
 from ..base.display import counted, listed
 from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainError
 from ..base.files import write
-from .constraining import arm_of, known_arms, said_elsewhere
+from .constraining import arm_of, said_elsewhere
 from .informing import OF, TOLD, learnt_from
 from .printing import option_for_json, refuse_warnings, say_judged, say_verdict, say_written
 from .reading import as_options, options_for_reading, prepared, reading_of, typed
@@ -55,7 +55,7 @@ def play(output: str, force: bool, as_json: bool) -> None:
 @click.option("--rrd", type=click.Path(dir_okay=False), help="Also write a recording for the viewer rerun there.")
 @click.option("--live", is_flag=True, help="In place of a page, show all in the browser until Ctrl-C.")
 @click.option("--port", type=click.IntRange(0, 65535), help="With --live: where to listen, or the next that is free.")
-@click.option("--robot", metavar="URDF", help="States are joint angles of this robot: show it (--live), and its hand.")
+@click.option("--robot", metavar="URDF", help="With --live or --rrd: states are joint angles of this robot; show it.")
 @click.option("--tip", help="With --robot: the link that is its hand.")
 @option_for_force
 @option_for_json
@@ -239,7 +239,6 @@ def _scene(seen: Seen, robot: str | None, tip: str | None) -> Any:
 
 def _model(path: str | Path) -> Any:
     """The policy or constraint in a file; None where it holds a recording."""
-    known_arms()
     if Path(path).suffix.lower() == ".npz":
         with suppress(ModelFileError):
             return uc.load(path, uc.Policy | uc.LearntConstraint | uc.Guided)  # type: ignore[arg-type]

@@ -261,12 +261,12 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
             _say_suspects(solution.belief.suspects, stream)
     elif learner != "direct":
         _say_determined(solution, learner)
+    click.echo("".join(f"{note}\n" for note in solution.notes), nl=False)
     seen = f"{judged.training:.4g} on the training data, " if known else ""
-    ran = [f"Run from the same starts: {judged.ran}."] * bool(judged.ran)
     rest = f"{judged.held_out:.4g} where held out." if isfinite(judged.held_out) else "nothing could be held out."
     click.echo(f"Share of the motion explained, where slow samples count less, as in the verdict: {seen}{rest}")
-    for note in (*ran, *solution.notes):
-        click.echo(note)
+    if judged.ran:
+        click.echo(f"Run from the same starts: {judged.ran}.")
     of, to = len(stream.recipe.directions), len(stream.recipe.actions or stream.recipe.directions)
     if of not in (to, 2 * to):
         said = f"Note: {counted(to, 'action')} for {counted(of, 'state')}: no velocities, which 'rollout' and a ROS 2 "

@@ -45,10 +45,10 @@ def export_c(
     described: Description,
     *,
     single: bool = False,
-) -> None:
-    """Write :func:`c_source` to a file and, beside it, the header, with a self-test that compares it with the policy.
+) -> str:
+    """Write :func:`c_source` to a file and its header beside it, with a self-test; return what names in it begin with.
 
-    The name is by default that of the file. A header that is there is replaced, as the file is.
+    The name is by default as the file is called. A header that is there is replaced, as the file is.
 
     Raises
     ------
@@ -58,9 +58,11 @@ def export_c(
     place = Path(path)
     if place.suffix == ".h":
         raise SettingError(f"{path}: got the name of a header, expected that of the source, such as {place.stem}.c.")
-    made = c_source(form, c_name(place.stem) if name is None else name, policy, described, place.name, single=single)
+    name = c_name(place.stem) if name is None else name
+    made = c_source(form, name, policy, described, place.name, single=single)
     files.write(place, made.source)
     files.write(place.with_suffix(".h"), made.header)
+    return name
 
 
 def c_name(stem: str) -> str:

@@ -45,12 +45,12 @@ class Exportable:
         single: bool = False,
         scaler: Scaler | None = None,
         notes: Mapping[str, Any] | None = None,
-    ) -> None:
+    ) -> str:
         """Write the policy as a C source that needs only the mathematics of the standard library, and its header.
 
         They are C99 and C++11, and offer ``void NAME_step(const double state[n], double action[d])``,
         ``double NAME_support(const double state[n])``, and limits of states and speed. With ``NAME_SELF_TEST`` (in
-        capitals) defined, there is a ``main`` that compares the file with :meth:`predict`.
+        capitals) defined, there is a ``main`` that compares the file with :meth:`predict`. Returns ``NAME``.
 
         Parameters
         ----------
@@ -73,10 +73,11 @@ class Exportable:
         Examples
         --------
         >>> policy = uc.ParametricPolicy(uc.Affine(), "direct").fit([[0.0], [1.0]], [[0.0], [-2.0]])
-        >>> policy.export_c("wipe.c")  # and wipe.h
+        >>> policy.export_c("wipe-2.c")  # and wipe-2.h
+        'wipe_2'
         """
         form = self.closed_form(scaler)
-        export_c(form, self._after(scaler), path, name, self.describe(form, notes), single=single)
+        return export_c(form, self._after(scaler), path, name, self.describe(form, notes), single=single)
 
     def export_onnx(
         self,

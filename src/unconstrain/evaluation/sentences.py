@@ -77,12 +77,13 @@ _WAYS = {
     "segments": "with one constraint for each demonstration",
     "likelihood": "samples look free, or constrained at random",
     "hybrid": "consistent with the actions, and as near to them as that allows",
+    "rows of the Jacobian": "with so many directions of the task held, in each kind of demonstration",
 }
 
 
 def in_words(method: str) -> str:
     """What is told of a way of learning, by its name with or without a softness after a comma; empty of others."""
-    return _WAYS.get(method.partition(", ")[0], "")
+    return _WAYS.get(method.partition(", ")[0].partition(" (")[0], "")
 
 
 def models_of(policy: Any) -> str:

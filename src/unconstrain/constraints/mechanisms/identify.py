@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import factorial, log, prod
+from math import comb, factorial, log, prod
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +18,7 @@ from ...risks import unit_actions
 from .evidence import Explained, log_evidences
 from .fitting import Fit, fit, noise
 from .forces import Witness, witnesses
-from .kinds import FLAT_KINDS, KINDS
+from .kinds import FLAT_KINDS, KINDS, Plane
 from .mechanism import Mechanism, on_one_side, small_length
 from .tied import TIED_KINDS
 from .track import Track, noise_by_differences, winding
@@ -35,6 +37,9 @@ LIKELY = 20.0
 
 BEYOND = 4.0
 """Who spreads by so many times the usual noise in each direction moves there: noise that lasts looks free, too."""
+
+FLAT = 10.0
+"""A surface whose radius is more than so many times the extent of what was recorded is a plane to a robot."""
 
 NEAR = 0.15
 """A path is near a circle that it leaves by less than this share of the radius."""
@@ -55,6 +60,8 @@ class Candidate(Shown):
         Of the kind of each against the next, where kinds differ; else empty.
     over_free : tuple of float
         By how much the log evidence of each is above that of nothing held, where some are free; else empty.
+    flat : bool
+        Whether each is a sphere or a cylinder so large that it is a plane to a robot.
     """
 
     mechanisms: tuple[Mechanism, ...]
@@ -62,6 +69,7 @@ class Candidate(Shown):
     noise: float
     odds: tuple[float, ...] = ()
     over_free: tuple[float, ...] = ()
+    flat: bool = False
 
     @property
     def kind(self) -> str:
@@ -145,10 +153,8 @@ class Identification(Shown):
         """Of each kind."""
         values = np.array([candidate.log_evidence for candidate in self.candidates])
         shares = np.exp(values - values.max())
-        return {
-            kind: float(sum(shares[[candidate.kind == kind for candidate in self.candidates]]) / shares.sum())
-            for kind in dict.fromkeys(candidate.kind for candidate in self.candidates)
-        }
+        kinds = np.array([candidate.kind for candidate in self.candidates])
+        return {kind: float(shares[kinds == kind].sum() / shares.sum()) for kind in dict.fromkeys(kinds.tolist())}
 
     @property
     def odds(self) -> float:
@@ -158,7 +164,9 @@ class Identification(Shown):
     @property
     def decided(self) -> bool:
         """Whether a kind is likely enough to speak of, that of each where they differ, and each radius known at all."""
-        return self.odds >= LIKELY and not {"undecided", "held"} & {*self.candidates[0].kinds}
+        first, *rest = self.candidates
+        rival = next(one for one in rest if one.kind != first.kind and not (one.flat and one.bends(first)))
+        return first.against(rival) >= LIKELY and not {"undecided", "held"} & {*first.kinds}
 
     @property
     def sentence(self) -> str:
@@ -184,12 +192,10 @@ class Identification(Shown):
         circle = next((one for one in self.candidates if one.kind == "circle"), best)
         if self.demonstrations > 1 or not circle.noise < NEAR * circle.mechanisms[0].radius or circle.free != 1:
             return ""
-        radius, strays = (
-            small_length(each, self.mechanism.unit) for each in (circle.mechanisms[0].radius, circle.noise)
-        )
-        return (
-            f"within the {best.kind} the path is near a circle of radius {radius}, which it leaves by {strays}; {apart}"
-        )
+        lengths = circle.mechanisms[0].radius, circle.noise
+        radius, strays = (small_length(one, self.mechanism.unit) for one in lengths)
+        near = f"within the {best.kind} the path is near a circle of radius {radius}"
+        return f"{near}, which it leaves by {strays}; {apart}"
 
     def _judged(self, best: str) -> str:
         first = self.candidates[0]
@@ -202,9 +208,9 @@ class Identification(Shown):
             other = "nothing held" if rival.kind == "free" else f"a {rival.kind}"
             verdict = f"{best}, against {'one kind for all' if first.odds else other} {_said(odds)}"
         if bent and first.against(bent[0]) < LIKELY:
-            verdict += (
-                f"; whether it bends a little, as a {bent[0].kind}, does not show ({_said(first.against(bent[0]))})"
-            )
+            large = f"or a {bent[0].kind} so large that it looks flat"
+            bends = large if bent[0].flat else f"whether it bends a little, as a {bent[0].kind}, does not show"
+            verdict += f"; {bends} ({_said(first.against(bent[0]))})"
         return "; ".join([verdict, *map(str, self.witnesses)])
 
     def _summary(self) -> tuple[str, ...]:
@@ -247,8 +253,10 @@ def identify(
     track, order, scale, origin = _track(positions, orientations, groups)
     pushed = None if forces is None else _as_long(forces, "forces", track.positions.shape)[order]
     every = _fits(track)
+    apart = _strays(every[1:])
     times = [min(max(fit.time for fit in fits) for fits in one.values() if fits[0].mechanism.count) for one in every]
-    time, white = min(times[0], max(times[1:] or times)), noise_by_differences(track.positions, track.groups)
+    usual = [time for k, time in enumerate(times[1:]) if k not in apart]
+    time, white = min(times[0], max(usual or times)), noise_by_differences(track.positions, track.groups)
     twice = zip([*every, *every[1:]], [*len(every) * [time], *times[1:]], strict=True)
     found = [(fits, log_evidences(fits, each, white)) for fits, each in twice]
     whole, *alone = ([_candidate(one[key], worth[key], scale, origin, unit) for key in one] for one, worth in found)
@@ -257,7 +265,8 @@ def identify(
     free = next(one.log_evidence for one in whole if one.kind == "free")
     most = {kind: free - lead for kind, lead in leads.items()}  # where free ones end on one cycle, it seems to hold all
     whole = [replace(one, log_evidence=min(one.log_evidence, most.get(one.kind, np.inf))) for one in whole]
-    ranked = tuple(sorted([*whole, *mixed], key=lambda one: -one.log_evidence))
+    mixed += _beside_free(every[1:], apart, (time, white), (scale, origin, unit))
+    ranked = tuple(sorted([*whole, *mixed], key=lambda one: one.flat * log(LIKELY) - one.log_evidence))
     places = origin + scale * track.positions
     said = [] if pushed is None or ranked[0].odds else witnesses(ranked[0].mechanisms, places, pushed, track.groups)
     steps = [np.diff(one.positions, axis=0) for one in track.demonstrations]
@@ -278,9 +287,7 @@ def _track(
     names = as_groups(np.zeros(len(table)) if groups is None else groups, len(table))
     _, codes, counts = np.unique(names, return_inverse=True, return_counts=True)
     if counts.min() < FEWEST:
-        raise InvalidDataError(
-            f"positions: got a demonstration of {counts.min()} samples, expected at least {FEWEST} of each."
-        )
+        raise InvalidDataError(f"positions: got a demonstration of {counts.min()} samples, expected at least {FEWEST}.")
     order = np.argsort(codes, kind="stable")
     origin = table.mean(axis=0)
     scale = float(np.sqrt(((table - origin) ** 2).sum(axis=1).mean()))
@@ -297,9 +304,7 @@ def _track(
 def _as_long(values: ArrayLike, what: str, shape: tuple[int, ...]) -> Array:
     table = as_matrix(values, what)
     if table.shape != shape:
-        raise InvalidDataError(
-            f"{what}: got an array of shape {table.shape}, expected {shape}, a row for each position."
-        )
+        raise InvalidDataError(f"{what}: got an array of shape {table.shape}, expected {shape}, a row for a position.")
     return table
 
 
@@ -314,8 +319,7 @@ def _fits(track: Track) -> list[Explained]:
 
 def _turned(fits: list[Fit]) -> list[Fit]:
     """Their axes on one side."""
-    turned = on_one_side([one.mechanism for one in fits])
-    return [Fit(mechanism, one.track) for mechanism, one in zip(turned, fits, strict=True)]
+    return [Fit(it, one.track) for it, one in zip(on_one_side([one.mechanism for one in fits]), fits, strict=True)]
 
 
 def _own(found: list[Candidate]) -> tuple[Candidate, float, dict[str, float]]:
@@ -349,7 +353,35 @@ def _free(alone: list[list[Candidate]]) -> dict[str, float]:
     return {kind: sum(lead[kind] for lead in leads) for kind in leads[0]} if leads else {}
 
 
+def _strays(alone: Sequence[Explained]) -> list[int]:
+    """Those that stray from each kind by more than others do, and far from the straight ones: noise is common."""
+    missed = [{key.form.kind: float(noise(fits)[:1].sum()) ** 0.5 for (key, _), fits in one.items()} for one in alone]
+    least = [min(size for kind, size in one.items() if kind != "free") for one in missed]
+    flat = [min(one["line"], one.get("plane", np.inf)) for one in missed]
+    usual = BEYOND * float(np.median(least or [0.0]))
+    return [k for k in range(len(alone)) if least[k] > usual and flat[k] > BEYOND * usual]
+
+
+def _beside_free(every: Sequence[Explained], apart: Sequence[int], known: Any, place: Any) -> list[Candidate]:
+    """Those that stray are free, the others of one kind, each with a mechanism of its own and the noise in common."""
+    held = [one for k, one in enumerate(every) if k not in apart]
+    if not 0 < len(apart) < len(held):
+        return []
+    fits = {key: _turned([one[key][0] for one in held]) for key in every[0]}
+    loose = {key: [every[k][key][0] for k in apart] for key in every[0] if key[0].form.kind == "free"}
+    found = ([(some[key], worth) for key, worth in log_evidences(some, *known).items()] for some in (fits, loose))
+    others, [free] = ([_candidate(*one, *place) for one in each] for each in found)
+    own, odds, leads = _own(others)
+    value = own.log_evidence + free.log_evidence - log(comb(len(every), len(apart)) * len(leads))
+    rest, kept = iter(free.mechanisms), iter(own.mechanisms)
+    told = [(next(rest), LIKELY, 0.0) if k in apart else (next(kept), odds, leads["free"]) for k in range(len(every))]
+    mechanisms, sure, lead = zip(*told, strict=True)
+    return [Candidate(mechanisms, value, np.nan, sure, lead)] * (own.kind != "free")
+
+
 def _candidate(fits: list[Fit], evidence: float, scale: float, origin: Array, unit: str) -> Candidate:
     variances = noise(fits)
     mechanisms = tuple(one.certain(variances).placed(scale, origin, unit) for one in fits)
-    return Candidate(mechanisms, evidence, scale * float(np.sqrt(variances[0])) if len(variances) else np.nan)
+    flat = all(one.mechanism.form.straight is Plane and one.mechanism.radius > FLAT * one.track.extent for one in fits)
+    size = scale * float(np.sqrt(variances[0])) if len(variances) else np.nan
+    return Candidate(mechanisms, evidence, size, flat=flat)

@@ -110,6 +110,7 @@ class Comparison:
 
     def __init__(self, candidates: Sequence[Candidate], noise: Array, samples: Samples | Sequence[Samples]) -> None:
         self._candidates, self.noise = candidates, noise
+        self.unused = ""  # why no candidate uses a Jacobian that was given
         self._views = [samples] * len(candidates) if isinstance(samples, Samples) else list(samples)
         self._samples = samples = self._views[0]
         self._held, self._seen = held_throughout(samples.actions, samples.groups, beyond_misfit(noise, samples))
@@ -127,7 +128,9 @@ class Comparison:
         """The candidates that both compare, each learnt twice."""
         learnt = {one.name: (one, other._samples) for one in other._candidates}
         both = [replace(one, otherwise=learnt[one.name]) for one in self._candidates if one.name in learnt]
-        return Comparison(both, self.noise, self._samples)
+        found = Comparison(both, self.noise, self._samples)
+        found.unused = self.unused or other.unused
+        return found
 
     def judged(self) -> dict[str, Judged]:
         """Figures of each candidate, by name, as shares of the mean squared action."""

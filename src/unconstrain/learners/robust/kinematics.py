@@ -47,7 +47,7 @@ def with_jacobian(samples: Samples, jacobian: Jacobian, noise: float) -> Iterato
         like = (kinds.labels.tobytes(), *(len(rows) for rows in kinds.rows))
         if kinds.rows and like not in tried:
             tried.add(like)
-            held = ", ".join(f"{len(rows)}" for rows in kinds.rows)
+            held = " and ".join(f"{len(rows)}" for rows in kinds.rows)
             yield _candidate(
                 f"rows of the Jacobian (within {misfit:.1%}) held: {held}", samples, kinds, jacobians, noise
             )

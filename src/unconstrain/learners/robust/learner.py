@@ -27,7 +27,7 @@ from .choice import Comparison
 from .consistent import by_segments, noise_corrected
 from .constants import AS_DIRECT, LEAST_EXPLAINED, LEAST_INFORMATIVE, LEAST_MISFIT, LONG
 from .held_out import held_out_otherwise, held_out_together
-from .kinematics import Jacobian, with_jacobian
+from .kinematics import KNOWING, Jacobian, with_jacobian
 from .likelihood import free_probability, maximise
 from .noise import beyond_misfit, hides_sphere, most_noise, noise_of_each
 from .posterior import Posterior
@@ -50,6 +50,9 @@ BY_AGREEMENT = (
     "is missed. What is said of held-out motion is instead what to expect if the policy has the form of this model, "
     "since all agree on one (generalised cross-validation). Recordings at other places would test that."
 )
+UNUSED = "The Jacobian that was given is not used: {}."
+OUTDONE = "no policy that uses it is of less estimated error"
+INCONSISTENT = "policies that use it miss at least {:.2g}% of held-out motion, this one {:.2g}%"
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,7 @@ class SampleLearner(Learner):
             found = self._plain(training, samples, everything)
         else:
             chosen, more = self.candidate(samples, training)
-            agreed = () if not chosen.alone else (BY_AGREEMENT.format(chosen.alone),)
+            agreed = (*more.pop("notes", ()), *(BY_AGREEMENT.format(one) for one in [chosen.alone] if one))
             more["held_out_score"] = _explained(samples, chosen)
             second = None if self.secondary is None else on(self.secondary, training)(training.folds.whole)
             found = solution(chosen, samples, everything, training.model, second, **more)
@@ -305,7 +308,9 @@ class Robust(_Maximising):
     def candidate(self, samples: Samples, training: Training) -> tuple[Candidate, dict[str, Any]]:
         """The candidate of least estimated error."""
         compared = self.compared(samples, training)
-        return compared.best, {"candidates": compared.judged()}
+        used = self.jacobian is None or compared.best.softness == KNOWING
+        notes = () if used else (UNUSED.format(compared.unused or OUTDONE),)
+        return compared.best, {"candidates": compared.judged(), "notes": notes}
 
     def compared(self, samples: Samples, training: Training) -> Comparison:
         """All candidates; those that use the Jacobian if they are as consistent as the best that does not, or more."""
@@ -332,8 +337,12 @@ class Robust(_Maximising):
         if self.jacobian is None:
             return found
         held = list(with_jacobian(samples, self.jacobian, least))
-        beside = Comparison([found.best, *held], found.noise, samples).as_consistent if held else []
-        return Comparison([*learnt, *beside], found.noise, samples) if beside else found
+        both = Comparison([found.best, *held], found.noise, samples)
+        if beside := both.as_consistent if held else []:
+            return Comparison([*learnt, *beside], found.noise, samples)
+        own, *its = (100.0 * max(one.loss, 0.0) for one in both.judged().values())
+        found.unused = INCONSISTENT.format(min(its), own) if held else "no demonstration shows rows of it held"
+        return found
 
     def suited(self, begun: Mapping[str, Training], seen: Iterable[Batch], usual: str | None = None) -> str:
         """The name of the model in which the policy of least estimated error is learnt.
