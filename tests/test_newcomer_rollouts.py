@@ -149,6 +149,33 @@ def test_who_stays_has_a_size_though_others_run_away(tmp_path):
     assert re.match(r"of those that stay, size (0\.9|1\.0)\d times", ran.in_figures)
 
 
+def test_runs_that_stray_either_way_are_counted_each():
+    sizes, nowhere = np.array([1.5, 1.6, 0.5, 1.0]), np.full(4, np.nan)
+    assert moves(sizes, nowhere)[0] == "3 of 4 turn out 2 too large and 1 too small"
+    assert moves(np.array([1.5, 1.6, 1.7, 1.0]), nowhere)[0] == "3 of 4 turn out too large"
+
+
+@pytest.mark.parametrize("joints", [3, 4])
+def test_a_look_at_what_was_held_out_asks_for_no_more_demonstrations_and_for_a_plane_where_there_is_one(
+    tmp_path, joints
+):
+    rng, names = np.random.default_rng(0), [f"q{k}" for k in range(joints)]
+    for k in range(4):
+        start = rng.uniform(-1, 1, joints)
+        times = 0.02 * np.arange(150)
+        write(tmp_path / f"{k}.csv", ",".join(["t", *names]), np.column_stack([times, start * np.exp(-times)[:, None]]))
+    learn, new = [tmp_path / f"{k}.csv" for k in range(3)], tmp_path / "3.csv"
+    run("fit", *learn, "--state", ",".join(names), "--by", "savgol", "--model", "affine", "-o", tmp_path / "p.npz")
+    page = tmp_path / "look.html"
+    said = words(run("look", new, tmp_path / "p.npz", "-o", page))
+    assert "few demonstrations" not in said
+    assert "few demonstrations" in words(run("look", new, "-o", page, "--force", "--state", ",".join(names)))
+    run("look", new, tmp_path / "p.npz", "-o", page, "--force")
+    found = page.read_text("utf-8")
+    assert ("Tilt the plane, and begin at the next start" in found) == (joints == 3)
+    assert ("Begin at the next start" in found) == (joints == 4)
+
+
 def test_a_cycle_that_shrinks_is_told_by_its_last_round(folder):
     class Shrinking(Ovals):
         def __call__(self, states):

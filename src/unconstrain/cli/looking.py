@@ -6,6 +6,7 @@ import shlex
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -84,6 +85,10 @@ def look(
     seen = _seen(paths, reading)
     scene: Any = None if rrd is None and not live else _scene(seen, robot, tip)
     surveys = uc.preparation.survey_set(seen.recordings, seen.recipe)
+    if seen.policy is not None:  # it was learnt from others
+        surveys = [
+            replace(one, warnings=tuple(w for w in one.warnings if w.code != "few-demonstrations")) for one in surveys
+        ]
     verdict, about = _judged(seen, surveys, live), [*_about(seen)]
     counts = {"demonstrations": len(seen.demonstrations), "samples": sum(map(len, seen.demonstrations))}
     if not as_json:

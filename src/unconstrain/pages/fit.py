@@ -169,7 +169,7 @@ def _replays(runs: Sequence[Replay], said: str, names: Sequence[str]) -> list[ht
     drawn = [("training", one.done) for one in runs] + [(key, one.run) for key, one in zip(keys, runs, strict=True)]
     caption = html.words("fit_replays", held=keys.count("hybrid"), every=len(runs), flat=f"{diagnosis.FLAT:.0%}")
     shown = [key for key in ("training", "hybrid", "roll-out, free") if key in {name for name, _ in drawn}]
-    labels = {"training": "demonstrations", "hybrid": "roll-outs, held alike"}
+    labels = {"training": "demonstrations", "hybrid": "roll-outs, held alike or free alike"}
     picture = html.picture(
         "replays", [_drawn([(key, _thin(demo)) for key, demo in drawn], names)], caption, keys=shown, labels=labels
     )

@@ -44,7 +44,8 @@ MOST_NUMBERS = 50_000
 """Of the covariances of a policy's weights; of more the page does not say where recordings tell the policy."""
 
 _NEXT = "Leave out what should not be learnt from, and copy the command that learns from the rest."
-_MOVED = "Tilt the plane, and begin at the next start, to see where the policy goes; then score it on new recordings."
+_MOVED = "Begin at the next start, to see where the policy goes; then score it on new recordings."
+_TILTED = f"Tilt the plane, and b{_MOVED[1:]}"
 
 
 class Mark(NamedTuple):
@@ -103,7 +104,7 @@ def look_page(
     known = free if learnt is None else learnt
     described = None if policy is None else _described(policy, len(columns))
     runs = described is not None and not described["trouble"]
-    then = _MOVED if runs else _NEXT if command[0] else ""
+    then = (_TILTED if len(columns) <= 3 else _MOVED) if runs else _NEXT if command[0] else ""
     data = {
         "columns": list(columns),
         "units": [(units or {}).get(name, "") for name in columns],

@@ -38,7 +38,7 @@ GUIDES = {
 
 MODELS = {"auto": "", "Affine": "So may a --model that bends: 'local', or 'auto', which tries several."}
 """What else may cure a policy of some features, by what they are called; of others :data:`ANOTHER`."""
-ANOTHER = "So may another --model: 'auto' tries several."
+ANOTHER = "So may another --model, such as cubic; 'auto' tries several."
 
 ROUNDS = 1.5
 """Rounds, at least, that have a pace, and of which the last is compared with the first: a bent reach may make one."""
