@@ -84,11 +84,7 @@ def look(
     check_outputs((None if live else output, rrd), (*paths, robot), force)
     seen = _seen(paths, reading)
     scene: Any = None if rrd is None and not live else _scene(seen, robot, tip)
-    surveys = uc.preparation.survey_set(seen.recordings, seen.recipe)
-    if seen.policy is not None:  # it was learnt from others
-        surveys = [
-            replace(one, warnings=tuple(w for w in one.warnings if w.code != "few-demonstrations")) for one in surveys
-        ]
+    surveys = _surveyed(seen)
     verdict, about = _judged(seen, surveys, live), [*_about(seen)]
     counts = {"demonstrations": len(seen.demonstrations), "samples": sum(map(len, seen.demonstrations))}
     if not as_json:
@@ -152,6 +148,13 @@ def _seen(paths: Sequence[str | Path], reading: dict[str, Any]) -> Seen:
     return Seen(
         recorded, *found, next(iter(policies), None), next(iter(constraints), None), reading_of(**notes).roles, notes
     )
+
+
+def _surveyed(seen: Seen) -> Sequence[Any]:
+    """What is odd about the recordings; beside a policy, which was learnt from others, not how few they are."""
+    found = uc.preparation.survey_set(seen.recordings, seen.recipe)
+    few = "few-demonstrations" * (seen.policy is not None)
+    return [replace(one, warnings=tuple(odd for odd in one.warnings if odd.code != few)) for one in found]
 
 
 def _judged(seen: Seen, surveys: Sequence[Any], live: bool) -> uc.evaluation.verdicts.Verdict:
