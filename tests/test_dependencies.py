@@ -31,7 +31,7 @@ def imported():
             elif isinstance(node, ast.ImportFrom):
                 names = [node.module] if node.level == 0 else []
             elif isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("require_extra", "import_module"):
-                names = [one.value for one in node.args[:1] if isinstance(one, ast.Constant)]
+                names = [one.value for one in node.args[:1] if isinstance(one, ast.Constant) and one.value[:1] != "."]
             else:
                 continue
             found |= {name.partition(".")[0]: path.relative_to(ROOT) for name in names}

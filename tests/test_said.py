@@ -82,7 +82,7 @@ def test_what_is_far_more_than_is_missed_is_not_called_noise():
 
 
 def test_places_that_are_nearly_one_are_one_row(tmp_path):
-    files = strokes(tmp_path / "a", 1e-3)
+    files = strokes(tmp_path / "a", 1e-3, count=4)
     asked = ("diagnose", *files, *FREE[:4])
     regions = json.loads(run(*asked, "--json"))["regions"]
     assert [one["along"] for one in regions] == sorted((one["along"] for one in regions), reverse=True)
