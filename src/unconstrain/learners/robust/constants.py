@@ -131,7 +131,7 @@ AGREED_EXACTLY = 1e-3
 no more than held-out predictions miss, and that fits less than the third share of what they tell. Below the second
 share of what held-out predictions miss, agreement is believed in their place. What they miss of what was learnt from is
 no more than so many times the noise, and that share of the actions: a model of the right form missed 0.96 to 1.35 times
-the noise of rulers and plates, and one that was wrong, by 0.6 to 3.5 times the policy in 7 of 18 draws, 364 times and
+the noise of rulers and plates, and one that was wrong, by 0.6 to 3.5 times the policy in 8 of 31 draws, 364 times and
 more (strokes to one goal in as many planes).
 
 On 24 sets of ten strokes along rulers (seeds that are not reported), cubic features miss 0.06 to 1.5 % of what is new
