@@ -149,6 +149,13 @@ def test_who_stays_has_a_size_though_others_run_away(tmp_path):
     assert re.match(r"of those that stay, size (0\.9|1\.0)\d times", ran.in_figures)
 
 
+def test_what_a_score_would_look_at_are_the_files_that_were_scored(folder):
+    new = folder / "held_3.csv"
+    said = run("score", folder / "slow.npz", new)
+    assert f"unconstrain look {new} " in said
+    assert "unconstrain look RECORDINGS.csv" not in said
+
+
 def test_runs_that_stray_either_way_are_counted_each():
     sizes, nowhere = np.array([1.5, 1.6, 0.5, 1.0]), np.full(4, np.nan)
     assert moves(sizes, nowhere)[0] == "3 of 4 turn out 2 too large and 1 too small"

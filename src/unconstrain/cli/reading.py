@@ -307,10 +307,16 @@ def next_command(name: str, *more: str, without: Sequence[str] = ()) -> str:
     return f"unconstrain {name} {_as_pattern(context.params['files'])} {shlex.join([*told, *more])}".rstrip()
 
 
-def to_copy(verdict: Any, policy: str, notes: Mapping[str, Any] | None = None, states: Sequence[str] = ()) -> Any:
+def to_copy(
+    verdict: Any,
+    policy: str,
+    notes: Mapping[str, Any] | None = None,
+    states: Sequence[str] = (),
+    of: Sequence[str] = (),
+) -> Any:
     """A verdict with the commands that its Next names whole, on these files or, in capitals, such as a model notes.
 
-    ``states`` are their names with units, where a goal may have to be given.
+    ``states`` are their names with units, where a goal may have to be given, and ``of`` are files to look at.
     """
     lines, known = verdict.next.split("\n"), notes or {}
     recipe = uc.Recipe.from_dict(known.get("recipe", {}))
@@ -323,7 +329,7 @@ def to_copy(verdict: Any, policy: str, notes: Mapping[str, Any] | None = None, s
         more = {"fit": more, "look": [policy]}.get(name, [])
         left = ["to", *["group"] * ("--group" in verdict.next)]  # another one is asked for
         own = next_command(name, *more, without=left) if notes is None and name != "score" else ""
-        files = [policy, "NEW.csv"] if name == "score" else read
+        files = [policy, "NEW.csv"] if name == "score" else [*of, *read[1:]] if of and name == "look" else read
         lines.append(own or shlex.join(["unconstrain", name, *files, *more]))
     return verdict._replace(next="\n".join(dict.fromkeys(lines)))
 

@@ -71,7 +71,7 @@ def score(
     with shown("running it from the same starts"):
         found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units, starts=HERE)
     judged = verdicts.of_unit(verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0)), _times(learnt, states))
-    verdict = to_copy(judged, policy, notes)
+    verdict = to_copy(judged, policy, notes, of=files)
     if not as_json:
         _print_scores(verdict, [*before, *rows], whole, {"hardly moved": still, "too short": short}, found.in_figures)
         return
