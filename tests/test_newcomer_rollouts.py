@@ -158,7 +158,7 @@ def test_what_a_score_would_look_at_are_the_files_that_were_scored(folder):
 
 def test_runs_that_stray_either_way_are_counted_each():
     sizes, nowhere = np.array([1.5, 1.6, 0.5, 1.0]), np.full(4, np.nan)
-    assert moves(sizes, nowhere)[0] == "3 of 4 turn out 2 too large and 1 too small"
+    assert moves(sizes, nowhere)[0] == "3 of 4 turn out too large (2) or too small (1)"
     assert moves(np.array([1.5, 1.6, 1.7, 1.0]), nowhere)[0] == "3 of 4 turn out too large"
 
 
@@ -264,7 +264,11 @@ def test_lengths_and_velocities_are_told_in_the_unit_of_the_columns(tmp_path, he
 
 @pytest.mark.parametrize(
     ("model", "advice"),
-    [("local", "another --model: 'auto' tries"), ("affine", "a --model that bends: 'local', or"), ("auto", None)],
+    [
+        ("local", "another --model, such as cubic; 'auto' tries"),
+        ("affine", "a --model that bends: 'local', or"),
+        ("auto", None),
+    ],
 )
 def test_another_model_is_advised_unless_it_was_tried(folder, tmp_path, model, advice):
     files = [folder / f"slow_{k}.csv" for k in range(10, 14)]
@@ -343,7 +347,7 @@ def added(sizes, paces=np.nan):
 def test_strokes_that_are_too_large_are_not_outweighed_by_others_that_are_too_small():
     found, figures = added([0.6, 0.7, 1.0, 1.5, 1.7])
     assert found.mark is Mark.DOUBTFUL
-    assert found.said == "Good. But run from the same starts, 4 of 5 turn out too large or too small."
+    assert found.said == "Good. But run from the same starts, 4 of 5 turn out too large (2) or too small (2)."
     assert figures == (
         "size 1.00 times (0.60 to 1.70) the demonstrated (in brackets, least to most of 5 runs), typically 3 mm "
         "from the recorded path; more than 20% off: size of 4 of 5"

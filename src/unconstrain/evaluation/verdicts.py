@@ -397,9 +397,8 @@ def moves(extents: Array, paces: Array, lasts: Any = ()) -> tuple[str, list[str]
             wrong = ratios[off > np.log(OTHERWISE)]
             ways = zip((wrong > 1, (wrong >= 0) & (wrong <= 1), wrong < 0), _WRONG[name], strict=True)
             who = f"{len(wrong)} of {many} " if many > 1 else "it " * (not said)
-            those = " and ".join(
-                f"{rows.sum()} {way}" if 0 < rows.sum() < len(wrong) else way for rows, way in ways if rows.any()
-            )
+            given = [(int(rows.sum()), way) for rows, way in ways if rows.any()]
+            those = " or ".join(way + f" ({count})" * (len(given) > 1) for count, way in given)
             said.append(who + f"{goes} " * (not said) + those)
             strays.append(name.replace(LAST, "size"))
     nearly = "nearly " * any((by > np.log(OTHERWISE)).any() for _, by in measured.values())
