@@ -350,7 +350,7 @@ def test_a_printed_command_reads_and_prepares_as_what_the_policy_was_learnt_from
     uc.save(uc.load(work / "p.npz"), tmp_path / "q.npz", {"recipe": recipe.to_dict(), TOLD: 0.2, **roles})
     [line] = [one.strip() for one in run("info", tmp_path / "q.npz").splitlines() if " diagnose REC" in one]
     _, command, *words = shlex.split(line)
-    given = main.commands[command].make_context(command, words).params
+    given = main.commands[command].make_context(command, words, help_option_names=["-h", "--help"]).params
     assert reading.recipe_of(**given) == recipe
     assert {**reading.reading_of(**given).roles} == {**uc.readers.Reading(**roles).roles}
     plain = {one for one in OTHER if one not in other and one not in roles} - {"differentiate"}
