@@ -191,7 +191,7 @@ def replays(
     moving, near = bounded(policy, stack(demos).states)
     runs = rollout(moving, starts, steps, dt, own, task=task, least_support=0.0)
     cut = [run[: round(seconds / dt) + 1] for run, seconds in zip(runs, lasted, strict=True)]
-    known = [held is not None or bool(rows.any()) for rows, _ in shapes]
+    known = [held is not None or not free or bool(rows.any()) for rows, _ in shapes]  # others were not chosen
     return [
         _compared(one, run, along, how or _free(policy, one), near(run.states))
         for one, run, (_, along), how in zip(chosen, cut, shapes, known, strict=True)
