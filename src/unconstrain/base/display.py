@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from difflib import get_close_matches
 from html import escape
+from itertools import pairwise
 from typing import Any, TypeVar
 
 Listener = Callable[[str, int, int], None]
@@ -59,6 +60,14 @@ def percent(share: float) -> str:
     """A share such as ``"12%"``; ``"<1%"`` and ``">99%"`` where rounding would say none or all of what is not."""
     rounded, exact = f"{share:.0%}", not 1e-9 < share % 1.0 < 1.0 - 1e-9  # sums of weights are all to rounding
     return rounded if exact else {"0%": "<1%", "-0%": "<1%", "100%": ">99%"}.get(rounded, rounded)
+
+
+def percents(parts: Sequence[float]) -> list[str]:
+    """Parts of a whole, as by :func:`percent`, rounded so that together they are 100%."""
+    ends = [round(100.0 * sum(parts[:count])) for count in range(len(parts) + 1)]
+    whole = [after - before for before, after in pairwise(ends)]
+    edges = [{0: "<1%" if part > 1e-9 else "0%", 100: ">99%" if part < 1.0 - 1e-9 else "100%"} for part in parts]
+    return [edge.get(much, f"{much}%") for much, edge in zip(whole, edges, strict=True)]
 
 
 def shortened(name: str, most: int = 40) -> str:

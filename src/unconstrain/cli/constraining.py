@@ -104,7 +104,8 @@ def constraint(
     verdict = _judged(learnt, named, wound)
     if not as_json:
         say_verdict(verdict)
-        click.echo(f"Learnt from {said_recipe(recipe, first)}.")
+        alone = f"{', '.join(recipe.labels(first.units)[0])} alone, as positions on a surface"
+        click.echo(f"Learnt from {alone if surface else said_recipe(recipe, first)}.")
         _say(learnt, surface, recipe.labels(first.units), named)
     notes = provenance(paths, recipe, first, **reading) | {WOUND: wound}
     for name, place in outputs.items():
@@ -147,6 +148,10 @@ def _judged(
         then = f"Learn it of those that look held, with --leave-out {left}."
         doubt = "What is learnt of all together." if "" in learnt else f"What is learnt of {listed(names)}."
         return uc.evaluation.verdicts.Verdict(uc.evaluation.verdicts.Mark.DOUBTFUL, said, doubt=doubt, next=then)
+    if named is not None and named.found.kind == "mixture" and {*kinds.values()} <= {"held", "undecided"}:
+        sure = [*kinds.values()].count("held")
+        said = f"Positions do not tell what held them, and of {len(kinds) - sure} of {len(kinds)} demonstrations not "
+        return found._replace(said=f"{said}whether anything did. {found.said}")
     if named is not None and named.differs(learnt):
         said = f"Demonstrations differ: {named.found.summary}. {found.said.replace('held;', 'held in all;')}"
         return found._replace(said=said, next="Learn those of one mechanism alone, with --episodes or --leave-out.")
@@ -412,6 +417,8 @@ def _say_one(learnt: uc.LearntConstraint, what: str) -> None:
     click.echo(f"Noise and misfit along them are about {learnt.noise_:.3g} {what}, and {missed}.")
     rows = [[name, f"{share:.3g}"] for name, share in choice.candidates.items()]
     print_table(["features", "missed where held out"], rows)
+    if choice.candidates.get(choice.name, 0.0) > min(choice.candidates.values()):
+        click.echo(f"Taken: {choice.name}, the simplest that misses no more than the least, up to noise and chance.")
 
 
 def table_of(

@@ -20,6 +20,19 @@ from .writing import check_outputs, option_for_force
 
 MOST_ROWS = 8
 
+LEGEND = """recorded in: the demonstration that passed there.
+told by all: share of the samples there at which all recordings together tell
+  the policy: what they leave open is a tenth of a typical action at most, or
+  below noise, where that is below it.
+told by three: the same whichever two demonstrations are left out, so that it
+  hangs on no one or two.
+may be off by: along 'leave free', any two left out; 100% is a typical action.
+  Large although all tell it, it hangs on one or two, which others may confirm.
+moved by: how many moved along 'leave free' there at all, by more than noise. A
+  place may be told all the same, by others from which models go on.
+Of each state: 'by_all' and 'by_three' of uc.evaluation.diagnose(...)."""
+"""What the heads of the table stand for."""
+
 
 @click.command(epilog="\b\nExample:\n  unconstrain diagnose wipe_*.csv --state x,y,z --by savgol -o a.html")
 @options_for_reading
@@ -78,10 +91,10 @@ def diagnose(
 def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequence[str], unit: str, all_: bool) -> None:
     for line in uc.evaluation.diagnosis.sentences(found, states, actions, unit):
         click.echo(line)
-    if all_ or found.states_determined < 1.0 or found.regions[0].along > uc.evaluation.diagnosis.SMALL:
+    if all_ or uc.evaluation.diagnosis.needs_more(found):
         _say_places(found, states, actions, all_)
     else:
-        click.echo("\nNo place needs another demonstration: three or more tell the policy at each (-v lists all).")
+        click.echo(f"\n{uc.evaluation.diagnosis.NOWHERE[:-1]} (-v lists all).")
     told = [one for one in found.movements if one.looks in uc.evaluation.diagnosis.COUNTED]
     if not (free := sorted(told, key=lambda one: -(one.free or 0.0))):
         return
@@ -97,19 +110,13 @@ def _say_places(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: 
     count = f"{len(every)} ({len(found.regions)} regions)"
     click.echo(f"\nThe {len(shown)} places where least is known, of {count}; what all leave open first, largest first:")
     around, along = (" ".join(name.partition(" [")[0] for name in names) for names in (states, actions))
-    head = [f"demonstrate\naround\n({around})", "in", "told", "by\nthree", "spread",
-            f"leave free\n({along})", "shown\nby"]  # fmt: skip
+    head = [f"demonstrate around\n({around})", "recorded\nin", "told\nby all", "told by\nthree", "may be\noff by",
+            f"leave free\n({along})", "moved\nby"]  # fmt: skip
     rows = [
-        [" ".join(f"{value:.2g}" for value in one.state), one.demonstration, percent(one.together),
+        [" ".join(f"{float(f'{value:.3g}'):g}" for value in one.state), one.demonstration, percent(one.together),
          percent(one.determined), percent(one.along), " ".join(f"{value:.2f}" for value in one.direction),
          str(len(one.shown_by))]
         for one in shown
     ]  # fmt: skip
     print_table(head, rows)
-    click.echo("told: share of samples there at which all tell the policy: what they leave open is a tenth of a")
-    click.echo("  typical action at most, or below noise, where that is below it (lengths over the coordinates).")
-    click.echo("by three: the same whichever two are left out, so that it hangs on no one or two; in Python")
-    click.echo("  'undetermined' and 'from_noise' of policy.uncertainty(states).")
-    click.echo("spread: how far it may be off along 'leave free', with any two left out; 100% is a typical action.")
-    click.echo("  Large although all tell the policy, it hangs on one or two demonstrations, which others may confirm.")
-    click.echo("shown by: demonstrations that moved along 'leave free' in this region.")
+    click.echo(LEGEND)

@@ -75,7 +75,8 @@ def export(
     check_outputs((output, header, ros2), (policy,), force)
     learnt, notes = fitted_policy(policy), uc.storage.load_notes(policy)
     notes["units"] = uc.Recipe.from_dict(notes.get("recipe", {})).units(notes.get("units", {}))  # as recorded, if old
-    judged = _judged(learnt, notes, ros2)
+    found, limits = verdict_of(learnt, notes), _limits(notes, ros2)
+    judged = found._replace(doubt=f"{limits} {found.doubt}".rstrip())
     notes |= {MARK: f"{judged.mark.name.lower()}. {judged.said} Do not trust: {judged.doubt}", RAN: None, MOVES: None}
     written, then = dict[str, str](), _NEXT_ROS2
     if ros2 is not None:
@@ -91,17 +92,19 @@ def export(
         written["header"] = header
     if judged.mark is uc.evaluation.verdicts.Mark.BAD:
         then = f"It is not to be trusted as it is: {judged.next.rstrip('.')}. To try it all the same: {then}"
-    say_judged(judged._replace(next=then), written, as_json)
+    short = f"{found.said.partition('. ')[0].rstrip('.')} ('unconstrain info' says all)."
+    less: dict[str, Any] = {} if as_json else {"said": short, "trust": "", "doubt": limits}
+    say_judged(judged._replace(next=then, **less), written, as_json)
 
 
-def _judged(learnt: Any, notes: dict[str, Any], ros2: str | None) -> uc.evaluation.verdicts.Verdict:
-    """Of a policy that goes to a robot, also in which unit where nobody has said it."""
-    judged, units = verdict_of(learnt, notes), notes.get("units", {})
+def _limits(notes: dict[str, Any], ros2: str | None) -> str:
+    """Where a policy on a robot is not to be trusted, and in which unit it is, where nobody has said it."""
+    units = notes.get("units", {})
     recipe = uc.Recipe.from_dict(notes.get("recipe", {}))
     of_states = {units.get(name) for name in recipe.states or ("",)}
     unit = "" if ros2 is None or of_states in ({"mm"}, {"cm"}, {"m"}, {"deg"}, {"rad"}) else _UNIT.format(ros2)
     far = "States far from all data, where its support is near 0." + _CENTRED * recipe.centre
-    return judged._replace(doubt=f"{far}{unit} {judged.doubt}".rstrip())
+    return far + unit
 
 
 def _check(output: str | None, kind: str, ros2: str | None, name: str | None, single: bool) -> None:

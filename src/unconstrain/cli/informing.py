@@ -179,6 +179,7 @@ def explained_by(held: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> uc.ev
     count = len(policy.training_.split.fold_of) or uc.evaluation.diagnosis.ENOUGH
     shown = notes[TOLD] if isinstance(notes.get(TOLD), float) else None
     more: dict[str, Any] = {"lost": notes.get(LOST), "noise": notes.get(NOISE) or 0.0}
+    more["alone"] = uc.evaluation.diagnosis.missed_alone(policy.solution_)
     return uc.evaluation.verdicts.of_explained(policy.held_out_score(), count, shown, **more)
 
 
@@ -187,7 +188,7 @@ def doubted(policy: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> str:
     if notes.get(MARK) not in ("doubtful", "bad"):
         return ""
     if (found := explained_by(policy, notes)).mark is not uc.evaluation.verdicts.Mark.GOOD:
-        return found.said[0].lower() + found.said[1:].rstrip(".")
+        return found.said[0].lower() + found.said[1:].partition(". ")[0].rstrip(".")
     return _doubt(notes)
 
 

@@ -70,7 +70,9 @@ def score(
     judged = judged if held is not None else verdicts.of_planes(judged, planes, _motion(demonstrations))
     with shown("running it from the same starts"):
         found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units, starts=HERE)
-    judged = verdicts.of_unit(verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0)), _times(learnt, states))
+    judged = verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0))
+    unit = verdicts.of_unit(judged, _times(learnt, states))
+    judged = _left(judged, moving, demonstrations) if unit is judged else unit
     verdict = to_copy(judged, policy, notes, of=files)
     if not as_json:
         _print_scores(verdict, [*before, *rows], whole, {"hardly moved": still, "too short": short}, found.in_figures)
@@ -96,10 +98,22 @@ def _missed(judged: Any, moving: Any, demonstrations: Sequence[uc.Demonstration]
     return uc.evaluation.verdicts.doubted(judged, said) if learnt else judged
 
 
+def _left(judged: Any, moving: Any, demonstrations: Sequence[uc.Demonstration]) -> Any:
+    """A verdict with how many samples leave where a policy was learnt, if most of what it misses is there."""
+    far = [support_of(innermost(moving), one.states) < uc.evaluation.verdicts.NEARBY for one in demonstrations]
+    off = [one[rows] for one, rows in zip(demonstrations, far, strict=True) if rows.any()]
+    usual = float((uc.stack(demonstrations).actions ** 2).sum(axis=1).mean() ** 0.5)
+    missed, motion = uc.evaluation.metrics.along_motion(moving, demonstrations, usual)
+    there = uc.evaluation.metrics.along_motion(moving, off, usual)[0] if off else 0.0
+    share = sum(map(len, off)) / sum(map(len, demonstrations))
+    return uc.evaluation.verdicts.of_left(judged, share, missed / (motion or 1.0), there / (missed or 1.0))
+
+
 def _print_scores(verdict: Any, rows: Any, whole: dict[str, Any], left: dict[str, list[str]], ran: str) -> None:
     """A verdict, scores of each demonstration and all, why others have none, and figures of runs from their starts."""
     say_verdict(verdict)
-    head = ["demonstration", "samples", "explains", "normalised inconsistency", "nPOE", "nCPE"][: len(whole) - 1]
+    head = ["demonstration", "fast of all samples", "explains", "normalised inconsistency", "nPOE", "nCPE"]
+    head = head[: len(whole) - 1]
     each = [_row(*one.values()) for one in (*rows, whole)]
     none = [[name, "", f"{why}: no score"] for why, names in left.items() for name in names]
     print_table(head, [*each[:-1], *none, each[-1]])
@@ -109,7 +123,7 @@ def _print_scores(verdict: Any, rows: Any, whole: dict[str, Any], left: dict[str
 def _row(name: str, size: int, fast: int, share: float, *rest: float | None) -> list[str]:
     said = percent(share) if share >= -1 else "worse than standing still"
     said = said if fast >= LEAST else "slow: cannot be judged"
-    return [name, f"{fast} of {size}" if fast < size else str(size), said, *(number(one, "{:.4g}") for one in rest)]
+    return [name, f"{fast} of {size}", said, *(number(one, "{:.4g}") for one in rest)]
 
 
 def _long_enough(demonstrations: Sequence[uc.Demonstration]) -> list[uc.Demonstration]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
@@ -24,12 +25,15 @@ from .metrics import along_motion
 from .sentences import CONSTRAINED as CONSTRAINED
 from .sentences import COUNTED as COUNTED
 from .sentences import FREE as FREE
+from .sentences import NOWHERE as NOWHERE
 from .sentences import about_choice as about_choice
 from .sentences import about_freedom as about_freedom
+from .sentences import about_places as about_places
 from .sentences import about_suspects as about_suspects
 from .sentences import in_words as in_words
 from .sentences import looks
 from .sentences import models_of as models_of
+from .sentences import needs_more as needs_more
 from .sentences import sentences as sentences
 from .sentences import to_record as to_record
 from .shown import FLAT as FLAT
@@ -133,6 +137,10 @@ class Movement:
     looks: str | None
 
 
+EACH = "by_all", "by_three", "undetermined", "from_noise", "free"
+"""Fields with one value a sample."""
+
+
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """Where the policy is determined by the data, and where it is not.
@@ -174,6 +182,8 @@ class Diagnosis:
         others.
     planes : int
         How many :func:`planes_of` finds.
+    by_all, by_three : ndarray of bool, shape (N,)
+        Whether recordings tell the policy at each recorded state: all together, and whichever two are left out.
     undetermined, from_noise : ndarray, shape (N,)
         Length of the standard deviations at each recorded state, as a share of the typical action.
     free : ndarray, shape (N,), optional
@@ -204,6 +214,8 @@ class Diagnosis:
     movements: tuple[Movement, ...]
     suspects: tuple[Place, ...]
     planes: int
+    by_all: NDArray[np.bool_]
+    by_three: NDArray[np.bool_]
     undetermined: Array
     from_noise: Array
     free: Array | None
@@ -211,7 +223,7 @@ class Diagnosis:
     def to_json(self) -> dict[str, Any]:
         """All fields but those with one value a sample; None for what is not finite."""
         plain = {one.name: getattr(self, one.name) for one in fields(self)}
-        kept = {name: value for name, value in plain.items() if name not in ("undetermined", "from_noise", "free")}
+        kept = {name: value for name, value in plain.items() if name not in EACH}
         kept["jitter"] = self.jitter if np.isfinite(self.jitter) else None
         named = {name: [vars(one) for one in plain[name]] for name in ("regions", "movements")}
         return kept | named | {"suspects": [one._asdict() for one in self.suspects]}
@@ -290,6 +302,8 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
         movements=_movements(demos, undetermined, known, free),
         suspects=() if free is None else tuple(places_of(belief.suspects, zip(names_of(demos), demos, strict=True))),
         planes=len(planes_of(demos)),
+        by_all=known | together,
+        by_three=known,
         undetermined=undetermined,
         from_noise=from_noise,
         free=free,
@@ -335,6 +349,12 @@ def states_told(policy: Policy) -> float | None:
     typical = float(np.sqrt((actions**2).sum(axis=1).mean()))
     told = max(float((untold_at(policy.in_own_units(), states, typical) <= SMALL).mean()), belief.told_together)
     return min(told, 1.0)  # a sum of shares may be more by rounding
+
+
+def missed_alone(solution: Solution) -> float | None:
+    """Share of the motion of demonstrations left out whole that is missed, where a note says so; None elsewhere."""
+    found = [re.search(r"left out in turn, (\d+)% of their motion is missed", note) for note in solution.notes]
+    return next((float(one[1]) / 100.0 for one in found if one), None)
 
 
 def lost_by_guiding(moving: Any, demonstrations: Sequence[Demonstration]) -> float | None:

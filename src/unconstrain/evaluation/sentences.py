@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.display import counted, percent
+from ..base.display import counted, percent, percents
 from ..learners import robust
 from .marks import ENOUGH, PARTLY, SMALL
 from .shown import named
-from .verdicts import regions_left
+from .verdicts import shares_told
 
 if TYPE_CHECKING:
     from .diagnosis import Diagnosis, Place, Region
@@ -28,8 +28,10 @@ FREE, CONSTRAINED = 0.5, 0.1
 
 COUNTED = {"free": "free", "constrained": "constrained", "unsure": "either"}
 LOOKS = COUNTED | {"flat": "on a plane that others cross (as what is held, or a short free stroke)"}
-LOOKS["untold"] = "not to be told (too little else was seen there, or all was held the same way)"
+LOOKS["untold"] = "not to be told as a whole (too little else was seen there, or all was held the same way)"
 """How demonstrations look, and how that is said; those of the first three are compared by probability."""
+
+NOWHERE = "No place needs another demonstration: three or more tell the policy at each."
 
 MOST_NAMED = 8
 """So many samples that look wrong are named."""
@@ -60,9 +62,9 @@ def _about_noise(found: Diagnosis, unit: str) -> str:
     too_much = found.noise_share > robust.SPHERE_HIDDEN_BY_NOISE
     hidden = " So much noise makes the following unreliable." if too_much else ""
     said = (
-        f"Noise and misfit: {verdict}, {found.noise:.3g}{unit} on each action coordinate, {found.noise_share:.1%} of a "
+        f"Noise and misfit: {verdict}, {found.noise:.3g}{unit} on each action coordinate, {percent(found.noise_share)} "
     )
-    said += f"typical action ({found.typical:.3g}{unit}) in all.{hidden}"
+    said += f"of a typical action ({found.typical:.3g}{unit}) on all together.{hidden}"
     if found.noise_share < 0.5 * SMALL or found.noise < MISFIT * found.jitter:
         return said
     rest = "the rest is what the model does not follow, fast parts that --window smooths, or people who vary."
@@ -114,12 +116,22 @@ def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[st
         worst = max(one.along for one in found.regions)
         off = f", though {percent(worst)} of a typical action may be off there" * bool(worst > SMALL)
         return f"Every recorded state is determined, as far as noise lets it be told{off}."
-    told, every, (open_, few) = found.told_together, len(found.regions), regions_left(found)
-    left, hangs = (percent(max(share, 0.0)) for share in (1.0 - told, told - found.states_determined))
-    where = "" if (left, open_) == ("0%", 0) else f"Not determined: {left} of the states, {open_} of {every} regions. "
-    where += f"Told by one or two demonstrations alone: {hangs} of the states, {few} of {every} regions; in "
-    where += f"{sum(len(one.shown_by) < ENOUGH for one in found.regions)} regions fewer than {ENOUGH} demonstrations "
-    return f"{where}moved along what is least known. {_least_shown(found.regions[0], states, actions)}"
+    few = sum(len(one.shown_by) < ENOUGH for one in found.regions)
+    said = f"In {few} of {len(found.regions)} regions fewer than {ENOUGH} demonstrations moved along what is least "
+    return f"{said}known. {_least_shown(found.regions[0], states, actions)}"
+
+
+def needs_more(found: Diagnosis) -> bool:
+    """Whether some recorded place needs another demonstration."""
+    return found.states_determined < 1.0 or found.regions[0].along > SMALL
+
+
+def about_places(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> list[str]:
+    """How well recordings tell the policy, and where another demonstration would help, each in a sentence."""
+    if not needs_more(found):
+        return [NOWHERE]
+    told = shares_told(found)
+    return [f"{told[0].upper()}{told[1:]}.", to_record(found, states, actions)]
 
 
 def to_record(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> str:
@@ -132,12 +144,11 @@ def to_record(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -
 def _least_shown(region: Region, states: Sequence[str], actions: Sequence[str]) -> str:
     """What was seen of the direction that is least determined in a region."""
     where = f"along {named(region.direction, actions)} near {named(region.state, states)}"
-    if not region.shown_by:
-        return f"Nothing was ever seen {where}."
-    if len(region.shown_by) < ENOUGH:
-        only = " and ".join(f"'{one}'" for one in region.shown_by)
-        return f"Only {only} moved {where}: record two more there."
-    return f"What was seen {where} is too little, or does not agree."
+    if len(region.shown_by) >= ENOUGH:
+        return f"What was seen {where} is too little, or does not agree."
+    said = f"Nobody moved {where} by more than noise"
+    but = f", but for {' and '.join(map(repr, region.shown_by))}, if only with a part of the motion"
+    return f"{said}{but * bool(region.shown_by)}: record {('three', 'two', 'one')[len(region.shown_by)]} more there."
 
 
 def looks(free: float, told: float, flat: bool) -> str:
@@ -158,10 +169,13 @@ def about_freedom(found: Diagnosis) -> str:
         return f"{said}; a short free stroke may, too. {look}"
     free = sum(one.samples * (one.free or 0.0) for one in others) / sum(one.samples for one in found.movements)
     share = free if len(others) < len(found.movements) else found.free_share
-    said = f"{percent(share)} of the samples look free: nothing that shows above the noise held them"
-    if found.undecided_share >= LITTLE:
-        said += f". Of {percent(found.undecided_share)} the recordings cannot tell: they were free or always held in "
-        said += "the same way, which looks alike; demonstrations held in another way would tell"
+    unsure = found.undecided_share * (found.undecided_share >= LITTLE)
+    much, held, open_ = percents((share, 1.0 - share - unsure, unsure))
+    said = f"Of the samples {much} look free (nothing that shows above the noise held them){' and' * (not unsure)}"
+    said += f"{',' * bool(unsure)} {held} held"
+    if unsure:
+        said += f", and of {open_} the recordings cannot tell: they were free or always held in the same way, which "
+        said += "looks alike; demonstrations held in another way would tell"
     if found.free is None:
         return f"{said}. That is of the samples that the policy was fitted to."
     return f"{said}. {look}"

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
-from ..base.display import counted, percent
+from ..base.display import counted, percent, percents
 from ..models import SUPPORTED
-from .marks import ENOUGH, FAIR, FAR_OFF, FEW, FORBIDDEN, NEARBY, OTHERWISE, PARTLY, UNITS, graded, no_better
+from .marks import ENOUGH, FAIR, FAR_OFF, FEW, FORBIDDEN, OTHERWISE, PARTLY, UNITS, graded, no_better
 from .marks import GOOD as GOOD
 from .marks import MOSTLY as MOSTLY
+from .marks import NEARBY as NEARBY
 from .marks import SMALL as SMALL
 from .marks import WIDTH as WIDTH
 from .marks import Mark as Mark
@@ -50,7 +51,7 @@ def misses(share: float, noise: float) -> str:
     """What is left of a share of motion, as one of a typical action, and what noise alone makes, if believable."""
     missed = float(np.sqrt(max(1.0 - share, 0.0)))
     known = 0.005 <= noise <= 1.2 * missed  # more is constraints that change at every sample, not noise
-    more = f" (noise in the recorded actions alone: {percent(min(noise, missed))} or more)" * known
+    more = f" (noise along the motion alone makes that {percent(min(noise, missed))} or more)" * known
     return f"misses {percent(missed)} of a typical action{more}"
 
 
@@ -87,6 +88,7 @@ def of_explained(
     learnt: float = 0.0,
     lost: float | None = None,
     noise: float = 0.0,
+    alone: float | None = None,
 ) -> Verdict:
     """Judge how much of held-out motion a policy explains, along the motion.
 
@@ -94,10 +96,12 @@ def of_explained(
     give no verdict. ``determined`` is the share of the recorded states at which recordings tell the policy, and
     ``there`` what to record where fewer show it. ``learnt`` is the share of what was learnt from, and ``lost`` what
     guiding takes of that, None where it is not guided: a guided policy is judged by what is left, or worse. What
-    is missed for ``noise`` alone is a share of a typical action.
+    is missed for ``noise`` alone is a share of a typical action. Where others tell too little of demonstrations left
+    out whole, ``alone`` is the share of their motion that is missed, and ``share`` is expected if one model holds.
     """
     across, little = "What constraints hid: no recording shows it, so no score does.", ""
-    alone, share = share, share - (lost or 0.0)
+    unguided, share = share, share - (lost or 0.0)
+    what = "held-out motion" if alone is None else "motion like what was recorded, if one model holds for all"
     mark, word = graded(share, told=determined)
     if determined is not None and determined < MOSTLY and demonstrations >= ENOUGH:
         untold = of_untold(1 - determined)
@@ -107,9 +111,9 @@ def of_explained(
         across += "." if there else "; 'unconstrain diagnose' says where."
     who, retold = "The policy" if lost is None else "The guided policy", ""
     if lost is not None and np.isfinite(share):
-        same = "about as much" if not round(lost, 2) else f"{percent(alone)}, and {misses(alone, 0.0)}"
+        same = "about as much" if not round(lost, 2) else f"{percent(unguided)}, and {misses(unguided, 0.0)}"
         retold = (
-            f" Unguided it {'misses more' if alone < -1 else f'explains {same}'}; what guiding takes is of what it "
+            f" Unguided it {'misses more' if unguided < -1 else f'explains {same}'}; what guiding takes is of what it "
         )
         retold += "was fitted to, and says nothing of new starts."
     if demonstrations < ENOUGH or not np.isfinite(share):
@@ -117,11 +121,15 @@ def of_explained(
         few = f"{seen} verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
         return Verdict(Mark.DOUBTFUL, few + retold, doubt=across, next=MORE)
     missed = f"where the policy predicts, it {misses(share, noise)}"
-    advice = f"{_advice(word, learnt, mark is not graded(alone, told=determined)[0])} {there}".rstrip()
+    advice = f"{_advice(word, learnt, mark is not graded(unguided, told=determined)[0])} {there}".rstrip()
     if little:
         advice = there or "'unconstrain diagnose' says what to record."
     trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
-    return Verdict(mark, f"{little}{who} {_explains(share)}: {word}.{retold}", trust, across, advice)
+    said = f"{little}{who} {_explains(share, what)}: {word}.{retold}"
+    if alone is not None:
+        much = f"{percent(alone)} of their motion" if alone < 1 else "more than all of their motion"
+        said += f" But whole demonstrations that are left out it misses by {much}, as the others tell little of them."
+    return Verdict(mark, said, trust, across, advice)
 
 
 def of_score(
@@ -168,6 +176,19 @@ def of_worst(found: Verdict, shares: Mapping[str, float]) -> Verdict:
     more = f", and {', '.join(name for _, name in poor[1:])} little better" if poor[1:] else ""
     then = f"Look whether these went wrong or were held otherwise ('unconstrain look'). {found.next}"
     return doubted(found, f"it {_explains(poor[0][0], f'{poor[0][1]} alone')}{more}")._replace(next=then)
+
+
+def of_left(found: Verdict, share: float, missed: float, there: float) -> Verdict:
+    """Add to a score that recordings leave where a policy was learnt, where that is likely why it misses.
+
+    At some ``share`` of their samples, which make a part ``there`` of what is ``missed``, itself a share of the motion.
+    """
+    if missed <= 1 - MOSTLY or there <= 0.5:
+        return found
+    said = f"What it misses is likely because these recordings leave where it was learnt: at {percent(share)} of their "
+    said += f"samples, which make {percent(there)} of what is missed."
+    then = f"Demonstrate where these go, too ('unconstrain look' shows both). {found.next}"
+    return found._replace(said=f"{found.said} {said}", next=then.rstrip())
 
 
 def of_planes(found: Verdict, shares: Array, motion: Array) -> Verdict:
@@ -236,30 +257,29 @@ def of_forbidden(found: Verdict, share: float) -> Verdict:
     return found if share <= FORBIDDEN else found._replace(mark=no_better(found.mark), said=said, next=then)
 
 
-def regions_left(found: Diagnosis) -> tuple[int, int]:
-    """Of how many regions all recordings leave most open, and how many more hang on one or two demonstrations."""
-    open_ = sum(region.together < PARTLY for region in found.regions)
-    return open_, sum(region.together >= PARTLY > region.determined for region in found.regions)
+def shares_told(found: Diagnosis) -> str:
+    """At which shares of their states recordings tell a policy, and how well: best first, together all of them."""
+    parts = (three := found.states_determined), (hangs := max(found.told_together - three, 0.0)), 1.0 - three - hangs
+    how = "three demonstrations or more tell the policy", "it hangs on one or two", "all leave a direction open"
+    said = [f"{much} {rest}" for much, rest in zip(percents(parts), how, strict=True)]
+    told = [one for one, part in zip(said, parts, strict=True) if part > 1e-9 or one == said[0]]
+    return f"at {' and at '.join(', at '.join(told).rsplit(', at ', 1))}".replace("%", "% of their states", 1)
 
 
 def of_diagnosis(found: Diagnosis, first: str = "") -> Verdict:
     """Judge whether recordings tell the unconstrained policy; ``first`` is what to record, before the list of it."""
-    share, count, (open_, few) = found.states_determined, len(found.movements), regions_left(found)
-    there = sum(one.samples for one in found.regions if one.together < PARTLY) / len(found.undetermined)
-    doubt = f"{open_} of {len(found.regions)} regions, where all recordings leave a direction open: free, or "
-    doubt = f"{doubt}always held the same way, cannot be told there (these hold {percent(there)} of the states)."
-    doubt = doubt if open_ else "States that nobody came near."
-    hangs = f" {few} of {len(found.regions)} regions by one or two demonstrations alone." if few else ""
+    share, count = found.states_determined, len(found.movements)
+    doubt = "Where all leave a direction open: free, or always held the same way, cannot be told there."
+    doubt = doubt if found.told_together < 1.0 - 1e-9 else "States that nobody came near."
     if count < ENOUGH:
         said = f"No verdict: {_count(count)}; whether they were free cannot be told from fewer than {ENOUGH}."
         return Verdict(Mark.DOUBTFUL, said, doubt=doubt, next=MORE)
     mark, word = graded(share, MOSTLY, PARTLY)
     how = {"good": "enough", "fair": "enough in most places", "poor": "not enough"}
-    said = f"Recordings: at {percent(share)} of their states three demonstrations or more tell the policy: {how[word]}."
+    said = f"Recordings: {shares_told(found)}: {how[word]}."
     if mark is Mark.BAD and allowed_by(found.told_together) is not Mark.BAD:
         mark = Mark.DOUBTFUL
-        said = f"Recordings: all together tell the policy at {percent(found.told_together)} of their states, "
-        said += f"but at {percent(share)} whichever two are left out: it may hang on one or two."
+        said = f"Recordings: {shares_told(found)}: enough only if none of these one or two went wrong."
     elif found.planes == 1:
         said = f"{said[:-1]}, as all lie on one plane or on parallel ones."
     elif mark is Mark.BAD and found.planes:
@@ -267,10 +287,11 @@ def of_diagnosis(found: Diagnosis, first: str = "") -> Verdict:
     if found.noise_share > 3 * SMALL:
         mark = no_better(mark)
         said = f"{said[:-1]}, though noise is {percent(found.noise_share)} of a typical action."
-    trust = f"The policy at these states, up to noise of {percent(found.noise_share)} of a typical action"
+    trust = f"The policy {'at these states' if share == 1 else 'where three or more tell it'}, up to noise and misfit "
+    trust += f"of {percent(found.noise_share)} of a typical action"
     if open_spread := share == 1 and (worst := found.regions[0].along) > SMALL:
         trust += f"; at the place that comes next, up to {percent(worst)}, where noise leaves more open"
-    trust = f"{f'{trust}.' * (mark is not Mark.BAD)}{hangs}".strip()
+    trust = f"{trust}." * (round(share, 2) > 0)
     if mark is not Mark.GOOD:
         doubt += " 'fit' and 'score' may still explain much: they judge a policy along the motion, this judges "
         doubt += "recordings across it."
@@ -297,7 +318,8 @@ def of_constraint(
         why = "each state was passed one way only, as by a free policy" if one_way else little
         then = "Record movements that cross each other, and learn it again; or name the --features."
         single = not others and not choice.several
-        then += " 'diagnose' tells of several together which look held." * single
+        more = " 'fit' and 'diagnose' judge by what demonstrations have in common, and may tell that they were held."
+        then += " 'diagnose' tells of several together which look held." if single else more
         said = f"Whether anything was held cannot be told{' by one demonstration alone' * single}: {why}."
         return Verdict(Mark.DOUBTFUL, said, doubt=f"That {min(ranks)} of {choice.actions} are held.", next=then)
     mark, word = graded(1.0 - missed)
@@ -393,15 +415,15 @@ def moves(extents: Array, paces: Array, lasts: Any = ()) -> tuple[str, list[str]
     goes = ("go round" if many > 1 else "goes round") if "pace" in measured else f"turn{'s' * (many == 1)} out"
     said, strays = list[str](), list[str]()
     for name, (ratios, off) in measured.items():
-        if (off > np.log(OTHERWISE)).mean() > (FEW if many >= ENOUGH else 0.5) or off.max() > np.log(FAR_OFF):
-            wrong = ratios[off > np.log(OTHERWISE)]
+        if _otherwise(ratios).mean() > (FEW if many >= ENOUGH else 0.5) or off.max() > np.log(FAR_OFF):
+            wrong = ratios[_otherwise(ratios)]
             ways = zip((wrong > 1, (wrong >= 0) & (wrong <= 1), wrong < 0), _WRONG[name], strict=True)
             who = f"{len(wrong)} of {many} " if many > 1 else "it " * (not said)
             given = [(int(rows.sum()), way) for rows, way in ways if rows.any()]
             those = " or ".join(way + f" ({count})" * (len(given) > 1) for count, way in given)
             said.append(who + f"{goes} " * (not said) + those)
             strays.append(name.replace(LAST, "size"))
-    nearly = "nearly " * any((by > np.log(OTHERWISE)).any() for _, by in measured.values())
+    nearly = "nearly " * any(_otherwise(ratios).any() for ratios, _ in measured.values())
     kept = " and ".join(name for name in measured if name != LAST)
     return (" and ".join(said) if said else f"it {nearly}keeps {kept}" * bool(kept)), [*dict.fromkeys(strays)]
 
@@ -411,9 +433,10 @@ def size_and_pace(extents: Array, paces: Array, lasts: Any = (), of: str = "", a
     measured, many = _measured(extents, paces, lasts), len(extents)
     told = ", ".join(f"{name} {_times(ratios)}" for name, (ratios, _) in measured.items())
     runs = f" (in brackets, least to most of {many} runs)" if "(" in told else ""
-    counts = {name: int((by > np.log(OTHERWISE)).sum()) for name, (_, by) in measured.items()}
+    counts = {name: int(_otherwise(ratios).sum()) for name, (ratios, _) in measured.items()}
     off = ", ".join(f"{name} of {count} of {many}" for name, count in counts.items() if count)
-    which = f"; {'' if off else 'none '}more than {OTHERWISE - 1:.0%} off{off and f': {off}'}" * (many > 1)
+    which = f"; {'' if off else 'none '}beyond {1 / OTHERWISE:.2f} to {OTHERWISE:.2f} times{off and f': {off}'}"
+    which *= many > 1
     return f"{of}{told} the demonstrated{runs}, typically {apart} from the recorded path{which}" if told else ""
 
 
@@ -422,6 +445,12 @@ def _measured(*given: Sequence[float] | Array) -> dict[str, tuple[Array, Array]]
     named = zip(("size", "pace", LAST), map(np.asarray, given), strict=True)
     found = {name: ratios[np.isfinite(ratios)] for name, ratios in named}
     return {name: (one, np.abs(np.log(np.maximum(one, 1e-9)))) for name, one in found.items() if len(one)}
+
+
+def _otherwise(ratios: Array) -> NDArray[np.bool_]:
+    """Which are beyond :data:`OTHERWISE`, or its inverse, as they are printed."""
+    said = np.round(ratios, 2)
+    return (said > OTHERWISE) | (said < np.round(1 / OTHERWISE, 2))
 
 
 def _times(ratios: Array) -> str:

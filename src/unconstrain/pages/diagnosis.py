@@ -65,14 +65,15 @@ def unknown(
     except InvalidDataError as error:
         return [html.paragraph(f"Nothing can be said about that: {error}")]
     return [
-        html.bullets([*diagnosis.sentences(found, states, actions), diagnosis.to_record(found, states, actions)]),
-        _map(found, demos, states, actions),
-        _next(found, states, actions),
+        html.bullets([*diagnosis.sentences(found, states, actions), *diagnosis.about_places(found, states, actions)]),
+        *([_map(found, demos, states, actions), _next(found, states, actions)] * diagnosis.needs_more(found)),
     ]
 
 
 def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], actions: Sequence[str]) -> html.Markup:
-    """Two state columns, coloured by the undetermined spread."""
+    """Two state columns, coloured by the undetermined spread; a sentence where three tell the policy at all."""
+    if found.by_three.all():
+        return html.paragraph("Nowhere: three demonstrations or more tell the policy at every recorded state.")
     recorded = stack(demos).states
     regions = diagnosis.places(found.regions)[:MOST_REGIONS]
     worst = np.array([region.state for region in regions])
@@ -99,6 +100,8 @@ def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], ac
 
 
 def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> html.Markup:
+    if not diagnosis.needs_more(found):
+        return html.paragraph(diagnosis.NOWHERE)
     every = diagnosis.places(found.regions)
     shown = every[:MOST_REGIONS]
     rows = [
@@ -118,7 +121,8 @@ def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> ht
     ]
     around, along = (", ".join(names) for names in (states, actions))
     header = ["", f"demonstrate around\n({around})", f"with motion left free along\n({along})", "recorded in"]
-    header += ["spread\nalong it", "spread in\nthe region", "told\nby all", "by three", "moved\nalong it by", "samples"]
+    header += ["spread\nalong it", "spread in\nthe region", "told\nby all", "by three"]
+    header += ["some motion\nalong it by", "samples"]
     note = html.words("diagnosis_next", shown=len(shown), every=len(every), regions=len(found.regions))
     return html.table(header, rows, left=4, note=note)
 
