@@ -6,7 +6,6 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from difflib import get_close_matches
 from html import escape
-from itertools import pairwise
 from typing import Any, TypeVar
 
 Listener = Callable[[str, int, int], None]
@@ -64,10 +63,8 @@ def percent(share: float) -> str:
 
 def percents(parts: Sequence[float]) -> list[str]:
     """Parts of a whole, as by :func:`percent`, rounded so that together they are 100%."""
-    ends = [round(100.0 * sum(parts[:count])) for count in range(len(parts) + 1)]
-    whole = [after - before for before, after in pairwise(ends)]
-    edges = [{0: "<1%" if part > 1e-9 else "0%", 100: ">99%" if part < 1.0 - 1e-9 else "100%"} for part in parts]
-    return [edge.get(much, f"{much}%") for much, edge in zip(whole, edges, strict=True)]
+    whole = [round(100.0 * sum(parts[: k + 1])) - round(100.0 * sum(parts[:k])) for k in range(len(parts))]
+    return [percent(part) if much in (0, 100) else f"{much}%" for part, much in zip(parts, whole, strict=True)]
 
 
 def shortened(name: str, most: int = 40) -> str:

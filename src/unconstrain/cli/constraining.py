@@ -149,9 +149,8 @@ def _judged(
         doubt = "What is learnt of all together." if "" in learnt else f"What is learnt of {listed(names)}."
         return uc.evaluation.verdicts.Verdict(uc.evaluation.verdicts.Mark.DOUBTFUL, said, doubt=doubt, next=then)
     if named is not None and named.found.kind == "mixture" and {*kinds.values()} <= {"held", "undecided"}:
-        sure = [*kinds.values()].count("held")
-        said = f"Positions do not tell what held them, and of {len(kinds) - sure} of {len(kinds)} demonstrations not "
-        return found._replace(said=f"{said}whether anything did. {found.said}")
+        sure = f"{[*kinds.values()].count('held')} of {len(kinds)} demonstrations that they were held"
+        return found._replace(said=f"{found.said} Positions tell of {sure}, though not by what; not of the others.")
     if named is not None and named.differs(learnt):
         said = f"Demonstrations differ: {named.found.summary}. {found.said.replace('held;', 'held in all;')}"
         return found._replace(said=said, next="Learn those of one mechanism alone, with --episodes or --leave-out.")
@@ -349,13 +348,14 @@ class Named(NamedTuple):
         """The verdict, and what it leaves open."""
         known = "Mechanism" if self.found.mechanism.unit else "Mechanism, if these are positions"
         doubt = self.found.doubt
-        meant = "± is half of a 95 % interval, 10:1 are odds" if "±" in self.found.summary else "10:1 are odds"
+        meant = " (± is half of a 95 % interval, 10:1 are odds)" if "±" in self.found.summary else " (10:1 are odds)"
+        meant *= ":1" in self.found.summary
         apart = [
             name for name, one in zip(self.names, self.held, strict=False) if sum(map(one.parallel, self.held)) < 2
         ]
         apart = [] if self.found.candidates[0].over_free else apart  # of each its kind says that
         free = f"Maybe free, as no other has an axis of that direction: {listed(apart)}."
-        said = [f"{known}: {self.found.summary} ({meant}).", *([f"{doubt[0].upper()}{doubt[1:]}."] if doubt else [])]
+        said = [f"{known}: {self.found.summary}{meant}.", *([f"{doubt[0].upper()}{doubt[1:]}."] if doubt else [])]
         return [*said, free] if doubt and 0 < len(apart) < len(self.held) else said
 
 

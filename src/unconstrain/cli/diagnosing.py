@@ -20,18 +20,12 @@ from .writing import check_outputs, option_for_force
 
 MOST_ROWS = 8
 
-LEGEND = """recorded in: the demonstration that passed there.
-told by all: share of the samples there at which all recordings together tell
-  the policy: what they leave open is a tenth of a typical action at most, or
-  below noise, where that is below it.
-told by three: the same whichever two demonstrations are left out, so that it
-  hangs on no one or two.
-may be off by: along 'leave free', any two left out; 100% is a typical action.
-  Large although all tell it, it hangs on one or two, which others may confirm.
-moved by: how many moved along 'leave free' there at all, by more than noise. A
-  place may be told all the same, by others from which models go on.
-Of each state: 'by_all' and 'by_three' of uc.evaluation.diagnose(...)."""
-"""What the heads of the table stand for."""
+LEGEND = {
+    "told by all": "share of samples there at which all recordings leave open a tenth of an action, or below noise.",
+    "told by three": "the same whichever two are left out; of each state 'told' of uc.evaluation.diagnose says it.",
+    "may be off by": "of a typical action, any two left out; if large though all tell it, it hangs on one or two.",
+    "moved by": "how many moved along 'leave free' there, by more than noise; others, elsewhere, may tell it, too.",
+}
 
 
 @click.command(epilog="\b\nExample:\n  unconstrain diagnose wipe_*.csv --state x,y,z --by savgol -o a.html")
@@ -119,4 +113,5 @@ def _say_places(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: 
         for one in shown
     ]  # fmt: skip
     print_table(head, rows)
-    click.echo(LEGEND)
+    for name, meant in LEGEND.items():
+        click.echo(click.wrap_text(f"{name}: {meant}", 80, subsequent_indent="  "))

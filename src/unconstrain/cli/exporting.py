@@ -92,19 +92,17 @@ def export(
         written["header"] = header
     if judged.mark is uc.evaluation.verdicts.Mark.BAD:
         then = f"It is not to be trusted as it is: {judged.next.rstrip('.')}. To try it all the same: {then}"
-    short = f"{found.said.partition('. ')[0].rstrip('.')} ('unconstrain info' says all)."
-    less: dict[str, Any] = {} if as_json else {"said": short, "trust": "", "doubt": limits}
-    say_judged(judged._replace(next=then, **less), written, as_json)
+    said = f"{found.said.partition('. ')[0].rstrip('.')} ('unconstrain info' says all)."
+    short = judged if as_json else found._replace(said=said, trust="", doubt=limits)
+    say_judged(short._replace(next=then), written, as_json)
 
 
 def _limits(notes: dict[str, Any], ros2: str | None) -> str:
     """Where a policy on a robot is not to be trusted, and in which unit it is, where nobody has said it."""
-    units = notes.get("units", {})
     recipe = uc.Recipe.from_dict(notes.get("recipe", {}))
-    of_states = {units.get(name) for name in recipe.states or ("",)}
+    of_states = {notes.get("units", {}).get(name) for name in recipe.states or ("",)}
     unit = "" if ros2 is None or of_states in ({"mm"}, {"cm"}, {"m"}, {"deg"}, {"rad"}) else _UNIT.format(ros2)
-    far = "States far from all data, where its support is near 0." + _CENTRED * recipe.centre
-    return far + unit
+    return f"States far from all data, where its support is near 0.{_CENTRED * recipe.centre}{unit}"
 
 
 def _check(output: str | None, kind: str, ros2: str | None, name: str | None, single: bool) -> None:

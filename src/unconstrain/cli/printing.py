@@ -37,8 +37,7 @@ SPOILING = {*OTHER_UNITS, "missing", "refused", "same-recording", "rolled-out"}
 """Codes of recordings that spoil what is learnt with others, or end it."""
 
 MEANINGS = {
-    "fast of all samples": "those of ten times their noise or more, where that is known; only they are judged in "
-    "'explains'; in --json 'fast' and 'samples'",
+    "fast samples": "of ten times their noise or more, where known, of all: what 'explains' is of; in --json 'fast'",
     "explains": "weighted share of the squared motion, along the recorded directions, that the policy explains; go by "
     "this, as the verdict does: of the fast samples the slower count less",
     "normalised inconsistency": "the paper's squared error along the motion, over the variance of the actions; slow "
@@ -207,8 +206,8 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     open_ = told is not None and told < uc.evaluation.verdicts.MOSTLY
     there = _least_known(policy, demos, stream.recipe) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
     noise = uc.evaluation.metrics.missed_for_noise(policy, demos)
-    whole = uc.evaluation.diagnosis.missed_alone(policy.solution_)
-    found = uc.evaluation.verdicts.of_explained(alone, count, told, there, 1.0 - missed, lost, noise, whole)
+    more = 1.0 - missed, lost, noise, policy.solution_.notes
+    found = uc.evaluation.verdicts.of_explained(alone, count, told, there, *more)
     ran = retraced(found, moving, demos, stream.recipe, None, stream.first.units, False)
     cured = ran.verdict._replace(next=there) if there and found.next == there else ran.verdict
     to = guides(policy, demos) if moving is policy else None
@@ -266,7 +265,7 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
         _say_determined(solution, learner)
     click.echo("".join(f"{note}\n" for note in solution.notes), nl=False)
     seen = f"{judged.training:.4g} on the training data, " if known else ""
-    where = "as expected of new motion" if uc.evaluation.diagnosis.missed_alone(solution) else "where held out"
+    where = "as expected of new motion" if "left out in turn" in " ".join(solution.notes) else "where held out"
     rest = f"{judged.held_out:.4g} {where}." if isfinite(judged.held_out) else "nothing could be held out."
     click.echo(f"Share of the motion explained, where slow samples count less, as in the verdict: {seen}{rest}")
     if judged.ran:

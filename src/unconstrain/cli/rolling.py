@@ -26,9 +26,6 @@ from .scoring import support_of
 from .speaking import as_typed
 from .writing import check_outputs, option_for_force
 
-MANY = 10
-"""Times as many steps as were taken, in which what is slow comes no nearer: it rests."""
-
 
 @click.command(epilog="\b\nExample:\n  unconstrain rollout wipe.npz --start 0.1,0,0 --plane 0,0.3,1 -o path.csv")
 @click.argument("policy", type=click.Path())
@@ -180,12 +177,9 @@ def _off_goal(moving: Any, path: uc.Demonstration, held: str, unit: str, near: f
     back = 1 + len(far) // 20
     shrinks = math.log(max(far[-1 - back], 1e-300) / max(far[-1], 1e-300)) / back if len(far) > back else 0.0
     more = math.log(max(far[-1] / (near * far.max() or 1.0), 1.0)) / max(shrinks, 1e-300)
-    slow, rests = speeds[-1] <= near * speeds.max(), speeds[-1] <= near * speeds.max() and more > MANY * len(far)
-    why = "it rests there" if rests else "it is still on its way (--steps)"
-    if slow and not rests:
-        why = (
-            f"it slows down towards it, and about {math.ceil(more)} more --steps bring it within {near:.0%} of its way"
-        )
+    rests = (slow := speeds[-1] <= near * speeds.max()) and more > 10 * len(far)  # it comes no nearer
+    slows = f"it slows down towards it; about {math.ceil(min(more, 1e9))} more --steps bring it within {near:.0%}"
+    why = "it rests there" if rests else slows if slow else "it is still on its way (--steps)"
     why += f", {'as' if rests else 'and may come to rest where'} {held} holds it off" if held else ""
     return f" It ends {far[-1]:.3g} {unit} from the goal: {why}." if far[-1] > near * far.max() else ""
 

@@ -70,10 +70,8 @@ def score(
     judged = judged if held is not None else verdicts.of_planes(judged, planes, _motion(demonstrations))
     with shown("running it from the same starts"):
         found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units, starts=HERE)
-    judged = verdicts.of_forbidden(found.verdict, whole.get("npoe", 0.0))
-    unit = verdicts.of_unit(judged, _times(learnt, states))
-    judged = _left(judged, moving, demonstrations) if unit is judged else unit
-    verdict = to_copy(judged, policy, notes, of=files)
+    judged = verdicts.of_forbidden(_left(found.verdict, moving, demonstrations), whole.get("npoe", 0.0))
+    verdict = to_copy(verdicts.of_unit(judged, _times(learnt, states)), policy, notes, of=files)
     if not as_json:
         _print_scores(verdict, [*before, *rows], whole, {"hardly moved": still, "too short": short}, found.in_figures)
         return
@@ -100,20 +98,24 @@ def _missed(judged: Any, moving: Any, demonstrations: Sequence[uc.Demonstration]
 
 def _left(judged: Any, moving: Any, demonstrations: Sequence[uc.Demonstration]) -> Any:
     """A verdict with how many samples leave where a policy was learnt, if most of what it misses is there."""
-    far = [support_of(innermost(moving), one.states) < uc.evaluation.verdicts.NEARBY for one in demonstrations]
+    along, verdicts = uc.evaluation.metrics.along_motion, uc.evaluation.verdicts
+    far = [support_of(innermost(moving), one.states) < verdicts.NEARBY for one in demonstrations]
     off = [one[rows] for one, rows in zip(demonstrations, far, strict=True) if rows.any()]
-    usual = float((uc.stack(demonstrations).actions ** 2).sum(axis=1).mean() ** 0.5)
-    missed, motion = uc.evaluation.metrics.along_motion(moving, demonstrations, usual)
-    there = uc.evaluation.metrics.along_motion(moving, off, usual)[0] if off else 0.0
-    share = sum(map(len, off)) / sum(map(len, demonstrations))
-    return uc.evaluation.verdicts.of_left(judged, share, missed / (motion or 1.0), there / (missed or 1.0))
+    usual = float(_motion(demonstrations).sum() / (size := sum(map(len, demonstrations)))) ** 0.5
+    missed, motion = along(moving, demonstrations, usual)
+    there = along(moving, off, usual)[0] if off else 0.0
+    if missed <= (1 - verdicts.MOSTLY) * motion or there <= 0.5 * missed:
+        return judged
+    left = f"leave where it was learnt, at {percent(sum(map(len, off)) / size)} of their samples"
+    said = f"{judged.said} What it misses is likely ({percent(there / missed)}) as these recordings {left}."
+    then = f"Demonstrate where they go, too ('unconstrain look' shows both). {judged.next}"
+    return judged._replace(said=said, next=then.rstrip())
 
 
 def _print_scores(verdict: Any, rows: Any, whole: dict[str, Any], left: dict[str, list[str]], ran: str) -> None:
     """A verdict, scores of each demonstration and all, why others have none, and figures of runs from their starts."""
     say_verdict(verdict)
-    head = ["demonstration", "fast of all samples", "explains", "normalised inconsistency", "nPOE", "nCPE"]
-    head = head[: len(whole) - 1]
+    head = ["demonstration", "fast samples", "explains", "normalised inconsistency", "nPOE", "nCPE"][: len(whole) - 1]
     each = [_row(*one.values()) for one in (*rows, whole)]
     none = [[name, "", f"{why}: no score"] for why, names in left.items() for name in names]
     print_table(head, [*each[:-1], *none, each[-1]])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
@@ -28,7 +27,6 @@ from .sentences import FREE as FREE
 from .sentences import NOWHERE as NOWHERE
 from .sentences import about_choice as about_choice
 from .sentences import about_freedom as about_freedom
-from .sentences import about_places as about_places
 from .sentences import about_suspects as about_suspects
 from .sentences import in_words as in_words
 from .sentences import looks
@@ -137,10 +135,6 @@ class Movement:
     looks: str | None
 
 
-EACH = "by_all", "by_three", "undetermined", "from_noise", "free"
-"""Fields with one value a sample."""
-
-
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """Where the policy is determined by the data, and where it is not.
@@ -182,8 +176,8 @@ class Diagnosis:
         others.
     planes : int
         How many :func:`planes_of` finds.
-    by_all, by_three : ndarray of bool, shape (N,)
-        Whether recordings tell the policy at each recorded state: all together, and whichever two are left out.
+    told : ndarray of int, shape (N,)
+        At each recorded state 2 if three or more tell the policy, 1 if it hangs on one or two demonstrations, else 0.
     undetermined, from_noise : ndarray, shape (N,)
         Length of the standard deviations at each recorded state, as a share of the typical action.
     free : ndarray, shape (N,), optional
@@ -214,8 +208,7 @@ class Diagnosis:
     movements: tuple[Movement, ...]
     suspects: tuple[Place, ...]
     planes: int
-    by_all: NDArray[np.bool_]
-    by_three: NDArray[np.bool_]
+    told: NDArray[np.int_]
     undetermined: Array
     from_noise: Array
     free: Array | None
@@ -223,7 +216,7 @@ class Diagnosis:
     def to_json(self) -> dict[str, Any]:
         """All fields but those with one value a sample; None for what is not finite."""
         plain = {one.name: getattr(self, one.name) for one in fields(self)}
-        kept = {name: value for name, value in plain.items() if name not in EACH}
+        kept = {name: one for name, one in plain.items() if name not in ("told", "undetermined", "from_noise", "free")}
         kept["jitter"] = self.jitter if np.isfinite(self.jitter) else None
         named = {name: [vars(one) for one in plain[name]] for name in ("regions", "movements")}
         return kept | named | {"suspects": [one._asdict() for one in self.suspects]}
@@ -302,8 +295,7 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
         movements=_movements(demos, undetermined, known, free),
         suspects=() if free is None else tuple(places_of(belief.suspects, zip(names_of(demos), demos, strict=True))),
         planes=len(planes_of(demos)),
-        by_all=known | together,
-        by_three=known,
+        told=known.astype(int) + (known | together),
         undetermined=undetermined,
         from_noise=from_noise,
         free=free,
@@ -349,12 +341,6 @@ def states_told(policy: Policy) -> float | None:
     typical = float(np.sqrt((actions**2).sum(axis=1).mean()))
     told = max(float((untold_at(policy.in_own_units(), states, typical) <= SMALL).mean()), belief.told_together)
     return min(told, 1.0)  # a sum of shares may be more by rounding
-
-
-def missed_alone(solution: Solution) -> float | None:
-    """Share of the motion of demonstrations left out whole that is missed, where a note says so; None elsewhere."""
-    found = [re.search(r"left out in turn, (\d+)% of their motion is missed", note) for note in solution.notes]
-    return next((float(one[1]) / 100.0 for one in found if one), None)
 
 
 def lost_by_guiding(moving: Any, demonstrations: Sequence[Demonstration]) -> float | None:

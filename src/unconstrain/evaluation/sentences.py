@@ -12,10 +12,9 @@ from ..base.display import counted, percent, percents
 from ..learners import robust
 from .marks import ENOUGH, PARTLY, SMALL
 from .shown import named
-from .verdicts import shares_told
 
 if TYPE_CHECKING:
-    from .diagnosis import Diagnosis, Place, Region
+    from .diagnosis import Diagnosis, Place
 
 MISFIT = 1.5
 """Residuals above this many times the noise by differences in time are mostly misfit of the model."""
@@ -26,12 +25,11 @@ LITTLE = 0.01
 FREE, CONSTRAINED = 0.5, 0.1
 """A demonstration looks free above the first, and constrained below the second mean probability of free samples."""
 
+NOWHERE = "No place needs another demonstration: three or more tell the policy at each."
 COUNTED = {"free": "free", "constrained": "constrained", "unsure": "either"}
 LOOKS = COUNTED | {"flat": "on a plane that others cross (as what is held, or a short free stroke)"}
 LOOKS["untold"] = "not to be told as a whole (too little else was seen there, or all was held the same way)"
 """How demonstrations look, and how that is said; those of the first three are compared by probability."""
-
-NOWHERE = "No place needs another demonstration: three or more tell the policy at each."
 
 MOST_NAMED = 8
 """So many samples that look wrong are named."""
@@ -61,10 +59,8 @@ def _about_noise(found: Diagnosis, unit: str) -> str:
     verdict = "little" if found.noise_share < SMALL else "some" if found.noise_share < 3 * SMALL else "much"
     too_much = found.noise_share > robust.SPHERE_HIDDEN_BY_NOISE
     hidden = " So much noise makes the following unreliable." if too_much else ""
-    said = (
-        f"Noise and misfit: {verdict}, {found.noise:.3g}{unit} on each action coordinate, {percent(found.noise_share)} "
-    )
-    said += f"of a typical action ({found.typical:.3g}{unit}) on all together.{hidden}"
+    said = f"Noise and misfit: {verdict}, {found.noise:.3g}{unit} on each action coordinate, "
+    said += f"{percent(found.noise_share)} of a typical action ({found.typical:.3g}{unit}) on all together.{hidden}"
     if found.noise_share < 0.5 * SMALL or found.noise < MISFIT * found.jitter:
         return said
     rest = "the rest is what the model does not follow, fast parts that --window smooths, or people who vary."
@@ -116,9 +112,13 @@ def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[st
         worst = max(one.along for one in found.regions)
         off = f", though {percent(worst)} of a typical action may be off there" * bool(worst > SMALL)
         return f"Every recorded state is determined, as far as noise lets it be told{off}."
-    few = sum(len(one.shown_by) < ENOUGH for one in found.regions)
-    said = f"In {few} of {len(found.regions)} regions fewer than {ENOUGH} demonstrations moved along what is least "
-    return f"{said}known. {_least_shown(found.regions[0], states, actions)}"
+    region = found.regions[0]
+    where = f"along {named(region.direction, actions)} near {named(region.state, states)}"
+    if len(region.shown_by) >= ENOUGH:
+        return f"What was seen {where} is too little, or does not agree."
+    said = f"Nobody moved {where} by more than noise"
+    but = f", but for {' and '.join(map(repr, region.shown_by))}, if only with a part of the motion"
+    return f"{said}{but * bool(region.shown_by)}: record {('three', 'two', 'one')[len(region.shown_by)]} more there."
 
 
 def needs_more(found: Diagnosis) -> bool:
@@ -126,29 +126,11 @@ def needs_more(found: Diagnosis) -> bool:
     return found.states_determined < 1.0 or found.regions[0].along > SMALL
 
 
-def about_places(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> list[str]:
-    """How well recordings tell the policy, and where another demonstration would help, each in a sentence."""
-    if not needs_more(found):
-        return [NOWHERE]
-    told = shares_told(found)
-    return [f"{told[0].upper()}{told[1:]}.", to_record(found, states, actions)]
-
-
 def to_record(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> str:
     """Where another demonstration would help most, and how to hold it."""
     worst = found.regions[0]
     advice = f"Demonstrate around {named(worst.state, states)} with motion along {named(worst.direction, actions)} "
     return f"{advice}left free: tilt what holds it, such as the plate, another way, or take another."
-
-
-def _least_shown(region: Region, states: Sequence[str], actions: Sequence[str]) -> str:
-    """What was seen of the direction that is least determined in a region."""
-    where = f"along {named(region.direction, actions)} near {named(region.state, states)}"
-    if len(region.shown_by) >= ENOUGH:
-        return f"What was seen {where} is too little, or does not agree."
-    said = f"Nobody moved {where} by more than noise"
-    but = f", but for {' and '.join(map(repr, region.shown_by))}, if only with a part of the motion"
-    return f"{said}{but * bool(region.shown_by)}: record {('three', 'two', 'one')[len(region.shown_by)]} more there."
 
 
 def looks(free: float, told: float, flat: bool) -> str:
@@ -171,10 +153,9 @@ def about_freedom(found: Diagnosis) -> str:
     share = free if len(others) < len(found.movements) else found.free_share
     unsure = found.undecided_share * (found.undecided_share >= LITTLE)
     much, held, open_ = percents((share, 1.0 - share - unsure, unsure))
-    said = f"Of the samples {much} look free (nothing that shows above the noise held them){' and' * (not unsure)}"
-    said += f"{',' * bool(unsure)} {held} held"
+    said = f"Of the samples {much} look free (nothing that shows above the noise held them), {held} held"
     if unsure:
-        said += f", and of {open_} the recordings cannot tell: they were free or always held in the same way, which "
+        said += f", and of {open_} recordings cannot tell: they were free or always held in the same way, which "
         said += "looks alike; demonstrations held in another way would tell"
     if found.free is None:
         return f"{said}. That is of the samples that the policy was fitted to."

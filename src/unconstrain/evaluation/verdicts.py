@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -88,7 +89,7 @@ def of_explained(
     learnt: float = 0.0,
     lost: float | None = None,
     noise: float = 0.0,
-    alone: float | None = None,
+    notes: Sequence[str] = (),
 ) -> Verdict:
     """Judge how much of held-out motion a policy explains, along the motion.
 
@@ -96,12 +97,13 @@ def of_explained(
     give no verdict. ``determined`` is the share of the recorded states at which recordings tell the policy, and
     ``there`` what to record where fewer show it. ``learnt`` is the share of what was learnt from, and ``lost`` what
     guiding takes of that, None where it is not guided: a guided policy is judged by what is left, or worse. What
-    is missed for ``noise`` alone is a share of a typical action. Where others tell too little of demonstrations left
-    out whole, ``alone`` is the share of their motion that is missed, and ``share`` is expected if one model holds.
+    is missed for ``noise`` alone is a share of a typical action. Where ``notes`` of the solution say how much is missed
+    of demonstrations left out whole, ``share`` is what to expect if one model holds.
     """
     across, little = "What constraints hid: no recording shows it, so no score does.", ""
-    unguided, share = share, share - (lost or 0.0)
-    what = "held-out motion" if alone is None else "motion like what was recorded, if one model holds for all"
+    alone, share = share, share - (lost or 0.0)
+    whole = re.search(r"left out in turn, (\d+)% of their motion is missed", " ".join(notes))
+    what = "held-out motion" if whole is None else "motion like what was recorded, if one model holds for all"
     mark, word = graded(share, told=determined)
     if determined is not None and determined < MOSTLY and demonstrations >= ENOUGH:
         untold = of_untold(1 - determined)
@@ -111,24 +113,21 @@ def of_explained(
         across += "." if there else "; 'unconstrain diagnose' says where."
     who, retold = "The policy" if lost is None else "The guided policy", ""
     if lost is not None and np.isfinite(share):
-        same = "about as much" if not round(lost, 2) else f"{percent(unguided)}, and {misses(unguided, 0.0)}"
-        retold = (
-            f" Unguided it {'misses more' if unguided < -1 else f'explains {same}'}; what guiding takes is of what it "
-        )
-        retold += "was fitted to, and says nothing of new starts."
+        same = "about as much" if not round(lost, 2) else f"{percent(alone)}, and {misses(alone, 0.0)}"
+        retold = f" Unguided it {'misses more' if alone < -1 else f'explains {same}'}; what guiding takes is of what "
+        retold += "it was fitted to, and says nothing of new starts."
     if demonstrations < ENOUGH or not np.isfinite(share):
         seen = f"{who} {_explains(share)}, but no" if np.isfinite(share) else "No"
         few = f"{seen} verdict: {_count(demonstrations)}, and a judgement takes {ENOUGH}."
         return Verdict(Mark.DOUBTFUL, few + retold, doubt=across, next=MORE)
     missed = f"where the policy predicts, it {misses(share, noise)}"
-    advice = f"{_advice(word, learnt, mark is not graded(unguided, told=determined)[0])} {there}".rstrip()
+    advice = f"{_advice(word, learnt, mark is not graded(alone, told=determined)[0])} {there}".rstrip()
     if little:
         advice = there or "'unconstrain diagnose' says what to record."
     trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
     said = f"{little}{who} {_explains(share, what)}: {word}.{retold}"
-    if alone is not None:
-        much = f"{percent(alone)} of their motion" if alone < 1 else "more than all of their motion"
-        said += f" But whole demonstrations that are left out it misses by {much}, as the others tell little of them."
+    if whole is not None:
+        said += f" But of demonstrations left out whole it misses {whole[1]}%: the others tell little of them."
     return Verdict(mark, said, trust, across, advice)
 
 
@@ -176,19 +175,6 @@ def of_worst(found: Verdict, shares: Mapping[str, float]) -> Verdict:
     more = f", and {', '.join(name for _, name in poor[1:])} little better" if poor[1:] else ""
     then = f"Look whether these went wrong or were held otherwise ('unconstrain look'). {found.next}"
     return doubted(found, f"it {_explains(poor[0][0], f'{poor[0][1]} alone')}{more}")._replace(next=then)
-
-
-def of_left(found: Verdict, share: float, missed: float, there: float) -> Verdict:
-    """Add to a score that recordings leave where a policy was learnt, where that is likely why it misses.
-
-    At some ``share`` of their samples, which make a part ``there`` of what is ``missed``, itself a share of the motion.
-    """
-    if missed <= 1 - MOSTLY or there <= 0.5:
-        return found
-    said = f"What it misses is likely because these recordings leave where it was learnt: at {percent(share)} of their "
-    said += f"samples, which make {percent(there)} of what is missed."
-    then = f"Demonstrate where these go, too ('unconstrain look' shows both). {found.next}"
-    return found._replace(said=f"{found.said} {said}", next=then.rstrip())
 
 
 def of_planes(found: Verdict, shares: Array, motion: Array) -> Verdict:
@@ -318,8 +304,9 @@ def of_constraint(
         why = "each state was passed one way only, as by a free policy" if one_way else little
         then = "Record movements that cross each other, and learn it again; or name the --features."
         single = not others and not choice.several
-        more = " 'fit' and 'diagnose' judge by what demonstrations have in common, and may tell that they were held."
-        then += " 'diagnose' tells of several together which look held." if single else more
+        then += (
+            f" '{'diagnose' * single or 'fit'}' compares several with one policy, which may tell that they were held."
+        )
         said = f"Whether anything was held cannot be told{' by one demonstration alone' * single}: {why}."
         return Verdict(Mark.DOUBTFUL, said, doubt=f"That {min(ranks)} of {choice.actions} are held.", next=then)
     mark, word = graded(1.0 - missed)
@@ -390,6 +377,7 @@ LAST = "last round over first"
 """A ratio of sizes."""
 
 _WRONG = {"size": ("too large", "too small", ""), "pace": ("too fast", "too slow", "the other way")}
+_OFF = np.log(OTHERWISE) + 0.005  # the bounds as they are printed are not beyond
 _WRONG[LAST] = "too large in the last round", "too small in the last round", ""
 
 
@@ -415,15 +403,15 @@ def moves(extents: Array, paces: Array, lasts: Any = ()) -> tuple[str, list[str]
     goes = ("go round" if many > 1 else "goes round") if "pace" in measured else f"turn{'s' * (many == 1)} out"
     said, strays = list[str](), list[str]()
     for name, (ratios, off) in measured.items():
-        if _otherwise(ratios).mean() > (FEW if many >= ENOUGH else 0.5) or off.max() > np.log(FAR_OFF):
-            wrong = ratios[_otherwise(ratios)]
+        if (off > _OFF).mean() > (FEW if many >= ENOUGH else 0.5) or off.max() > np.log(FAR_OFF):
+            wrong = ratios[off > _OFF]
             ways = zip((wrong > 1, (wrong >= 0) & (wrong <= 1), wrong < 0), _WRONG[name], strict=True)
             who = f"{len(wrong)} of {many} " if many > 1 else "it " * (not said)
             given = [(int(rows.sum()), way) for rows, way in ways if rows.any()]
             those = " or ".join(way + f" ({count})" * (len(given) > 1) for count, way in given)
             said.append(who + f"{goes} " * (not said) + those)
             strays.append(name.replace(LAST, "size"))
-    nearly = "nearly " * any(_otherwise(ratios).any() for ratios, _ in measured.values())
+    nearly = "nearly " * any((by > _OFF).any() for _, by in measured.values())
     kept = " and ".join(name for name in measured if name != LAST)
     return (" and ".join(said) if said else f"it {nearly}keeps {kept}" * bool(kept)), [*dict.fromkeys(strays)]
 
@@ -433,24 +421,18 @@ def size_and_pace(extents: Array, paces: Array, lasts: Any = (), of: str = "", a
     measured, many = _measured(extents, paces, lasts), len(extents)
     told = ", ".join(f"{name} {_times(ratios)}" for name, (ratios, _) in measured.items())
     runs = f" (in brackets, least to most of {many} runs)" if "(" in told else ""
-    counts = {name: int(_otherwise(ratios).sum()) for name, (ratios, _) in measured.items()}
+    counts = {name: int((by > _OFF).sum()) for name, (_, by) in measured.items()}
     off = ", ".join(f"{name} of {count} of {many}" for name, count in counts.items() if count)
-    which = f"; {'' if off else 'none '}beyond {1 / OTHERWISE:.2f} to {OTHERWISE:.2f} times{off and f': {off}'}"
-    which *= many > 1
+    which = f"{'' if off else 'none '}beyond {1 / OTHERWISE:.2f} to {OTHERWISE:.2f} times{off and f': {off}'}"
+    which = f"; {which}" * (many > 1)
     return f"{of}{told} the demonstrated{runs}, typically {apart} from the recorded path{which}" if told else ""
 
 
 def _measured(*given: Sequence[float] | Array) -> dict[str, tuple[Array, Array]]:
-    """Finite ratios by name, and how far off one they are, as logarithms."""
+    """Finite ratios by name, and how far off one they are as they are printed, as logarithms."""
     named = zip(("size", "pace", LAST), map(np.asarray, given), strict=True)
     found = {name: ratios[np.isfinite(ratios)] for name, ratios in named}
-    return {name: (one, np.abs(np.log(np.maximum(one, 1e-9)))) for name, one in found.items() if len(one)}
-
-
-def _otherwise(ratios: Array) -> NDArray[np.bool_]:
-    """Which are beyond :data:`OTHERWISE`, or its inverse, as they are printed."""
-    said = np.round(ratios, 2)
-    return (said > OTHERWISE) | (said < np.round(1 / OTHERWISE, 2))
+    return {name: (one, np.abs(np.log(np.maximum(one.round(2), 1e-9)))) for name, one in found.items() if len(one)}
 
 
 def _times(ratios: Array) -> str:

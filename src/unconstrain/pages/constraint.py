@@ -97,8 +97,8 @@ def _chosen(learnt: LearntConstraint) -> html.Markup:
 def _named(mechanism: Sequence[str], each: tuple[Sequence[str], Sequence[Sequence[str]]]) -> list[html.Markup]:
     head, rows = each
     said = [html.section("The mechanism", *map(html.paragraph, mechanism))] if mechanism else []
-    interval = ", with half of their 95 % intervals" * any("±" in cell for row in rows for cell in row)
-    note = f"Lengths in the unit of the columns{interval}." * ("radius" in head)
+    half = ", with half of their 95 % intervals" * any("±" in cell for row in rows for cell in row)
+    note = f"Lengths in the unit of the columns{half}." * ("radius" in head)
     return [
         *said,
         *([html.section("Each demonstration", html.table(head, rows, note=note, left=len(head)))] if rows else []),

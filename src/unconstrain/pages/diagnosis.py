@@ -64,15 +64,16 @@ def unknown(
         found = diagnose(policy, demos)
     except InvalidDataError as error:
         return [html.paragraph(f"Nothing can be said about that: {error}")]
-    return [
-        html.bullets([*diagnosis.sentences(found, states, actions), *diagnosis.about_places(found, states, actions)]),
-        *([_map(found, demos, states, actions), _next(found, states, actions)] * diagnosis.needs_more(found)),
-    ]
+    said = diagnosis.sentences(found, states, actions)
+    if not diagnosis.needs_more(found):
+        return [html.bullets([*said, diagnosis.NOWHERE])]
+    told = f"Recordings: {verdicts.shares_told(found)}.", diagnosis.to_record(found, states, actions)
+    return [html.bullets([*said, *told]), _map(found, demos, states, actions), _next(found, states, actions)]
 
 
 def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], actions: Sequence[str]) -> html.Markup:
     """Two state columns, coloured by the undetermined spread; a sentence where three tell the policy at all."""
-    if found.by_three.all():
+    if found.told.min() == 2:
         return html.paragraph("Nowhere: three demonstrations or more tell the policy at every recorded state.")
     recorded = stack(demos).states
     regions = diagnosis.places(found.regions)[:MOST_REGIONS]

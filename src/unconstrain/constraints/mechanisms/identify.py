@@ -202,10 +202,9 @@ class Identification(Shown):
         bent = [one for one in self.candidates if one.bends(first) and first.free == 2]
         rival = next(one for one in self.candidates if one.kind != self.kind and one not in bent)
         odds = first.against(rival)
-        if odds < LIKELY and first.odds:
-            verdict = best if best.startswith("undecided") else f"undecided: {best}"
-        elif odds < LIKELY or (not first.odds and "undecided" in first.kinds):
-            verdict = f"undecided: {best}; or else {rival.summary} ({_said(odds)})"
+        if odds < LIKELY or (not first.odds and "undecided" in first.kinds):
+            rest = "" if first.odds else f"; or else {rival.summary} ({_said(odds)})"
+            verdict = f"undecided: {best}{rest}".replace("undecided: undecided", "undecided")
         else:
             other = "nothing held" if rival.kind == "free" else f"a {rival.kind}"
             verdict = f"{best}, against {'one kind for all' if first.odds else other} {_said(odds)}"
