@@ -62,7 +62,7 @@ def test_fit_score_and_info_say_how_much_of_what_is_missed_is_noise(tmp_path, no
     said += [text(call("info", tmp_path / "p.npz")), text(call("score", tmp_path / "p.npz", files[5]))]
     for one in said:
         found = re.search(
-            r"misses (<?\d+)% of a typical action( \(noise in the recorded actions alone: (\d+)% or mor)?", one
+            r"misses (<?\d+)% of a typical action( \(noise along the motion alone makes that (\d+)% or mor)?", one
         )
         assert bool(found[2]) == (noise > 0)
         if noise:
@@ -74,7 +74,7 @@ def test_fit_score_and_info_say_how_much_of_what_is_missed_is_noise(tmp_path, no
 def test_what_is_far_more_than_is_missed_is_not_called_noise():
     """Constraints that change at every sample look like noise by differences in time."""
     assert verdicts.misses(0.99, 0.5) == "misses 10% of a typical action"
-    assert verdicts.misses(0.99, 0.11).endswith("(noise in the recorded actions alone: 10% or more)")
+    assert verdicts.misses(0.99, 0.11).endswith("(noise along the motion alone makes that 10% or more)")
     assert verdicts.misses(0.99, 0.001) == "misses 10% of a typical action"
 
 
@@ -86,13 +86,15 @@ def test_places_that_are_nearly_one_are_one_row(tmp_path):
     asked = ("diagnose", *files, *FREE[:4])
     regions = json.loads(run(*asked, "--json"))["regions"]
     assert [one["along"] for one in regions] == sorted((one["along"] for one in regions), reverse=True)
-    said, every = (run(*asked, *more).partition("largest first:\n")[2].partition("told:")[0] for more in ((), ("-v",)))
+    said, every = (
+        run(*asked, *more).partition("largest first:\n")[2].partition("told by all:")[0] for more in ((), ("-v",))
+    )
     states = np.array([one["state"] for one in regions])
-    rows = [[float(each) for each in line.split()[:2]] for line in said.splitlines()[3:] if line.strip()]
+    rows = [[float(each) for each in line.split()[:2]] for line in said.splitlines()[2:] if line.strip()]
     apart = np.abs(np.subtract.outer(rows, rows).diagonal(0, 1, 3)) / np.ptp(states, axis=0)
-    assert 2 <= len(rows) < len([line for line in every.splitlines()[3:] if line.strip()]) == len(regions)
+    assert 2 <= len(rows) < len([line for line in every.splitlines()[2:] if line.strip()]) == len(regions)
     near = (apart.max(axis=2) < 0.09)[np.triu_indices(len(rows), 1)]
-    ways = [[float(each) for each in line.split()[-3:-1]] for line in said.splitlines()[3:] if line.strip()]
+    ways = [[float(each) for each in line.split()[-3:-1]] for line in said.splitlines()[2:] if line.strip()]
     alike = np.abs(np.array(ways) @ np.array(ways).T)[np.triu_indices(len(rows), 1)]
     assert not (near & (alike > 0.75)).any()
 
@@ -166,8 +168,17 @@ def test_what_is_said_of_size_and_pace_agrees_with_the_figures_beside_it(last, k
     given = np.ones(4), np.ones(4), [1.0, 1.0, 1.0, last]
     assert verdicts.moves(*given) == (kept, [])
     told = verdicts.size_and_pace(*given, apart="3 mm")
-    assert ("; none more than 20% off" in told) == (last < 1.2)
-    assert ("; more than 20% off: last round over first of 1 of 4" in told) == (last > 1.2)
+    assert ("; none beyond 0.83 to 1.20 times" in told) == (last < 1.2)
+    assert ("; beyond 0.83 to 1.20 times: last round over first of 1 of 4" in told) == (last > 1.2)
+
+
+@pytest.mark.parametrize("ratio", [0.81, 0.8249, 0.826, 0.8334, 0.84, 1.0, 1.2, 1.2049, 1.206])
+def test_the_bounds_that_are_printed_are_those_that_ratios_as_printed_are_judged_by(ratio):
+    told = verdicts.size_and_pace(np.array([1.0, 1.0, 1.0, ratio]), np.full(4, np.nan), apart="3 mm")
+    beyond = not 0.83 <= float(f"{ratio:.2f}") <= 1.2
+    assert told.endswith(
+        "; beyond 0.83 to 1.20 times: size of 1 of 4" if beyond else "; none beyond 0.83 to 1.20 times"
+    )
 
 
 # How commands end
@@ -503,7 +514,9 @@ def test_fit_and_diagnose_name_first_what_all_recordings_leave_open(tmp_path):
 def test_what_is_said_of_a_fit_holds_no_share_that_nobody_can_act_on(tmp_path):
     files = strokes(tmp_path / "a", 1e-3)
     assert "always held" not in text(call("fit", *files, *FREE, "-o", tmp_path / "p.npz"))
-    assert re.search(r"\d% of the samples look free: nothing", text(call("diagnose", *files, *FREE)))
+    said = text(call("diagnose", *files, *FREE))
+    shares = re.search(r"Of the samples (\d+)% look free \(nothing that .*\), (\d+)% held(?:, and of (\d+)%)?", said)
+    assert sum(int(one or 0) for one in shares.groups()) == 100
 
 
 # Units

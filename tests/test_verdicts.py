@@ -78,7 +78,7 @@ class TestMarks:
         assert (little.mark, little.said[:40]) == (Mark.DOUBTFUL, "Whether anything was held cannot be told")
         assert verdicts.of_constraint(held(1), held(1), wound=True) == sure
         assert verdicts.of_constraint(held(1), wound=False).mark is Mark.GOOD  # several tell it together
-        assert "'diagnose' tells of several together which look held." in alike.next
+        assert "'diagnose' compares several with one policy, which may tell that they were held." in alike.next
         assert "by one demonstration alone" in alike.said
         assert "alone" not in little.said + little.next
         both = verdicts.of_constraint(alone, alone, shown=True)

@@ -346,9 +346,8 @@ class Named(NamedTuple):
     @property
     def sentences(self) -> list[str]:
         """The verdict, and what it leaves open."""
-        known = "Mechanism" if self.found.mechanism.unit else "Mechanism, if these are positions"
-        doubt = self.found.doubt
-        meant = " (± is half of a 95 % interval, 10:1 are odds)" if "±" in self.found.summary else " (10:1 are odds)"
+        known, doubt = f"Mechanism{', if these are positions' * (not self.found.mechanism.unit)}", self.found.doubt
+        meant = f" ({'± is half of a 95 % interval, ' * ('±' in self.found.summary)}10:1 are odds)"
         meant *= ":1" in self.found.summary
         apart = [
             name for name, one in zip(self.names, self.held, strict=False) if sum(map(one.parallel, self.held)) < 2
