@@ -313,9 +313,16 @@ class TestPage:
             assert width_of(browser) <= 400
 
     def test_the_page_of_a_robust_fit_says_what_is_not_known(self, fitted, browser, tmp_path):
-        page = fit.policy_page(*fitted, "A policy")
-        assert "What the demonstrations do not tell" in page
-        assert "known" in [one["id"] for one in opened(browser, page, tmp_path)]
+        few = uc.LocallyLinearPolicy(learner=uc.Robust()).fit_demonstrations(fitted[1][:3]), fitted[1][:3]
+        for policy, demos in (fitted, few):  # as diagnose says it of the same
+            page, more = (
+                fit.policy_page(policy, demos, "A policy"),
+                uc.evaluation.diagnosis.needs_more(diagnose(policy, demos)),
+            )
+            assert "What the demonstrations do not tell" in page
+            assert ("known" in [one["id"] for one in opened(browser, page, tmp_path)]) == more == (demos is few[1])
+            assert ("No place needs another demonstration" in page) == (not more)
+            assert ("Demonstrate around" in page) == more
 
     def test_a_fit_of_which_nothing_can_be_said_says_so(self):
         demos = [replace(one, actions=one.actions[:, :1]) for one in movements()]

@@ -5,6 +5,7 @@ import json
 import re
 import shlex
 from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import onnxruntime
@@ -13,10 +14,11 @@ import pytest
 import unconstrain as uc
 from test_cli import call, run, write
 from test_newcomer import text
-from unconstrain.cli import main, reading
+from unconstrain.cli import main, reading, rolling
 from unconstrain.cli.informing import TOLD
 from unconstrain.evaluation import diagnosis, metrics, verdicts
 from unconstrain.evaluation.diagnosis import places
+from unconstrain.pages.constraint import constraint_page
 
 TURN = np.array([[-1.0, 0.5], [-0.5, -1.0]])
 RECIPE = uc.Recipe(states=("x", "y"), differentiate="savgol")
@@ -668,3 +670,65 @@ def test_pages_are_called_by_what_they_are_and_lead_on(tmp_path):
         assert ("Tilt the plane, and begin at the next start" in page) == bool(more)
         assert ("Leave out what should not be learnt from" in page) == (not more)
         assert "What looks odd" not in page
+
+
+# What is said is so
+
+
+@pytest.mark.parametrize(
+    ("rate", "said"), [(0.03, "it slows down towards it; about 32 more --steps"), (0.0, "it rests")]
+)
+def test_what_still_comes_nearer_to_a_goal_is_not_said_to_rest(rate, said):
+    far = 0.5 * np.exp(-rate * np.arange(100.0))
+    states, actions = np.column_stack([far, 0.0 * far]), np.column_stack([-rate * far, 0.0 * far])
+    actions[0] = 10.0
+    moving = SimpleNamespace(aim_=object.__new__(uc.motion.descent.Descent), goal_=np.zeros(2))
+    ends = rolling._off_goal(moving, uc.Demonstration(states, actions), "", "m")
+    assert ends.startswith(f" It ends {far[-1]:.3g} m from the goal: {said}")
+
+
+def test_a_score_says_that_recordings_leave_where_the_policy_was_learnt_if_it_misses_there(work, tmp_path):
+    run("fit", work / "in ways", *FREE[:4], "-o", tmp_path / "p.npz")
+    times, ahead = 0.02 * np.arange(150), np.linspace(0.0, 1.0, 150)
+    rows = np.column_stack([times, 0.6 + ahead, 0.7 + 0.5 * ahead])
+    away = write(tmp_path / "away.csv", "t,x [m],y [m]", rows)
+    said = text(call("score", tmp_path / "p.npz", away))
+    assert "as these recordings leave where it was learnt, at 100% of their samples." in said
+    assert "Next: Demonstrate where they go, too" in said
+    assert "leave where it was learnt" not in text(call("score", tmp_path / "p.npz", work / "new"))
+
+
+def test_what_is_missed_of_whole_demonstrations_is_in_the_headline():
+    note = uc.learners.robust.learner.BY_AGREEMENT.format(0.66)
+    found, plain = (verdicts.of_explained(0.995, 8, notes=notes) for notes in ((note,), ("Another note.",)))
+    assert "if one model holds for all: good. But of demonstrations left out whole it misses 66%" in found.said
+    assert "held-out" not in found.said
+    assert plain.said == "The policy explains >99% of held-out motion: good."
+
+
+def test_an_export_says_in_short_what_fit_said(work, tmp_path):
+    said = text(call("export", work / "p.npz", "-o", tmp_path / "p.c"))
+    assert (
+        "('unconstrain info' says all.) Do not trust: States far from all data, where its support is near 0. N" in said
+    )
+    assert "Trust: Directions" not in said
+    assert "Trust: Directions" in text(call("info", work / "p.npz"))
+
+
+def test_of_a_surface_it_is_said_that_positions_alone_are_learnt_from_and_why_of_that_form(work, tmp_path):
+    asked = "constraint", work / "in ways" / "d1.csv", *FREE[:4], "-o", tmp_path / "c.npz", "--force"
+    said, told = text(call(*asked, "--surface")), json.loads(run(*asked, "--surface", "--json"))
+    assert "Learnt from x [m], y [m] alone, as positions on a surface." in said
+    assert "alone, as positions" not in text(call(*asked))
+    shares = told["candidates"]
+    assert ("Taken: " in said) == (shares[told["features"]] > min(shares.values()))
+
+
+def test_a_table_without_lengths_has_no_caption_about_them():
+    states = np.random.default_rng(0).uniform(-1, 1, (60, 3)) * [1.0, 1.0, 0.0]
+    held = uc.LearntConstraint("constant").fit(states, np.roll(states, 1, axis=0) - states)
+    for head, cell in ((("demonstration", "angle"), "3.1°"), (("demonstration", "radius"), "0.2 m")):
+        rows = [["a", cell]]
+        page = constraint_page([held], [uc.Demonstration(states, states)], "A", None, (), (head, rows))
+        assert ("Lengths in the unit of the columns" in page) == ("radius" in head)
+        assert "95 % intervals" not in page

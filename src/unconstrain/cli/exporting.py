@@ -93,7 +93,7 @@ def export(
     if judged.mark is uc.evaluation.verdicts.Mark.BAD:
         then = f"It is not to be trusted as it is: {judged.next.rstrip('.')}. To try it all the same: {then}"
     first, *more = found.said.rstrip(".").split(". ")
-    said = f"{'. '.join([first, *(one for one in more if 'un from' in one)])} ('unconstrain info' says all)."
+    said = f"{'. '.join([first, *(one for one in more if 'un from' in one)])}. ('unconstrain info' says all.)"
     short = judged if as_json else found._replace(said=said, trust="", doubt=limits)
     say_judged(short._replace(next=then), written, as_json)
 
