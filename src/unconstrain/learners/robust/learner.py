@@ -25,7 +25,7 @@ from .belief import solution, weak_prior
 from .candidate import Candidate
 from .choice import Comparison
 from .consistent import by_segments, noise_corrected
-from .constants import AS_DIRECT, LEAST_EXPLAINED, LEAST_INFORMATIVE, LEAST_MISFIT, LONG, MOST_OF_NOISE
+from .constants import AGREED, AS_DIRECT, LEAST_EXPLAINED, LEAST_INFORMATIVE, LEAST_MISFIT, LONG, MOST_OF_NOISE
 from .held_out import held_out_otherwise, held_out_together
 from .kinematics import KNOWING, Jacobian, with_jacobian
 from .likelihood import free_probability, maximise
@@ -85,7 +85,7 @@ class SampleLearner(Learner):
             found = self._plain(training, samples, everything)
         else:
             chosen, more = self.candidate(samples, training)
-            agreed = (*more.pop("notes", ()), *(BY_AGREEMENT.format(one) for one in [chosen.alone] if one))
+            agreed = (*more.pop("notes", ()), *(BY_AGREEMENT.format(one) for one in [chosen.alone] if one > AGREED))
             more["held_out_score"] = _explained(samples, chosen)
             second = None if self.secondary is None else on(self.secondary, training)(training.folds.whole)
             found = solution(chosen, samples, everything, training.model, second, **more)
