@@ -84,6 +84,38 @@ def test_strokes_to_one_goal_in_as_many_planes_do_not_agree_on_a_wrong_model(dra
     assert uc.nupe(policy, data.test) < 0.2
 
 
+def around(states):
+    """A cycle of 12 cm about the origin, in a plane that tilts."""
+    inwards = 1.6 * (1.0 - (states[:, :2] ** 2).sum(axis=1, keepdims=True) / 0.12**2)
+    level = 0.4 * states[:, 0] - 1.2 * (states[:, 2] + 0.05)
+    return np.column_stack([inwards * states[:, :2] + 2.2 * states[:, 1::-1] * [-1.0, 1.0], level])
+
+
+def wiped(seed, count=7):
+    """The cycle wiped on so many tilted plates through about its middle, with noise of two per cent."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        tilt, way = np.radians(rng.uniform(11, 35)), rng.uniform(0, 2 * np.pi)
+        normal = np.array([np.sin(tilt) * np.cos(way), np.sin(tilt) * np.sin(way), np.cos(tilt)])
+        x, y = rng.uniform(0.03, 0.2) * np.array([np.cos(angle := rng.uniform(0, 6.3)), np.sin(angle)])
+        start = [x, y, rng.uniform(-0.03, 0.03) - (normal[0] * x + normal[1] * y) / normal[2]]
+        shown = uc.rollout(around, start, 200, 0.03, uc.constraints.Plane(normal))
+        yield uc.Demonstration(shown.states, shown.actions + rng.normal(0, 0.005, shown.actions.shape), shown.times)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [11, 13])
+def test_a_model_on_which_plates_agree_refutes_those_that_miss_more_than_noise(seed):
+    demos = list(wiped(seed))
+    policy, states = uc.LocallyLinearPolicy().fit_demonstrations(demos), uc.stack(demos).states
+    assert policy.variance_ == "cubic"
+    off, size = policy(states) - around(states), np.linalg.norm(around(states))
+    assert np.linalg.norm(off) < 0.02 * size
+    spread = policy.uncertainty(states)
+    assert np.linalg.norm(spread.from_noise) < 0.1 * size, "left out in turn, some are missed by far more"
+    assert np.mean(np.abs(off) <= 1.96 * spread.total) > 0.95
+
+
 @pytest.mark.parametrize(
     ("drawn", "why"),
     [

@@ -494,6 +494,39 @@ def test_where_plates_held_movements_off_the_goal_it_is_proposed_and_not_taken()
     assert str(untold.value).endswith("give it with goal=.")
 
 
+def near_the_goal(offsets):
+    """Strokes to the goal, held by planes that pass it at small distances, and a policy learnt from them."""
+    rng = np.random.default_rng(5)
+    demos = []
+    for off in offsets:
+        normal = rng.normal(size=3) * [0.5, 0.5, 0.0] + [0.0, 0.0, 1.0]
+        start = np.asarray(GOAL) + rng.uniform(-1, 1, 3)
+        start += normal * (off - (start - GOAL) @ normal) / (normal @ normal)
+        demos.append(uc.rollout(spiral, start, 400, 0.02, Plane(normal)))
+    return demos, uc.LocallyLinearPolicy().fit_demonstrations(demos)
+
+
+def test_the_goal_is_where_the_policy_rests_if_planes_held_ends_about_it():
+    demos, policy = near_the_goal(np.array([-2.0, 1.0, 3.0, 2.0, -1.0, 3.0, 2.5, 3.0]) / 30)
+    ends = np.array([demo.states[-1] for demo in demos])
+    assert np.linalg.norm(ends.mean(axis=0) - GOAL) > 0.02
+    assert_allclose(uc.Guided(policy, demonstrations=demos).goal_, GOAL, atol=2e-3)
+
+
+def test_the_goal_is_where_all_ended_though_the_policy_rests_beside():
+    shown = uc.rollout(spiral, STARTS, 400, 0.05)
+    away = np.array([0.01, 0.0, 0.0])
+
+    class Beside:
+        """Rests beside the goal, and is sure of it."""
+
+        covariances = staticmethod(lambda states: 1e-12 * np.eye(3)[None])
+        __call__ = staticmethod(lambda states: spiral(states - away))
+
+    goal = uc.Guided(Beside(), demonstrations=shown).goal_
+    assert_allclose(goal, np.mean([demo.states[-1] for demo in shown], axis=0), atol=1e-9)
+
+
 def test_where_the_policy_is_hardly_told_no_goal_is_proposed():
     demos, policy = held_off(np.random.default_rng(11).normal(size=(8, 3)))
     known = policy.covariances(GOAL[None])[0]

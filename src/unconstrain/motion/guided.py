@@ -105,7 +105,8 @@ class Guided(Exportable, Shown):
         States (N, n) to velocities (N, n).
     goal : array_like, shape (n,), optional
         By default where the demonstrations come to rest, if most do or they do not go round: those that end where the
-        policy rests, too, if there are any, as constraints stopped the others.
+        policy rests, too, if there are any, as constraints stopped the others. If the ends of those that come to rest
+        scatter about the place where the policy rests, by more than its standard error, it is that place.
     orbit : array_like, shape (T, n), or "shown", optional
         States on the cycle, all around it; "shown" are those of the demonstrations, from which it is found by default
         where they go round and most do not come to rest; if they stop at once on the cycle, they do not.
@@ -396,14 +397,18 @@ def _found(demos: Sequence[Demonstration], policy: Any, wanted: Array) -> Array:
     left = np.linalg.norm(wanted[last], axis=1) / max(float(np.linalg.norm(wanted, axis=1).max()), 1e-300)
     rests = _resting(demos)
     slow = rests & (left <= max(_STILL, 2.0 * float(left[rests].min(initial=1.0)))) & (left <= _AT_REST)
-    ends = stack(demos).states[last[slow if slow.any() else rests]]
-    apart = _apart(demos, ends)
+    all_ends, ends = (stack(demos).states[last[some]] for some in (rests, slow if slow.any() else rests))
+    apart, rest = _apart(demos, ends), _rest_of(policy, ends, demos, wanted)
     if apart > _TOGETHER:
         raise InvalidDataError(
             f"goal: demonstrations end at rest in places up to {apart:.0%} of their extent from the mean of these; "
-            f"expected one place; {_given(demos)}.{_proposed(policy, ends, demos, wanted)}"
+            f"expected one place; {_given(demos)}.{_proposed(rest, demos)}"
         )
-    _doubt_goal(demos, ends.mean(axis=0))
+    place = ends.mean(axis=0)
+    scatter = np.linalg.norm(all_ends - place, axis=1).max()
+    if rest is not None and max(rest[1], np.linalg.norm(rest[0] - place)) < scatter:
+        place = rest[0]  # constraints held them off it, each elsewhere
+    _doubt_goal(demos, place)
     if not slow.any():
         warnings.warn(
             f"goal: where demonstrations end at rest the policy goes on, at {left[rests].min():.0%} of its fastest: "
@@ -411,7 +416,7 @@ def _found(demos: Sequence[Demonstration], policy: Any, wanted: Array) -> Array:
             UserWarning,
             stacklevel=3,
         )
-    return np.asarray(np.mean(ends, axis=0))
+    return np.asarray(place)
 
 
 def _doubt_goal(demos: Sequence[Demonstration], place: Array) -> None:
@@ -431,34 +436,41 @@ def _doubt_goal(demos: Sequence[Demonstration], place: Array) -> None:
         )
 
 
-def _proposed(policy: Any, ends: Array, demos: Sequence[Demonstration], wanted: Array) -> str:
-    """The one place in what was shown to which a policy comes, sought from where demonstrations end, as far as told.
+def _rest_of(policy: Any, ends: Array, demos: Sequence[Demonstration], wanted: Array) -> tuple[Array, float] | None:
+    """The one place in what was shown to which a policy comes, and its standard error; sought from the ends (K, n).
 
-    Of 18 sets of movements to a goal that plates held off it, it rested at most 3.3 cm from there in the eight where
-    what demonstrations leave open of it moves that place by less than a fifth of the extent; in the others, 2 to 13 cm.
+    The error is by what noise and demonstrations leave open of the policy there.
     """
     from scipy.optimize import least_squares  # takes long to import
 
     states, usual = stack(demos).states, float(np.sqrt((wanted**2).sum(axis=1).mean()))
     low, high = states.min(axis=0), states.max(axis=0)
     if not hasattr(policy, "covariances") or usual == 0.0 or (low == high).any():
-        return ""
+        return None
     found = [least_squares(lambda x: policy(x[None])[0] / usual, end, bounds=(low, high)) for end in ends]
-    places = np.array([one.x for one in found])
+    places, slope = np.array([one.x for one in found]), usual * found[0].jac
     if max(one.cost for one in found) > _STILL**2 / 2.0 or _apart(demos, places) > _STILL:
-        return ""
-    slope = usual * found[0].jac
+        return None
     if np.linalg.eigvals(slope).real.max() >= 0.0:  # it rests there, but nothing comes there
-        return ""
+        return None
     with suppress(SettingError, np.linalg.LinAlgError):
         back = np.linalg.inv(slope)
-        off = float(np.sqrt(np.trace(back @ policy.covariances(places[:1])[0] @ back.T)))
-        if off >= 2.0 * _TOGETHER * np.linalg.norm(high - low):
-            return f" Where the policy rests is told to within {off:.2g} only: record more, held in other ways."
-        place = ", ".join(f"{value:.4g}" for value in places[0])
-        return f" If surfaces held them off it: the policy rests, to within about {off:.2g}, at goal=({place})."
-    return ""
+        return places[0], float(np.sqrt(np.trace(back @ policy.covariances(places[:1])[0] @ back.T)))
+    return None
 
+
+def _proposed(rest: tuple[Array, float] | None, demos: Sequence[Demonstration]) -> str:
+    """Where the policy rests, as a goal to give, as far as told.
+
+    Of 18 sets of movements to a goal that plates held off it, it rested at most 3.3 cm from there in the eight where
+    what demonstrations leave open of it moves that place by less than a fifth of the extent; in the others, 2 to 13 cm.
+    """
+    if rest is None:
+        return ""
+    if rest[1] >= 2.0 * _TOGETHER * np.linalg.norm(np.ptp(stack(demos).states, axis=0)):
+        return f" Where the policy rests is told to within {rest[1]:.2g} only: record more, held in other ways."
+    place = ", ".join(f"{value:.4g}" for value in rest[0])
+    return f" If surfaces held them off it: the policy rests, to within about {rest[1]:.2g}, at goal=({place})."
 
 STORED = (Descent, Guided, Moved, Orbit, Potential)
 """What guided policies are made of, for their file."""

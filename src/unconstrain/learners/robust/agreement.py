@@ -17,15 +17,14 @@ import numpy as np
 from ...base.arrays import Array
 from ...training import Samples
 from .candidate import Candidate
-from .constants import AGREED, AGREED_EXACTLY, AGREED_OF_HELD_OUT, MOST_FITTED, MOST_OF_NOISE
+from .constants import AGREED, AGREED_EXACTLY, MOST_FITTED, MOST_OF_NOISE
 from .noise import most_noise
 
 
 def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Candidate | None:
     """The candidate, judged by agreement; None unless that says that it is right, and no worse than held out.
 
-    Its variance is that of the posterior. Where agreement expects far less to be missed than held-out predictions do,
-    these are such that they miss as much as it says, and refits are all alike.
+    Its variance is that of the posterior, held-out predictions miss as much as agreement says, and refits are all alike.
 
     Parameters
     ----------
@@ -52,11 +51,9 @@ def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Cand
     if _square(samples, missed) > most:
         return None
     from_noise, undetermined = found.posterior.covariances()
-    found = replace(found, spread=_spread(samples, factor * from_noise[0] + undetermined[0]))
-    if _square(samples, missed) > AGREED_OF_HELD_OUT * _square(samples, held_out):
-        return found
     return replace(
         found,
+        spread=_spread(samples, factor * from_noise[0] + undetermined[0]),
         held_out=policy + residuals - missed,
         refits=np.repeat(found.weights[None], len(found.refits), axis=0),
         alone=_square(samples, held_out) / motion,

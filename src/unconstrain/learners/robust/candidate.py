@@ -57,6 +57,11 @@ class Candidate:
     by_segments: bool = False
     otherwise: tuple[Candidate, Samples] | None = None
 
+    @property
+    def agreed(self) -> bool:
+        """Whether demonstrations agree on the policy, so that it misses no more than noise; see :mod:`.agreement`."""
+        return self.spread is not None
+
 
 def scaled(posterior: Posterior, variance: Array) -> Posterior:
     """Divided by the residual variance, shape (M,)."""

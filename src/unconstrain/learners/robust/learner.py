@@ -25,7 +25,7 @@ from .belief import solution, weak_prior
 from .candidate import Candidate
 from .choice import Comparison
 from .consistent import by_segments, noise_corrected
-from .constants import AS_DIRECT, LEAST_EXPLAINED, LEAST_INFORMATIVE, LEAST_MISFIT, LONG
+from .constants import AGREED, AS_DIRECT, LEAST_EXPLAINED, LEAST_INFORMATIVE, LEAST_MISFIT, LONG, MOST_OF_NOISE
 from .held_out import held_out_otherwise, held_out_together
 from .kinematics import KNOWING, Jacobian, with_jacobian
 from .likelihood import free_probability, maximise
@@ -85,7 +85,7 @@ class SampleLearner(Learner):
             found = self._plain(training, samples, everything)
         else:
             chosen, more = self.candidate(samples, training)
-            agreed = (*more.pop("notes", ()), *(BY_AGREEMENT.format(one) for one in [chosen.alone] if one))
+            agreed = (*more.pop("notes", ()), *(BY_AGREEMENT.format(one) for one in [chosen.alone] if one > AGREED))
             more["held_out_score"] = _explained(samples, chosen)
             second = None if self.secondary is None else on(self.secondary, training)(training.folds.whole)
             found = solution(chosen, samples, everything, training.model, second, **more)
@@ -376,7 +376,7 @@ class Robust(_Maximising):
             soft = np.inf if one.softness >= AS_DIRECT else 0.0
             best[name] = replace(one, name=name, softness=soft, by_segments=False)
             if name == usual:
-                coarser = {one: best[one] for one in _better(_compared(best, views), list(best))}
+                coarser = {one: best[one] for one in _better(_compared(best, views), best)}
                 best = {name: best[name]}
             found = chosen = _compared(best, views).best.name
             if coarser:  # by itself: what a third is sure of decides between no two
@@ -386,10 +386,17 @@ class Robust(_Maximising):
         return chosen
 
 
-def _better(found: Comparison, names: Sequence[str]) -> list[str]:
-    """Of models that refute the last, or show its bias, the one of least estimated error, if any."""
-    risks, last = found.judged(), names[-1]
-    better = [one for one in names[:-1] if found.refutes(one, last) or found.shows(one, last)]
+def _better(found: Comparison, best: Mapping[str, Candidate]) -> list[str]:
+    """Of models that refute the last, or show its bias, the one of least estimated error, if any.
+
+    Where demonstrations agree on a model, which then misses no more than noise, it refutes those that miss far more.
+    """
+    risks, (*names, last) = found.judged(), best
+
+    def agreed(one: str) -> bool:
+        return best[one].agreed and best[last].variance > MOST_OF_NOISE * best[one].variance
+
+    better = [one for one in names if agreed(one) or found.refutes(one, last) or found.shows(one, last)]
     return sorted(better, key=lambda one: risks[one].risk)[:1]
 
 

@@ -30,6 +30,7 @@ from ...risks import Moments, autocorrelations, standard_risk
 from ...training import Samples
 from .constants import (
     DIFFERENCE_ORDER,
+    LEAST_APART,
     LEAST_AUTOCORRELATION,
     LEAST_DIFFERENCES,
     LEAST_MISFIT,
@@ -70,7 +71,7 @@ def lag_of_noise(actions: Array, groups: NDArray[np.intp]) -> int:
     most = MOST_SHARED_NOISE**2 * float((actions**2).mean()) if len(actions) else 0.0
     told = np.inf  # of a first plateau that is higher than neighbours tell
     while at <= most:
-        farther = _by_differences(actions, groups, 2 * lag)
+        farther = _by_differences(actions, groups, 2 * lag, least=2 * lag * LEAST_APART)
         if farther <= MOST_GROWTH * at and (told == np.inf or at > MOST_GROWTH**2 * told):
             alike = at <= MOST_GROWTH**2 * _by_differences(actions, groups, lag, 0.25)
             found, told = (2 * lag if lag > 1 and farther < at else lag, at) if alike else (found, told)
@@ -78,14 +79,16 @@ def lag_of_noise(actions: Array, groups: NDArray[np.intp]) -> int:
     return found
 
 
-def _by_differences(actions: Array, groups: NDArray[np.intp], lag: int = 1, quantile: float = 0.5) -> float:
-    """Variance by a quantile of fourth differences of samples so far apart; infinity where too few are together."""
+def _by_differences(
+    actions: Array, groups: NDArray[np.intp], lag: int = 1, quantile: float = 0.5, least: int = 1
+) -> float:
+    """Variance by a quantile of fourth differences of samples so far apart; infinity of fewer than the least."""
     weights = np.array([(-1) ** i * comb(DIFFERENCE_ORDER, i) for i in range(DIFFERENCE_ORDER + 1)], dtype=np.float64)
     count = len(actions) - DIFFERENCE_ORDER * lag
     if count < 1:
         return np.inf
     same = groups[-count:] == groups[:count]
-    if same.sum() < (1 if lag == 1 else LEAST_DIFFERENCES):
+    if same.sum() < least:
         return np.inf
     differences = sum(weight * actions[i * lag : i * lag + count] for i, weight in enumerate(weights))
     lengths = (np.asarray(differences)[same] ** 2).sum(axis=1)
