@@ -699,9 +699,11 @@ def test_a_score_says_that_recordings_leave_where_the_policy_was_learnt_if_it_mi
 
 
 def test_what_is_missed_of_whole_demonstrations_is_in_the_headline():
-    note = uc.learners.robust.learner.BY_AGREEMENT.format(0.66)
-    found, plain = (verdicts.of_explained(0.995, 8, notes=notes) for notes in ((note,), ("Another note.",)))
-    assert "if one model holds for all: good. But of demonstrations left out whole it misses 66%" in found.said
+    found, little, plain = (verdicts.of_explained(0.995, 8, left_out=share) for share in (0.66, 0.05, 0.0))
+    said = "if one model holds for all: good. But of the motion of demonstrations left out whole it misses"
+    assert f"{said} 66%" in found.said
+    assert f"{said} 5%" in little.said
+    assert [one.mark.name for one in (found, little)] == ["DOUBTFUL", "GOOD"]
     assert "held-out" not in found.said
     assert plain.said == "The policy explains >99% of held-out motion: good."
 

@@ -178,7 +178,7 @@ def explained_by(held: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> uc.ev
     policy = innermost(held)
     count = len(policy.training_.split.fold_of) or uc.evaluation.diagnosis.ENOUGH
     shown = notes[TOLD] if isinstance(notes.get(TOLD), float) else None
-    more = {"lost": notes.get(LOST), "noise": notes.get(NOISE) or 0.0, "notes": policy.solution_.notes}
+    more = {"lost": notes.get(LOST), "noise": notes.get(NOISE) or 0.0, "left_out": policy.solution_.left_out}
     return uc.evaluation.verdicts.of_explained(policy.held_out_score(), count, shown, **more)
 
 

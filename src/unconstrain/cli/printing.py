@@ -206,7 +206,7 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     open_ = told is not None and told < uc.evaluation.verdicts.MOSTLY
     there = _least_known(policy, demos, stream.recipe) if open_ and count >= uc.evaluation.diagnosis.ENOUGH else ""
     noise = uc.evaluation.metrics.missed_for_noise(policy, demos)
-    more = 1.0 - missed, lost, noise, policy.solution_.notes
+    more = 1.0 - missed, lost, noise, policy.solution_.left_out
     found = uc.evaluation.verdicts.of_explained(alone, count, told, there, *more)
     ran = retraced(found, moving, demos, stream.recipe, None, stream.first.units, False)
     cured = ran.verdict._replace(next=there) if there and found.next == there else ran.verdict
@@ -265,7 +265,7 @@ def say_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, judged: Judged, le
         _say_determined(solution, learner)
     click.echo("".join(f"{note}\n" for note in solution.notes), nl=False)
     seen = f"{judged.training:.4g} on the training data, " if known else ""
-    where = "as expected of new motion" if "left out in turn" in " ".join(solution.notes) else "where held out"
+    where = "as expected of new motion" if solution.left_out else "where held out"
     rest = f"{judged.held_out:.4g} {where}." if isfinite(judged.held_out) else "nothing could be held out."
     click.echo(f"Share of the motion explained, where slow samples count less, as in the verdict: {seen}{rest}")
     if judged.ran:

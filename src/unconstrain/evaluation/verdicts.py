@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -89,7 +88,7 @@ def of_explained(
     learnt: float = 0.0,
     lost: float | None = None,
     noise: float = 0.0,
-    notes: Sequence[str] = (),
+    left_out: float = 0.0,
 ) -> Verdict:
     """Judge how much of held-out motion a policy explains, along the motion.
 
@@ -97,13 +96,12 @@ def of_explained(
     give no verdict. ``determined`` is the share of the recorded states at which recordings tell the policy, and
     ``there`` what to record where fewer show it. ``learnt`` is the share of what was learnt from, and ``lost`` what
     guiding takes of that, None where it is not guided: a guided policy is judged by what is left, or worse. What
-    is missed for ``noise`` alone is a share of a typical action. Where ``notes`` of the solution say how much is missed
-    of demonstrations left out whole, ``share`` is what to expect if one model holds.
+    is missed for ``noise`` alone is a share of a typical action. If ``left_out`` is the share missed of demonstrations
+    left out whole, ``share`` is what to expect if one model holds.
     """
     across, little = "What constraints hid: no recording shows it, so no score does.", ""
     alone, share = share, share - (lost or 0.0)
-    whole = re.search(r"left out in turn, (\d+)% of their motion is missed", " ".join(notes))
-    what = "held-out motion" if whole is None else "motion like what was recorded, if one model holds for all"
+    what = "motion like what was recorded, if one model holds for all" if left_out else "held-out motion"
     mark, word = graded(share, told=determined)
     if determined is not None and determined < MOSTLY and demonstrations >= ENOUGH:
         untold = of_untold(1 - determined)
@@ -126,8 +124,10 @@ def of_explained(
         advice = there or "'unconstrain diagnose' says what to record."
     trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
     said = f"{little}{who} {_explains(share, what)}: {word}.{retold}"
-    if whole is not None:
-        said += f" But of demonstrations left out whole it misses {whole[1]}%: the others tell little of them."
+    if left_out:
+        much = percent(left_out) if left_out < 1.0 else "more than all there is"
+        said += f" But of the motion of demonstrations left out whole it misses {much}: the others tell little of them."
+        mark = no_better(mark) if left_out > 1.0 - FAIR else mark
     return Verdict(mark, said, trust, across, advice)
 
 

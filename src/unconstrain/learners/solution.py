@@ -88,6 +88,9 @@ class Belief(Shown):
         determine.
     held_out_score : float
         Share of the squared motion that is explained where held out, as by ``Policy.score``.
+    left_out : float
+        Share of the squared motion that is missed of demonstrations left out in turn, where ``held_out_score`` is not
+        about these, but about what to expect if one model holds for all; else 0.
     candidates : dict
         Judged error of each candidate, by name, where the learner chose among several.
     undecided_share : float
@@ -119,6 +122,7 @@ class Belief(Shown):
     suspects: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     told_together: float = 0.0
     together: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
+    left_out: float = 0.0
 
     def uncertainty(self, model: Model, states: Array) -> Uncertainty:
         """Posterior standard deviations of the prediction at N states.
@@ -239,6 +243,11 @@ class Solution(Shown):
     def free_share(self) -> float:
         """Estimated share of samples that nothing constrained."""
         return self.believed.free_share
+
+    @property
+    def left_out(self) -> float:
+        """Share that is missed of demonstrations left out whole, where what is held out tells another; else 0."""
+        return 0.0 if self.belief is None else self.belief.left_out
 
     @property
     def candidates(self) -> dict[str, Judged]:

@@ -123,8 +123,8 @@ class Guided(Exportable, Shown):
         Or the middle of the cycle.
     potential_ : Potential
     dt_ : float
-        Seconds. With Euler steps of this length V falls, or cycles are wider than told by a few hundredths; a delay
-        counts as twice such a step.
+        Seconds. With Euler steps of this length V falls, or cycles are wider than told by a few per cent of their size;
+        a delay counts as twice such a step.
 
     Raises
     ------
@@ -471,6 +471,7 @@ def _proposed(rest: tuple[Array, float] | None, demos: Sequence[Demonstration]) 
         return f" Where the policy rests is told to within {rest[1]:.2g} only: record more, held in other ways."
     place = ", ".join(f"{value:.4g}" for value in rest[0])
     return f" If surfaces held them off it: the policy rests, to within about {rest[1]:.2g}, at goal=({place})."
+
 
 STORED = (Descent, Guided, Moved, Orbit, Potential)
 """What guided policies are made of, for their file."""

@@ -97,8 +97,8 @@ class Orbit(Shown):
             f"told of ({TOLD}): the distance from it shrinks at rates of {PULL * self.rate:.4g} to "
             f"{RUSH * self.rate:.4g} per second. A plane through its inside cuts it in one cycle, on which the pace is "
             f"within {STRAY:.0%} of the one learnt wherever the plane lets it turn. With steps of up to "
-            f"{self.dt:.3g} s, to which twice any delay counts, the cycle is wider by a few hundredths, with longer "
-            "ones by more. A constraint that moves or is not told, or an obstacle, may lead off it."
+            f"{self.dt:.3g} s, to which twice any delay counts, the cycle is wider by a few per cent of its size, with "
+            "longer ones by more. A constraint that moves or is not told, or an obstacle, may lead off it."
         )
 
     def correction(self) -> Correction:

@@ -76,7 +76,7 @@ def policy_page(
     us = list(actions or (f"action {index + 1}" for index in range(d)))
     learner, held_out = named(policy.learner), _held_out(policy, demos)
     lost = diagnosis.lost_by_guiding(moving, demos)
-    more: dict[str, Any] = {"lost": lost, "notes": policy.solution_.notes}
+    more: dict[str, Any] = {"lost": lost, "left_out": policy.solution_.left_out}
     found = verdicts.of_explained(policy.held_out_score(), len(demos), diagnosis.states_told(policy), **more)
     judged = retraced(found, moving, demos, made, None, known)
     parts = [

@@ -24,7 +24,8 @@ from .noise import most_noise
 def where_agreed(found: Candidate, samples: Samples, projections: Array) -> Candidate | None:
     """The candidate, judged by agreement; None unless that says that it is right, and no worse than held out.
 
-    Its variance is that of the posterior, held-out predictions miss as much as agreement says, and refits are all alike.
+    Its variance is that of the posterior, its held-out predictions miss as much as agreement says, and its refits are
+    all alike.
 
     Parameters
     ----------

@@ -2,7 +2,7 @@
 
 import warnings
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal, Self
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array, check_at_least
-from ...base.display import counted
+from ...base.display import counted, percent
 from ...base.errors import SettingError
 from ...models import Scale
 from ...risks import along_motion, inconsistency, vec
@@ -46,9 +46,9 @@ THINNED = (
 EXPLAINS_LITTLE = "The policy explains next to nothing of held-out motion ({:.2g}): look at columns, units and groups=."
 NOTHING_MOVED = "No action is other than zero: nothing can be learnt of them. Look at the columns."
 BY_AGREEMENT = (
-    "Without some of the demonstrations the others tell too little of these: left out in turn, {0:.0%} of their motion "
-    "is missed. What is said of held-out motion is instead what to expect if the policy has the form of this model, "
-    "since all agree on one (generalised cross-validation). Recordings at other places would test that."
+    "One model misses no more than noise of all demonstrations, but each is needed: of some that are left out in turn, "
+    "the others tell too little, and {} of the motion is missed. So what is said of held-out motion is what to expect "
+    "if the policy has the form of this model (generalised cross-validation). Recordings at other places would test it."
 )
 UNUSED = "The Jacobian that was given is not used: {}."
 OUTDONE = "no policy that uses it is of less estimated error"
@@ -85,7 +85,9 @@ class SampleLearner(Learner):
             found = self._plain(training, samples, everything)
         else:
             chosen, more = self.candidate(samples, training)
-            agreed = (*more.pop("notes", ()), *(BY_AGREEMENT.format(one) for one in [chosen.alone] if one > AGREED))
+            more["left_out"] = chosen.alone if chosen.alone > AGREED else 0.0
+            by = BY_AGREEMENT.format(percent(chosen.alone) if chosen.alone < 1.0 else "more than all")
+            agreed = *more.pop("notes", ()), *([by] if more["left_out"] else [])
             more["held_out_score"] = _explained(samples, chosen)
             second = None if self.secondary is None else on(self.secondary, training)(training.folds.whole)
             found = solution(chosen, samples, everything, training.model, second, **more)
