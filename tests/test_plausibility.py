@@ -406,7 +406,7 @@ def test_turning_points_are_no_stops(rate, noise, beside, turn_s):
 def test_handwriting_and_contours_do_not_stop_on_the_way(recordings, every):
     for recording in list(recordings())[::every]:
         found = survey(recording, uc.Recipe(recording.columns, differentiate="savgol"))
-        assert "stop" not in [one.code for one in found.notes], recording.name
+        assert "pause" not in [one.code for one in found.warnings], recording.name
 
 
 @needs_rim

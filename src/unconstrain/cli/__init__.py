@@ -102,7 +102,7 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     def recordings() -> Iterator[uc.Recording]:
         paths, how = uc.readers.expand(files), reading_of(**reading)
         every = (one for path in paths for one in uc.readers.read_blocks(path, how, whole=True))
-        for recording in left_in(every, reading["leave_out"]):
+        for recording in left_in(every, reading["leave_out"], recipe):
             first[:] = first or [recording]
             held = (recording.values == recording.values[:1].round()).all(axis=0)  # as is the number of a trial
             head = zip(recording.columns, held, recording.values[0] if len(recording) else held, strict=True)
@@ -136,7 +136,8 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
 
 
 def _plain(one: Any) -> dict[str, Any]:
-    return {"code": one.code, "message": as_typed(one.message), "column": one.column, "row": one.row}
+    told = {"code": one.code, "message": as_typed(one.message), "column": one.column, "row": one.row}
+    return told | ({"spans": one.spans} if one.spans else {})
 
 
 def _used(recipe: uc.Recipe, first: uc.Recording, surveys: Sequence[Any]) -> tuple[str, str, list[str]]:
@@ -282,7 +283,7 @@ def fit(
     fitted = policy_of(model, variance, centres, scale, learner=taught, validation=uc.Folds(folds, hold_out))
     with shown("reading, placing, learning") as progress:
         stream = stream_of(paths, speed_power, progress, **reading)
-        with of_files(recordings_of(stream)):
+        with of_files(recordings_of(stream, recipe_of(**reading))):
             fitted = learn(fitted, stream, scheduler, to)
             moving = guided(fitted, to, stream)
             judged = judge_fit(moving, stream, told := uc.evaluation.diagnosis.states_told(fitted), scheduler)

@@ -81,7 +81,10 @@ CURES = (
         "auto",
     ),
     of_words(
-        "--pauses", "drop keep", "Rows that stand still in the middle, before the start or after a sudden end.", "drop"
+        "--pauses",
+        "drop keep cut",
+        "Rows that stand still in the middle, before the start or after a sudden end; cut: a demonstration between each.",
+        "drop",
     ),
     of_words(
         "--glitches", "auto keep repair drop", "Samples far off: repair puts a line there, auto only of few.", "auto"
@@ -293,9 +296,10 @@ def of_files(recordings: Iterable[uc.Recording]) -> Iterator[None]:
         raise
 
 
-def recordings_of(stream: uc.Stream) -> Iterator[uc.Recording]:
-    """Read a stream's files once more."""
-    return (one for path in stream.paths for one in uc.readers.read_blocks(path, stream.reading, whole=True))
+def recordings_of(stream: uc.Stream, recipe: uc.Recipe) -> Iterator[uc.Recording]:
+    """Read a stream's files once more, cut as a recipe says."""
+    every = (one for path in stream.paths for one in uc.readers.read_blocks(path, stream.reading, whole=True))
+    return (piece for one in every for piece in uc.preparation.pieces(one, recipe))
 
 
 def next_command(name: str, *more: str, without: Sequence[str] = ()) -> str:
@@ -409,7 +413,7 @@ def prepared(paths: Sequence[Any], reading: dict[str, Any], notes: Mapping[str, 
     known = notes or {}
     asked = _but(uc.Recipe.from_dict(known.get("recipe", {})), recipe_of(**reading))
     how = _but(uc.readers.Reading(**reading_of(**known).roles), reading_of(**reading))
-    recordings = list(left_in(uc.read(paths, **how.arguments), reading["leave_out"]))
+    recordings = list(left_in(uc.read(paths, **how.arguments), reading["leave_out"], asked))
     if not recordings:
         raise ReadError(NOTHING_LEFT)
     with of_files(recordings):
@@ -434,11 +438,13 @@ def _but(kept: Any, asked: Any) -> Any:
     return replace(kept, **{name: value for name, value in vars(asked).items() if value != plain[name]})
 
 
-def left_in(recordings: Iterable[uc.Recording], names: Sequence[str]) -> Iterator[uc.Recording]:
-    """Recordings but those that are left out by name; a SettingError where a name is of none."""
+def left_in(recordings: Iterable[uc.Recording], names: Sequence[str], recipe: uc.Recipe) -> Iterator[uc.Recording]:
+    """Recordings, cut as a recipe says, but those that are left out by name; a SettingError where a name is of none."""
     came: dict[str, None] = {}
     for recording in recordings:
         came[recording.name] = None
-        if recording.name not in names:
-            yield recording
+        for piece in uc.preparation.pieces(recording, recipe) if recording.name not in names else ():
+            came[piece.name] = None
+            if piece.name not in names:
+                yield piece
     uc.readers.check_left_out(names, came)

@@ -26,6 +26,7 @@ from .preparation.movements import prepare_one, warn
 from .preparation.plausibility.outlines import Outline
 from .preparation.plausibility.sets import compare, outline
 from .preparation.plausibility.subject import Subject
+from .preparation.surveys import pieces
 from .readers import Reading, check_left_out, expand, read_blocks
 from .readers.blocks import WHOLE_ROWS
 from .remarks import Remark
@@ -201,12 +202,12 @@ class Stream:
         self._outlines.clear()  # of a walk that was left
         for number, path in enumerate(self.paths, start=self._first_file):
             before = Counter[str]()
-            for recording in self._blocks(path, whole=not by_rows):
+            for recording in self._pieces(path, whole=not by_rows):
                 with warnings.catch_warnings():
                     if self._walked:  # it was said on the first walk
                         warnings.simplefilter("ignore", UserWarning)
                     elif before[recording.name]:  # that it stands still in a part says nothing of the whole
-                        warnings.filterwarnings("ignore", "(rest|pause|stop): ", UserWarning)
+                        warnings.filterwarnings("ignore", "(rest|pause): ", UserWarning)
                     demonstration = self._prepared(recording, before[recording.name])
                 name = f"{number}/{recording.name}"
                 contents[name] = recording.content(self.recipe, contents.get(name))
@@ -223,6 +224,12 @@ class Stream:
                 self._came[recording.name] = None
                 if recording.name not in self.leave_out:
                     yield recording
+
+    def _pieces(self, path: Path, whole: bool) -> Iterator[Recording]:
+        for piece in (one for block in self._blocks(path, whole) for one in pieces(block, self.recipe)):
+            self._came[piece.name] = None
+            if piece.name not in self.leave_out:
+                yield piece
 
     def _prepared(self, recording: Recording, before: int) -> Demonstration:
         """A recording, or a part of it after so many rows, whose start is in the middle, as a demonstration."""

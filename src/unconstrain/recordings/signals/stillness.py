@@ -23,6 +23,9 @@ NOISE = 4.5
 SHORTEST = 10
 """Samples that a pause has at least."""
 
+BESIDE_S = 4.0
+"""What moves within so many seconds before and after tells a stand."""
+
 SHORTEST_STOP_S, STOP_ROWS = 0.3, 6
 """A stop takes so many seconds, and rows, at least: who turns a corner is slow for a shorter time."""
 
@@ -74,13 +77,38 @@ def is_noise(values: Array) -> bool:
     return bool((noise_share(values) > 0.5).all())
 
 
-def pauses(values: Array) -> list[tuple[int, int]]:
-    """Half-open stretches of rows, with movement before and after, in which nothing moves.
+def stands(values: Array, interval: float = 0.0) -> list[tuple[int, int]]:
+    """Half-open stretches of rows (T, n), with movement before and after, in which nothing moves.
+
+    Each is told by what moves within :data:`BESIDE_S` of it, whatever else there is; without a clock, or where it takes
+    a good share of all rows, by the whole.
 
     Parameters
     ----------
     values : ndarray, shape (T, n)
+    interval : float
+        Seconds between rows; 0 or NaN where it is not known.
     """
+    found = pauses(values)
+    if not 0.0 < interval <= SHORTEST_STOP_S / STOP_ROWS:
+        return found
+    shortest, beside = round(SHORTEST_STOP_S / interval), round(BESIDE_S / interval)
+    for first, last in _slow_runs(values, shortest, 0.9)[1]:
+        start = max(first - beside, 0)
+        near = values[start : last + beside]
+        least = SLOW * float(np.linalg.norm(_usual(near, shortest)))
+        inner = [run for run in (*pauses(near), *_stops(near, shortest)) if _moves_around(near, *run, least)]
+        inner = [(start + one, start + other) for one, other in inner]
+        inner = [run for run in inner if run[0] < last and first < run[1]]
+        found += [run for run in inner if min(run[0], len(values) - run[1]) >= shortest]
+    covered = np.zeros(len(values), dtype=bool)
+    for one, other in found:
+        covered[one:other] = True
+    return stretches(covered)
+
+
+def pauses(values: Array) -> list[tuple[int, int]]:
+    """Stretches as :func:`stands` finds, of a good share of all rows (T, n)."""
     if len(values) < 4 * SHORTEST:
         return []
     smooth = noise_share(values) < 0.3
@@ -91,18 +119,21 @@ def pauses(values: Array) -> list[tuple[int, int]]:
     return _slow(moving, shortest) or _motionless(moving, max(shortest, 2 * SHORTEST))
 
 
-def stops(values: Array, shortest: int) -> list[tuple[int, int]]:
-    """Half-open stretches of so many rows (T, n) or more in which nothing moves, however long the recording is.
+def _stops(values: Array, shortest: int) -> list[tuple[int, int]]:
+    """Stretches of so many rows (T, n) or more in which nothing moves.
 
     Means of neighbouring thirds of so many rows are compared in units of their noise. At a turning point these are near
     each other, too, but not long before and after: there a stop is left at the usual pace, to go somewhere.
     """
-    moved, runs, fast = _slow_runs(values, shortest)
+    moved, runs, fast = _slow_runs(values, shortest, 0.5)
     last = 1 - 2 * (shortest // 3)
     found = [run for run in runs if _is_sudden(moved, run[0], run[1] + last, shortest, fast)]
-    left = _left(found, values, LEFT * np.ptp(values, axis=0))
-    least = SLOW * float(np.linalg.norm(_usual(values, shortest))) if left else 0.0
-    return [one for one in left if min(_spread(values[: one[1]]), _spread(values[one[0] :])) > least]
+    return _left(found, values, LEFT * np.ptp(values, axis=0))
+
+
+def _moves_around(values: Array, first: int, last: int, least: float) -> bool:
+    """Whether what is before a stand spreads by more than a length, and what is after it."""
+    return min(_spread(values[:last]), _spread(values[first:])) > least
 
 
 def rest_at_ends(values: Array, interval: float = 0.0) -> tuple[int, int]:
@@ -179,21 +210,28 @@ def _near(values: Array, place: Array, far: Array) -> int:
     return int(gone[0]) if len(gone) else len(values)
 
 
-def _slow_runs(values: Array, shortest: int) -> tuple[Array, list[tuple[int, int]], float]:
-    """How far means before and after each row are apart, stretches where hardly, and what is fast; none where loud."""
+def _slow_runs(values: Array, shortest: int, share: float) -> tuple[Array, list[tuple[int, int]], float]:
+    """How far means before and after each row are apart, stretches where hardly, and what is fast; none where loud.
+
+    Hardly and fast are beside what so large a share of the rows does not exceed.
+    """
     if len(values) < 4 * shortest:
         return values[:0, 0], [], np.inf
     span = shortest // 3
     moved = np.sqrt(sum(_moved(column, span) ** 2 for column in values.T))
-    usual, noise = float(np.quantile(moved, 0.5)), np.sqrt(values.shape[1]) + 1.0
+    noise = np.sqrt(values.shape[1]) + 1.0
+    usual = float(np.quantile(moved[moved > noise], share)) if (moved > noise).any() else 0.0
     runs = _stretches(moved <= max(SLOW * usual, noise), 2 * span - 1, shortest) if noise <= LOUD * usual else []
     return moved, runs, RISE * usual
 
 
 def _is_sudden(moved: Array, first: int, last: int, least: int, fast: float) -> bool:
-    """Whether there is fast movement on both sides of a slow stretch, within its length or a least number of rows."""
+    """Whether movement before and after a slow stretch, within its length or a least number of rows, is fast on average.
+
+    It is their geometric mean: who comes to a place slowly, and leaves it fast, stands there.
+    """
     near = max(last - first, least)
-    return bool(min(moved[max(first - near, 0) : first + 1].max(), moved[last - 1 :][:near].max()) > fast)
+    return bool(moved[max(first - near, 0) : first + 1].max() * moved[last - 1 :][:near].max() > fast**2)
 
 
 def _moved(column: Array, span: int) -> Array:
