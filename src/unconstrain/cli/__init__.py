@@ -196,6 +196,8 @@ def _cures(surveys: Sequence[Any]) -> dict[str, str]:
             found[option] = ",".join(dict.fromkeys(names))
     if "--angle" in found:  # which has no scale
         found.pop("--scale", None)
+    if len(surveys) == 1 and "pause" in [one.code for one in surveys[0].warnings]:
+        found["--pauses"] = "cut"
     found.pop("--action-is", None)  # which takes the actions for what they are
     if all("reversed" in [one.code for one in each.warnings] for each in surveys):
         found["--by"] = "savgol"  # the sign of all actions is turned

@@ -83,7 +83,7 @@ CURES = (
     of_words(
         "--pauses",
         "drop keep cut",
-        "Rows that stand still in the middle, before the start or after a sudden end; cut: a demonstration between each.",
+        "Rows that stand still in the middle or at the ends; cut: apart there, too.",
         "drop",
     ),
     of_words(
@@ -308,7 +308,7 @@ def next_command(name: str, *more: str, without: Sequence[str] = ()) -> str:
     known = {one.name for one in context.find_root().command.commands[name].params}  # type: ignore[attr-defined]
     others = [one.name or "" for one in context.command.params if one.name not in known]
     told = typed("files", "output", "report", "force", "verbose", "as_json", "strict", *others, *without)
-    return f"unconstrain {name} {_as_pattern(context.params['files'])} {shlex.join([*told, *more])}".rstrip()
+    return f"unconstrain {name} {as_pattern(context.params['files'])} {shlex.join([*told, *more])}".rstrip()
 
 
 def to_copy(
@@ -351,12 +351,12 @@ def as_options(recipe: uc.Recipe, how: uc.readers.Reading, without: Sequence[str
     return told
 
 
-def _as_pattern(files: Sequence[str]) -> str:
+def as_pattern(files: Sequence[str | Path]) -> str:
     """Files as they were typed; many by a pattern that stands for just these."""
     folder, pattern = Path(files[0]).parent, f"*{Path(files[0]).suffix}"
     if len(files) > 3 and sorted(map(Path, files)) == sorted(folder.glob(pattern)):
         return shlex.quote(str(folder / pattern))
-    return shlex.join(files)
+    return shlex.join(map(str, files))
 
 
 def likely_states(columns: Sequence[str]) -> tuple[str, ...]:
@@ -441,10 +441,8 @@ def _but(kept: Any, asked: Any) -> Any:
 def left_in(recordings: Iterable[uc.Recording], names: Sequence[str], recipe: uc.Recipe) -> Iterator[uc.Recording]:
     """Recordings, cut as a recipe says, but those that are left out by name; a SettingError where a name is of none."""
     came: dict[str, None] = {}
-    for recording in recordings:
+    for recording in (piece for one in recordings for piece in uc.preparation.pieces(one, recipe)):
         came[recording.name] = None
-        for piece in uc.preparation.pieces(recording, recipe) if recording.name not in names else ():
-            came[piece.name] = None
-            if piece.name not in names:
-                yield piece
+        if recording.name not in names:
+            yield recording
     uc.readers.check_left_out(names, came)

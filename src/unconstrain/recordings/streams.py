@@ -202,7 +202,7 @@ class Stream:
         self._outlines.clear()  # of a walk that was left
         for number, path in enumerate(self.paths, start=self._first_file):
             before = Counter[str]()
-            for recording in self._pieces(path, whole=not by_rows):
+            for recording in self._blocks(path, not by_rows, self.recipe):
                 with warnings.catch_warnings():
                     if self._walked:  # it was said on the first walk
                         warnings.simplefilter("ignore", UserWarning)
@@ -218,18 +218,13 @@ class Stream:
                 yield name, demonstration
         self._rows, self.contents = read, [one.hexdigest() for one in contents.values()]
 
-    def _blocks(self, path: Path, whole: bool = False) -> Iterator[Recording]:
+    def _blocks(self, path: Path, whole: bool = False, cut: Recipe | None = None) -> Iterator[Recording]:
         with unchanged(path, self._stamps.setdefault(path, Stamp.of(path))):
-            for recording in read_blocks(path, self.reading, whole=whole):
+            every = read_blocks(path, self.reading, whole=whole)
+            for recording in (piece for one in every for piece in pieces(one, cut or Recipe())):
                 self._came[recording.name] = None
                 if recording.name not in self.leave_out:
                     yield recording
-
-    def _pieces(self, path: Path, whole: bool) -> Iterator[Recording]:
-        for piece in (one for block in self._blocks(path, whole) for one in pieces(block, self.recipe)):
-            self._came[piece.name] = None
-            if piece.name not in self.leave_out:
-                yield piece
 
     def _prepared(self, recording: Recording, before: int) -> Demonstration:
         """A recording, or a part of it after so many rows, whose start is in the middle, as a demonstration."""

@@ -12,15 +12,12 @@ from ..readers.table import rows_of
 from ..remarks import Remark
 from .plausibility.subject import LEAST_ROWS, Subject
 
-HARDLY = 0.05
+HARDLY = 0.1
 """A piece that covers less than this share of what half of the pieces cover moves hardly."""
 
 
 def between_stands(subject: Subject) -> list[Recording]:
-    """What moves between stands, called ``NAME.1``, ``NAME.2``, ..., where a recipe cuts there; else the recording.
-
-    Pieces that hardly move are left out; the first that is left says so. A piece has no stand, so it is cut no more.
-    """
+    """What moves between stands, called ``NAME.1``, ``NAME.2``, ..., where a recipe cuts there; else the recording."""
     whole, every = subject.recording, _between(subject) if subject.recipe.pauses == "cut" else []
     if len(every) < 2:
         return [whole]

@@ -80,26 +80,19 @@ def is_noise(values: Array) -> bool:
 def stands(values: Array, interval: float = 0.0) -> list[tuple[int, int]]:
     """Half-open stretches of rows (T, n), with movement before and after, in which nothing moves.
 
-    Each is told by what moves within :data:`BESIDE_S` of it, whatever else there is; without a clock, or where it takes
-    a good share of all rows, by the whole.
-
-    Parameters
-    ----------
-    values : ndarray, shape (T, n)
-    interval : float
-        Seconds between rows; 0 or NaN where it is not known.
+    Each is told by what moves within :data:`BESIDE_S` of it, whatever else there is; where it takes a good share of all
+    rows, or their interval is not known (0 or NaN, seconds), by the whole.
     """
     found = pauses(values)
     if not 0.0 < interval <= SHORTEST_STOP_S / STOP_ROWS:
         return found
     shortest, beside = round(SHORTEST_STOP_S / interval), round(BESIDE_S / interval)
     for first, last in _slow_runs(values, shortest, 0.9)[1]:
-        start = max(first - beside, 0)
-        near = values[start : last + beside]
+        start = max(first - beside, 0) // shortest * shortest  # a row or two of one run make no other window
+        near = values[start : -(-(last + beside) // shortest) * shortest]
         least = SLOW * float(np.linalg.norm(_usual(near, shortest)))
-        inner = [run for run in (*pauses(near), *_stops(near, shortest)) if _moves_around(near, *run, least)]
-        inner = [(start + one, start + other) for one, other in inner]
-        inner = [run for run in inner if run[0] < last and first < run[1]]
+        inner = [run for run in (*pauses(near), *_stops(near, shortest)) if _spread_around(near, *run) > least]
+        inner = [(start + one, start + other) for one, other in inner if start + one < last and first < start + other]
         found += [run for run in inner if min(run[0], len(values) - run[1]) >= shortest]
     covered = np.zeros(len(values), dtype=bool)
     for one, other in found:
@@ -128,12 +121,8 @@ def _stops(values: Array, shortest: int) -> list[tuple[int, int]]:
     moved, runs, fast = _slow_runs(values, shortest, 0.5)
     last = 1 - 2 * (shortest // 3)
     found = [run for run in runs if _is_sudden(moved, run[0], run[1] + last, shortest, fast)]
-    return _left(found, values, LEFT * np.ptp(values, axis=0))
-
-
-def _moves_around(values: Array, first: int, last: int, least: float) -> bool:
-    """Whether what is before a stand spreads by more than a length, and what is after it."""
-    return min(_spread(values[:last]), _spread(values[first:])) > least
+    exact = [_exact(values, run, NOISE * _noise(values)) or run for run in found]
+    return _left(exact, values, LEFT * np.ptp(values, axis=0))
 
 
 def rest_at_ends(values: Array, interval: float = 0.0) -> tuple[int, int]:
@@ -201,6 +190,10 @@ def _spread(values: Array) -> float:
     return float(np.linalg.norm(values.std(axis=0)))
 
 
+def _spread_around(values: Array, first: int, last: int) -> float:
+    return min(_spread(values[:last]), _spread(values[first:]))
+
+
 def _near(values: Array, place: Array, far: Array) -> int:
     """Rows (T, n), from the first on, of which no two in a row are farther from a place than some lengths (n,)."""
     off = np.zeros(len(values), dtype=bool)
@@ -211,10 +204,7 @@ def _near(values: Array, place: Array, far: Array) -> int:
 
 
 def _slow_runs(values: Array, shortest: int, share: float) -> tuple[Array, list[tuple[int, int]], float]:
-    """How far means before and after each row are apart, stretches where hardly, and what is fast; none where loud.
-
-    Hardly and fast are beside what so large a share of the rows does not exceed.
-    """
+    """How far means before and after each row are apart, stretches where hardly beside a quantile, and what is fast."""
     if len(values) < 4 * shortest:
         return values[:0, 0], [], np.inf
     span = shortest // 3
@@ -226,10 +216,7 @@ def _slow_runs(values: Array, shortest: int, share: float) -> tuple[Array, list[
 
 
 def _is_sudden(moved: Array, first: int, last: int, least: int, fast: float) -> bool:
-    """Whether movement before and after a slow stretch, within its length or a least number of rows, is fast on average.
-
-    It is their geometric mean: who comes to a place slowly, and leaves it fast, stands there.
-    """
+    """Whether movement just before and after a slow stretch, in their geometric mean, is fast."""
     near = max(last - first, least)
     return bool(moved[max(first - near, 0) : first + 1].max() * moved[last - 1 :][:near].max() > fast**2)
 
@@ -250,12 +237,17 @@ def _slow(values: Array, shortest: int) -> list[tuple[int, int]]:
         usual = _usual(values, span)
         near = np.maximum(noise, 0.3 * usual / span)
         runs = _runs(values, span, SLOW * usual, shortest)
-        exact = [_around(values, *run, np.maximum(near, _trembling(values[slice(*run)]))) for run in runs]
-        long = [one for one, run in zip(exact, runs, strict=True) if 2 * (one[1] - one[0]) > run[1] - run[0]]
-        if found := _left(long, values, LEFT * np.ptp(values, axis=0)):
+        exact = [_exact(values, run, near) for run in runs]
+        if found := _left([run for run in exact if run is not None], values, LEFT * np.ptp(values, axis=0)):
             return found
         span *= 2
     return []
+
+
+def _exact(values: Array, run: tuple[int, int], near: Array) -> tuple[int, int] | None:
+    """The stretch around the middle of another that is near one place; None where it is less than half as long."""
+    start, stop = _around(values, *run, np.maximum(near, _trembling(values[slice(*run)])))
+    return (start, stop) if 2 * (stop - start) > run[1] - run[0] else None
 
 
 def _trembling(values: Array) -> Array:

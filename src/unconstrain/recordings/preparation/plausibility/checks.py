@@ -141,7 +141,7 @@ def irregular(subject: Subject) -> Remark | None:
     if rows := rows_missing(steady, typical):
         said = f"{'1 row is' if rows == 1 else f'{rows} rows are'} missing between the gaps"
         return Remark("rows-missing", f"{said}, as the time stamps show, {to}")
-    return Remark("irregular", f"time stamps are irregular, {to}")
+    return Remark("irregular", f"time stamps are irregular, {to}") if steady.std() > 2 * STEADY * typical else None
 
 
 def rows_missing(intervals: Array, typical: float) -> int:
@@ -273,12 +273,11 @@ def pause(subject: Subject) -> Remark | None:
     rows, stamps = sum(stop - start for start, stop in found), subject.stamps
     done = {"drop": "left out (pauses='keep')", "keep": "kept (pauses='drop')", "cut": "left out"}
     message = f"stands still for {subject.lasting(rows)} in the middle; they are {done[subject.recipe.pauses]}"
-    at = [] if stamps is None else [f"{stamps[row] - stamps[0]:.3g} s" for row, _ in found]
-    at = [f"{seconds} for {subject.interval * (last - row):.2g} s" for seconds, (row, last) in zip(at, found, strict=False)]
-    message += f": at {listed(at, 3)}" * bool(at)
+    at = [] if stamps is None else [(stamps[row] - stamps[0], subject.interval * (last - row)) for row, last in found]
+    message += f": at {listed([f'{begin:.3g} s for {lasting:.2g} s' for begin, lasting in at], 3)}" * bool(at)
     spans = tuple((subject.row(row), subject.row(last - 1) + 1) for row, last in found)
-    cure = "If demonstrations are between, cut it there: pauses='cut'."
-    return Remark("pause", f"{message}. {cure}", row=spans[0][0], spans=spans)
+    message += ". If demonstrations are between, cut it there: pauses='cut'."
+    return Remark("pause", message, row=spans[0][0], spans=spans)
 
 
 def rest(subject: Subject) -> Remark | None:
