@@ -136,8 +136,9 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
 
 
 def _plain(one: Any) -> dict[str, Any]:
-    told = {"code": one.code, "message": as_typed(one.message), "column": one.column, "row": one.row}
-    return told | ({"spans": one.spans} if one.spans else {})
+    return {name: getattr(one, name) for name in ("code", "column", "row", "spans")} | {
+        "message": as_typed(one.message)
+    }
 
 
 def _used(recipe: uc.Recipe, first: uc.Recording, surveys: Sequence[Any]) -> tuple[str, str, list[str]]:

@@ -1,7 +1,5 @@
 """One recording as several demonstrations, with a stand between any two."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 
@@ -23,13 +21,13 @@ def between_stands(subject: Subject) -> list[Recording]:
         return [whole]
     extents = [float(np.linalg.norm(np.ptp(one.states, axis=0))) if len(one.rows) >= LEAST_ROWS else 0 for one in every]
     moving = [one for one, far in zip(every, extents, strict=True) if far >= HARDLY * np.median(extents)]
-    left = len(every) - len(moving)
     said = f"cut where it stands still, into {whole.name}.1 to {whole.name}.{len(moving)}; leave out those that are no "
-    said += f"demonstrations with leave_out=.{f' {left} more hardly moved, and are left out.' * bool(left)}"
-    notes = (*whole.remarks, Remark("cut", said))
+    said += "demonstrations with leave_out=."
+    said += f" {len(every) - len(moving)} more hardly moved, and are left out." * (len(every) > len(moving))
+    notes = [(*whole.remarks, Remark("cut", said)), *[()] * len(moving)]
     return [
-        replace(one.recording, name=f"{whole.name}.{number}", remarks=notes if number == 1 else ())
-        for number, one in enumerate(moving, start=1)
+        replace(one.recording, name=f"{whole.name}.{number + 1}", remarks=notes[number])
+        for number, one in enumerate(moving)
     ]
 
 

@@ -82,7 +82,7 @@ class Recipe:
     pauses : {"drop", "keep", "cut"}
         What becomes of rows in which nothing moves, in the middle of a demonstration, before it starts (who follows a
         policy of the state and rests never starts) or after a sudden end. Time stamps stay as they are. ``"cut"``
-        drops them, and makes a demonstration of what moves between any two stands (``NAME.1``, ``NAME.2``, ...).
+        makes a demonstration of what moves between any two stands, ``NAME.1``, ``NAME.2``, ...
     action_is : {"auto", "velocity", "target", "delta"}
         What the action columns are: velocities; states to come, so that the velocity of the states is learnt; changes
         to the next sample, so that they are divided by the interval. ``"auto"`` takes them for velocities unless the

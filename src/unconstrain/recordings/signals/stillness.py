@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import BLOCK_ROWS, Array, slices
-from .jumps import resolution, stretches
+from .jumps import COUNTS, resolution, stretches
 
 SLOW = 0.08
 """Whoever moves by less than this share of a usual movement in the same time stands still."""
@@ -23,11 +23,8 @@ NOISE = 4.5
 SHORTEST = 10
 """Samples that a pause has at least."""
 
-BESIDE_S = 4.0
-"""What moves within so many seconds before and after tells a stand."""
-
-SHORTEST_STOP_S, STOP_ROWS = 0.3, 6
-"""A stop takes so many seconds, and rows, at least: who turns a corner is slow for a shorter time."""
+SHORTEST_STOP_S, STOP_ROWS, BESIDE_S = 0.3, 6, 4.0
+"""A stop takes so many seconds, and rows, at least, and what moves within so many seconds of it tells it."""
 
 HALVES, HALF, ADDED_UP, SHARED = 2.0, 4, 3.0, 1.5
 """Means of both halves of a rest are nearer than so many standard errors of their difference, by white noise; or, where
@@ -43,11 +40,8 @@ SHORTER = 60
 
 LOUD, RISE, FINEST = 0.25, 0.7, 0.02
 """A stop is seen where noise is below the first share of usual movement, and begins and ends at the second share, near
-it. Noise counts as the third share at least.
-
-No stop is found in 210 strokes of handwriting, 12 contours and ten bouts of wiping; two in six recordings of wiping
-are, rightly, rests between bouts. Of stops of 0.3 to 0.6 s that are put in, 97 % are found. Strokes to and fro on a
-line, which turn in 4 s or more, seem to stop from noise of a hundredth of them on."""
+it. Noise counts as the third share at least. None is found in handwriting and contours; strokes to and fro on a line,
+which turn in 4 s or more, seem to stop from noise of a hundredth of them on."""
 
 
 def noise_share(values: Array) -> Array:
@@ -91,13 +85,11 @@ def stands(values: Array, interval: float = 0.0) -> list[tuple[int, int]]:
         start = max(first - beside, 0) // shortest * shortest  # a row or two of one run make no other window
         near = values[start : -(-(last + beside) // shortest) * shortest]
         least = SLOW * float(np.linalg.norm(_usual(near, shortest)))
-        inner = [run for run in (*pauses(near), *_stops(near, shortest)) if _spread_around(near, *run) > least]
-        inner = [(start + one, start + other) for one, other in inner if start + one < last and first < start + other]
+        both = [*pauses(near), *_stops(near, shortest)]
+        both = [one for one in both if min(_spread(near[: one[1]]), _spread(near[one[0] :])) > least]
+        inner = [(start + one, start + two) for one, two in both if start + one < last and first < start + two]
         found += [run for run in inner if min(run[0], len(values) - run[1]) >= shortest]
-    covered = np.zeros(len(values), dtype=bool)
-    for one, other in found:
-        covered[one:other] = True
-    return stretches(covered)
+    return stretches(np.isin(np.arange(len(values)), [row for run in found for row in range(*run)]))
 
 
 def pauses(values: Array) -> list[tuple[int, int]]:
@@ -128,11 +120,7 @@ def _stops(values: Array, shortest: int) -> list[tuple[int, int]]:
 def rest_at_ends(values: Array, interval: float = 0.0) -> tuple[int, int]:
     """Rows (T, n) before the start, and after an end that is sudden, in which nothing moves.
 
-    Parameters
-    ----------
-    values : ndarray, shape (T, n)
-    interval : float
-        Seconds between rows; 0 or NaN where it is not known.
+    ``interval`` is the seconds between rows, 0 or NaN where it is not known.
     """
     known = 0.0 < interval <= SHORTEST_STOP_S / STOP_ROWS
     shortest = round(SHORTEST_STOP_S / interval) if known else max(20, len(values) // 10)
@@ -190,10 +178,6 @@ def _spread(values: Array) -> float:
     return float(np.linalg.norm(values.std(axis=0)))
 
 
-def _spread_around(values: Array, first: int, last: int) -> float:
-    return min(_spread(values[:last]), _spread(values[first:]))
-
-
 def _near(values: Array, place: Array, far: Array) -> int:
     """Rows (T, n), from the first on, of which no two in a row are farther from a place than some lengths (n,)."""
     off = np.zeros(len(values), dtype=bool)
@@ -227,7 +211,8 @@ def _moved(column: Array, span: int) -> Array:
     means = (sums[span:] - sums[:-span]) / span
     moved = np.abs(means[span:] - means[:-span])
     noise = float(np.median(np.abs(np.diff(column, 3)))) / (0.6745 * np.sqrt(20.0)) * np.sqrt(2.0 / span)
-    return np.asarray(moved / (max(noise, FINEST * float(np.quantile(moved, 0.9))) or 1.0))
+    count = float(resolution(column[:, None])[0]) / COUNTS
+    return np.asarray(moved / (max(noise, count, FINEST * float(np.quantile(moved, 0.9))) or 1.0))
 
 
 def _slow(values: Array, shortest: int) -> list[tuple[int, int]]:
