@@ -21,8 +21,7 @@ def between_stands(subject: Subject) -> list[Recording]:
         return [whole]
     extents = [float(np.linalg.norm(np.ptp(one.states, axis=0))) if len(one.rows) >= LEAST_ROWS else 0 for one in every]
     moving = [one for one, far in zip(every, extents, strict=True) if far >= HARDLY * np.median(extents)]
-    said = f"cut where it stands still, into {whole.name}.1 to {whole.name}.{len(moving)}; leave out those that are no "
-    said += "demonstrations with leave_out=."
+    said = f"cut where it stands still, into {whole.name}.1 to {whole.name}.{len(moving)}; leave_out= leaves some out."
     said += f" {len(every) - len(moving)} more hardly moved, and are left out." * (len(every) > len(moving))
     notes = [(*whole.remarks, Remark("cut", said)), *[()] * len(moving)]
     return [

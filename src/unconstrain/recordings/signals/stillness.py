@@ -118,10 +118,7 @@ def _stops(values: Array, shortest: int) -> list[tuple[int, int]]:
 
 
 def rest_at_ends(values: Array, interval: float = 0.0) -> tuple[int, int]:
-    """Rows (T, n) before the start, and after an end that is sudden, in which nothing moves.
-
-    ``interval`` is the seconds between rows, 0 or NaN where it is not known.
-    """
+    """Rows (T, n) before the start, and after an end that is sudden, in which nothing moves; ``interval`` as above."""
     known = 0.0 < interval <= SHORTEST_STOP_S / STOP_ROWS
     shortest = round(SHORTEST_STOP_S / interval) if known else max(20, len(values) // 10)
     first, last = _standing(values, shortest), _standing(values[::-1], shortest, only_sudden=True)
