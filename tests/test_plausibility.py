@@ -144,7 +144,7 @@ def test_of_handwriting_most_files_with_other_columns_are_named_and_no_others(si
 @needs_rim
 def test_nothing_is_said_of_wiping_but_of_its_quaternions_where_they_are_used():
     recordings = [uc.read(path)[0] for path in sorted(RIM.glob("demo_*.csv"))]
-    assert codes(recordings) == [[]] * 6
+    assert codes(recordings) == [[]] * 5 + [["pause"]]  # two rests between bouts
     turned = [index for index, one in enumerate(recordings) if _turns_sign(one.select(("qx", "qy", "qz", "qw")))]
     assert turned == [2, 4]
     said = codes(recordings, uc.Recipe(("qx", "qy", "qz", "qw"), differentiate="savgol"))
@@ -817,7 +817,7 @@ def test_inspect_fit_and_diagnose_say_the_same(wrapped):
     options = (wrapped / "crank_*.csv", "--state", "x,yaw", "--differentiate")
     shown = json.loads(run("inspect", *options, "--json"))["demonstrations"]
     [first] = [one for one in shown[0]["warnings"] if one["code"] == "angle-wrap"]
-    assert set(first) == {"code", "message", "column", "row"}
+    assert set(first) == {"code", "message", "column", "row", "spans"}
     assert (first["column"], first["row"]) == ("yaw", 25)
     line = f"angle-wrap: 'crank_0', row 25 (line 27), column 'yaw': {first['message']}"
     assert line in run("inspect", *options).splitlines()

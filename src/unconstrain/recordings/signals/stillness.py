@@ -235,8 +235,8 @@ def _exact(values: Array, run: tuple[int, int], near: Array) -> tuple[int, int] 
 def _trembling(values: Array) -> Array:
     """How far rows are from one place by their own noise, shape (n,): nothing for columns that go on meanwhile."""
     inner = values[len(values) // 4 : -(len(values) // 4)]
-    parts = _parts(inner)
-    gone = np.abs(parts[HALF:].mean(axis=0) - parts[:HALF].mean(axis=0))
+    half = len(parts := _parts(inner)) // 2
+    gone = np.abs(parts[half:].mean(axis=0) - parts[:half].mean(axis=0))
     steps, noise = np.median(np.abs(np.diff(parts, axis=0)), axis=0), np.maximum(inner.std(axis=0), _noise(values))
     return np.asarray(np.where(gone < ADDED_UP * steps / np.sqrt(HALF), NOISE * noise, 0.0))
 
