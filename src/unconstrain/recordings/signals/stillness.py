@@ -114,7 +114,7 @@ def _stops(values: Array, shortest: int) -> list[tuple[int, int]]:
     last = 1 - 2 * (shortest // 3)
     found = [run for run in runs if _is_sudden(moved, run[0], run[1] + last, shortest, fast)]
     exact = [_exact(values, run, NOISE * _noise(values)) or run for run in found]
-    return _left(exact, values, LEFT * np.ptp(values, axis=0))
+    return _left([run for run in exact if run[1] - run[0] >= shortest], values, LEFT * np.ptp(values, axis=0))
 
 
 def rest_at_ends(values: Array, interval: float = 0.0) -> tuple[int, int]:
