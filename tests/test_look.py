@@ -3,6 +3,7 @@
 import contextlib
 import json
 import re
+import shlex
 
 import numpy as np
 import pytest
@@ -135,7 +136,7 @@ def test_a_demonstration_is_left_out_by_its_tick_and_by_a_click_in_the_scene(fol
     assert len(out) == 2
     command = text(page, "command")
     assert f"--leave-out wipe_{out[0]},wipe_{out[1]}" in command
-    told = command.split()[1:]
+    told = shlex.split(command)[1:]
     done = call(*told[:-1], folder / "again.npz", "--force")
     assert done.code == 0
     assert "2 demonstrations" in done.out

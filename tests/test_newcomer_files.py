@@ -937,3 +937,118 @@ def test_what_diagnose_calls_told_is_what_it_says_of_uncertainty(tmp_path):
     assert found.states_determined == pytest.approx(told.mean())
     doubt = uc.evaluation.verdicts.of_diagnosis(found).doubt
     assert doubt.startswith("Where all leave a direction open") == (found.told_together < 1.0)
+
+
+# Stands between demonstrations
+
+
+def session(count, still=60, carried=100, noise=0.3, seed=0):
+    """Clock and positions, mm at 100 Hz, of strokes along a line each, stands, and ways back; its stands."""
+    rng, parts, stands, rows = np.random.default_rng(seed), [], [], 0
+    starts = rng.uniform(-150, 150, (count, 2))
+    ends = starts + 120 * np.array([[np.cos(angle), np.sin(angle)] for angle in np.pi * np.arange(count) / count])
+    share = np.linspace(0, 1, carried)[:, None]
+    smooth = share**3 * (10 - 15 * share + 6 * share**2)
+    for number, (start, end) in enumerate(zip(starts, ends, strict=True)):
+        stroked = start + (end - start) * (1 - np.exp(-3 * np.linspace(0, 1, 150)))[:, None]
+        back = stroked[-1] + (starts[(number + 1) % count] - stroked[-1]) * smooth
+        moved = [np.repeat(stroked[:1], still, 0), stroked, np.repeat(stroked[-1:], still, 0), back]
+        bounds = rows + np.cumsum([0, *map(len, moved)])
+        stands += [(bounds[0], bounds[1]), (bounds[2], bounds[3])]
+        parts, rows = [*parts, *moved], bounds[4]
+    path = np.concatenate(parts[:-1])
+    path += noise * rng.standard_normal(path.shape)
+    return np.column_stack([0.01 * np.arange(len(path)), path]), stands[1:-1]
+
+
+def spans_of(file, *more):
+    [found] = json.loads(call("inspect", file, *more, "--json").out)["demonstrations"]
+    return [span for one in found["warnings"] if one["code"] == "pause" for span in one["spans"]]
+
+
+def test_each_stand_is_told_once_and_the_same_however_long_the_recording_is(tmp_path):
+    table, stands = session(8)
+    every = spans_of(write(tmp_path / "long.csv", "t,x,y", table))
+    assert len(every) == len(stands)
+    for (first, last), (start, end) in zip(every, stands, strict=True):
+        assert start - 45 < first < start + 15  # strokes end slowly
+        assert end - 15 < last < end + 25
+    for rows in (900, 1500, 2000):
+        some = spans_of(write(tmp_path / "some.csv", "t,x,y", table[:rows]))
+        away = rows - 420
+        assert [one for one in some if one[1] < away] == [one for one in every if one[1] < away]
+    moving = table[60 + np.arange(150)]
+    assert not spans_of(write(tmp_path / "one.csv", "t,x,y", moving))
+
+
+def test_a_session_is_cut_where_it_stands_still_and_its_strokes_are_learnt(tmp_path):
+    table, _ = session(6)
+    file, between = write(tmp_path / "long.csv", "t,x,y", table), [f"long.{2 * k}" for k in range(1, 6)]
+    said = text(call("inspect", file))
+    assert "If demonstrations are between, cut it there: --pauses cut." in said
+    assert f"unconstrain fit {file} --pauses cut -o policy.npz" in said
+    cut = ("--pauses", "cut", "--leave-out", ",".join(between))
+    found = json.loads(call("inspect", file, *cut, "--json").out)["demonstrations"]
+    assert [one["name"] for one in found] == [f"long.{2 * k + 1}" for k in range(6)]
+    assert all(abs(one["samples"] - 150) < 90 for one in found[1:-1])
+    assert not [odd for one in found for odd in one["warnings"] if odd["code"] == "pause"]
+    assert "no demonstration is called 'long.99'" in refused(
+        "inspect", file, "--pauses", "cut", "--leave-out", "long.99"
+    )
+    policy = tmp_path / "policy.npz"
+    quick = ("--model", "affine", "--learner", "direct")
+    learnt = json.loads(call("fit", file, *cut, *quick, "-o", policy, "--json").out)
+    assert learnt["demonstrations"] == 6
+    scored = json.loads(call("score", policy, file, *cut[2:], "--json").out)  # cut as what it learnt from
+    assert [one["demonstration"] for one in scored["rows"]] == [one["name"] for one in found]
+    assert scored["learnt_from"] == [one["name"] for one in found]
+    assert len(json.loads(call("diagnose", file, *cut, *quick[:2], "--json").out)["movements"]) == 6
+    assert run("constraint", file, *cut, "-o", tmp_path / "held.npz")
+    looked = json.loads(call("look", file, *cut, "-o", tmp_path / "look.html", "--json").out)
+    assert looked["demonstrations"] == 6
+
+
+@pytest.mark.parametrize("command", ["fit", "diagnose"])
+def test_one_recording_that_stands_still_is_to_be_cut_there_and_one_that_does_not_is_not(tmp_path, command):
+    table, _ = session(2)
+    more = ("--learner", "direct", "-o", tmp_path / "p.npz", "--force") if command == "fit" else ()
+    for rows, cut in ((table, True), (table[70:200], False)):
+        said = text(call(command, write(tmp_path / "w.csv", "t,x,y", rows), "--model", "affine", *more))
+        assert (f"unconstrain {command} {tmp_path / 'w.csv'} " in said) == cut
+        assert ("--pauses cut" in said) == cut
+
+
+def test_pieces_that_hardly_move_are_left_out_with_a_word(tmp_path):
+    table, _ = session(4)
+    still = table[-1, 1:] + np.clip(np.arange(-80, 140) / 60, 0, 1)[:, None] * [6, 0]
+    still += 0.3 * np.random.default_rng(1).standard_normal(still.shape)
+    path = np.concatenate([table[:, 1:], still, table[::-1, 1:] + [6, 0]])
+    rows = np.column_stack([0.01 * np.arange(len(path)), path])
+    every = json.loads(call("inspect", write(tmp_path / "w.csv", "t,x,y", rows), "--pauses", "cut", "--json").out)
+    notes = [one["message"] for each in every["demonstrations"] for one in each["notes"] if one["code"] == "cut"]
+    assert len(every["demonstrations"]) == 14
+    assert "1 more hardly moved, and are left out." in notes[0]
+    kept = call("inspect", write(tmp_path / "v.csv", "t,x,y", table), "--pauses", "cut").out
+    assert "hardly moved" not in kept
+    assert "cut where it stands still, into v.1 to v.7" in kept
+
+
+def test_the_time_line_of_a_look_has_each_stand_and_its_command_a_pattern(tmp_path):
+    table, stands = session(4)
+    for k in range(4):
+        write(tmp_path / f"w{k}.csv", "t,x,y", table)
+    for pauses, left_out in (("drop", True), ("keep", False)):
+        run("look", tmp_path / "*.csv", "--pauses", pauses, "-o", tmp_path / "look.html", "--force")
+        page = (tmp_path / "look.html").read_text("utf-8")
+        marks = re.findall(r'{"code": ?"pause", ?"message": ?"[^"]*", ?"start": ?([\d.]+), ?"length": ?([\d.]+)', page)
+        assert len(marks) == 4 * len(stands)
+        assert all((float(length) > 0.3) == left_out for _, length in marks)
+        assert f"unconstrain fit '{tmp_path}/*.csv'" in page
+
+
+@pytest.mark.parametrize(("jitter", "told"), [(0.05, False), (0.3, True)])
+def test_jitter_is_said_where_it_matters_by_inspect_and_fit_alike(tmp_path, jitter, told):
+    for k in range(3):
+        np.savetxt(tmp_path / f"w{k}.csv", stroke(k, jitter=jitter), delimiter=",", header="t,x,y", comments="")
+    for ran in (call("inspect", tmp_path), call("fit", tmp_path, *READ, "-o", tmp_path / "p.npz", "--force")):
+        assert ("irregular" in text(ran)) == told

@@ -144,7 +144,7 @@ def test_of_handwriting_most_files_with_other_columns_are_named_and_no_others(si
 @needs_rim
 def test_nothing_is_said_of_wiping_but_of_its_quaternions_where_they_are_used():
     recordings = [uc.read(path)[0] for path in sorted(RIM.glob("demo_*.csv"))]
-    assert codes(recordings) == [[]] * 6
+    assert codes(recordings) == [[]] * 5 + [["pause"]]  # two rests between bouts
     turned = [index for index, one in enumerate(recordings) if _turns_sign(one.select(("qx", "qy", "qz", "qw")))]
     assert turned == [2, 4]
     said = codes(recordings, uc.Recipe(("qx", "qy", "qz", "qw"), differentiate="savgol"))
@@ -367,9 +367,8 @@ def halted(values, row, rows):
 
 def stops_told(values, rate):
     recording = uc.Recording(("x", "y", "z"), values, np.arange(len(values)) / rate, "wipe")
-    return [
-        one for one in survey(recording, uc.Recipe(("x", "y", "z"), differentiate="savgol")).notes if one.code == "stop"
-    ]
+    found = survey(recording, uc.Recipe(("x", "y", "z"), differentiate="savgol"))
+    return [one for one in found.warnings if one.code == "pause"]
 
 
 def to_and_fro(rate, beside=0.0, noise=0.0, turn_s=2.0):
@@ -386,10 +385,13 @@ def test_a_stop_on_the_way_is_told_with_its_second_and_what_to_do(rate, noise):
     values = halted(clean, 3 * rate, round(0.4 * rate))
     values += 0.2 * noise * np.random.default_rng(1).standard_normal(values.shape)
     [said] = stops_told(values, rate)
-    seconds, start = map(float, re.search(r"for ([\d.]+) s from ([\d.]+) s", said.message).groups())
+    start, seconds = map(float, re.search(r"at ([\d.]+) s for ([\d.]+) s", said.message).groups())
     assert 3.0 - 0.2 <= start <= 3.0 + 5 / rate + 0.1
     assert 0.3 <= seconds <= 0.4 + 10 / rate + 0.1
-    assert "cut it in two there" in said.message
+    assert "cut it there: pauses='cut'" in said.message
+    [(first, last)] = said.spans
+    assert first == said.row
+    assert abs((last - first) / rate - seconds) < 0.01
     assert abs(said.row / rate - start) < 0.01
 
 
@@ -406,17 +408,17 @@ def test_turning_points_are_no_stops(rate, noise, beside, turn_s):
 def test_handwriting_and_contours_do_not_stop_on_the_way(recordings, every):
     for recording in list(recordings())[::every]:
         found = survey(recording, uc.Recipe(recording.columns, differentiate="savgol"))
-        assert "stop" not in [one.code for one in found.notes], recording.name
+        assert "pause" not in [one.code for one in found.warnings], recording.name
 
 
 @needs_rim
 def test_rests_between_bouts_of_wiping_are_stops():
     told = [
-        [one.message for one in survey(uc.read(path)[0]).notes if one.code == "stop"]
+        [one.message for one in survey(uc.read(path)[0]).warnings if one.code == "pause"]
         for path in sorted(RIM.glob("demo_*.csv"))
     ]
     assert [len(one) for one in told] == [0, 0, 0, 0, 0, 1]
-    assert "0.99 s from 11.9 s on" in told[5][0]
+    assert "at 11.9 s for 1 s, 24 s for 0.9 s" in told[5][0]
 
 
 def of_joints(names, size=40.0, units=None):
@@ -587,7 +589,7 @@ def test_settings_that_cure_survive_json_and_are_checked():
     assert uc.Recipe.from_dict(json.loads(json.dumps(recipe.to_dict()))) == recipe
     with pytest.raises(SettingError, match="quaternions: got a, b, expected 4 columns together"):
         uc.Recipe(quaternions=("a", "b"))
-    with pytest.raises(SettingError, match="pauses: got 'skip', expected one of drop, keep"):
+    with pytest.raises(SettingError, match="pauses: got 'skip', expected one of drop, keep, cut"):
         uc.Recipe(pauses="skip")
     with pytest.raises(SettingError, match="got 'yaw' as an angle, expected one of the states x, y; add it to them"):
         prepare(recording(), uc.Recipe(("x", "y"), differentiate="savgol", angles=("yaw",)))
@@ -815,7 +817,7 @@ def test_inspect_fit_and_diagnose_say_the_same(wrapped):
     options = (wrapped / "crank_*.csv", "--state", "x,yaw", "--differentiate")
     shown = json.loads(run("inspect", *options, "--json"))["demonstrations"]
     [first] = [one for one in shown[0]["warnings"] if one["code"] == "angle-wrap"]
-    assert set(first) == {"code", "message", "column", "row"}
+    assert set(first) == {"code", "message", "column", "row", "spans"}
     assert (first["column"], first["row"]) == ("yaw", 25)
     line = f"angle-wrap: 'crank_0', row 25 (line 27), column 'yaw': {first['message']}"
     assert line in run("inspect", *options).splitlines()

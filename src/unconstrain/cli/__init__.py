@@ -102,7 +102,7 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
     def recordings() -> Iterator[uc.Recording]:
         paths, how = uc.readers.expand(files), reading_of(**reading)
         every = (one for path in paths for one in uc.readers.read_blocks(path, how, whole=True))
-        for recording in left_in(every, reading["leave_out"]):
+        for recording in left_in(every, reading["leave_out"], recipe):
             first[:] = first or [recording]
             held = (recording.values == recording.values[:1].round()).all(axis=0)  # as is the number of a trial
             head = zip(recording.columns, held, recording.values[0] if len(recording) else held, strict=True)
@@ -136,7 +136,9 @@ def inspect(files: Sequence[str], as_json: bool, **reading: Any) -> None:
 
 
 def _plain(one: Any) -> dict[str, Any]:
-    return {"code": one.code, "message": as_typed(one.message), "column": one.column, "row": one.row}
+    return {name: getattr(one, name) for name in ("code", "column", "row", "spans")} | {
+        "message": as_typed(one.message)
+    }
 
 
 def _used(recipe: uc.Recipe, first: uc.Recording, surveys: Sequence[Any]) -> tuple[str, str, list[str]]:
@@ -195,6 +197,8 @@ def _cures(surveys: Sequence[Any]) -> dict[str, str]:
             found[option] = ",".join(dict.fromkeys(names))
     if "--angle" in found:  # which has no scale
         found.pop("--scale", None)
+    if len(surveys) == 1 and "pause" in [one.code for one in surveys[0].warnings]:
+        found["--pauses"] = "cut"
     found.pop("--action-is", None)  # which takes the actions for what they are
     if all("reversed" in [one.code for one in each.warnings] for each in surveys):
         found["--by"] = "savgol"  # the sign of all actions is turned
@@ -282,7 +286,7 @@ def fit(
     fitted = policy_of(model, variance, centres, scale, learner=taught, validation=uc.Folds(folds, hold_out))
     with shown("reading, placing, learning") as progress:
         stream = stream_of(paths, speed_power, progress, **reading)
-        with of_files(recordings_of(stream)):
+        with of_files(recordings_of(stream, recipe_of(**reading))):
             fitted = learn(fitted, stream, scheduler, to)
             moving = guided(fitted, to, stream)
             judged = judge_fit(moving, stream, told := uc.evaluation.diagnosis.states_told(fitted), scheduler)

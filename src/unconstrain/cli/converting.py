@@ -35,7 +35,7 @@ def convert(files: Sequence[str], output: str, align: bool, force: bool, as_json
     paths = uc.readers.expand(files)
     check_outputs((output,), paths, force)
     with shown("reading"):
-        every = left_in(uc.read(paths, **reading_of(**options).arguments), options["leave_out"])
+        every = left_in(uc.read(paths, **reading_of(**options).arguments), options["leave_out"], recipe_of(**options))
         recordings = [_timed(recording, options.get("rate")) for recording in every]
     if not recordings:
         raise ReadError(NOTHING_LEFT)

@@ -63,7 +63,8 @@ def diagnose(
     refuse_warnings(reading["strict"])
     states, actions = recipe.states or (), recipe.actions or recipe.directions
     judged = uc.evaluation.verdicts.of_diagnosis(found, uc.evaluation.diagnosis.to_record(found, states, actions))
-    verdict = as_noted(uc.evaluation.diagnosis.about_recordings(judged, demonstrations, recipe, policy))
+    judged = uc.evaluation.diagnosis.about_recordings(judged, demonstrations, recipe, policy)
+    verdict = as_noted(judged, len(demonstrations))
     if as_json:
         named = {"states": states, "actions": actions, "verdict": verdict.to_json()}
         click.echo(json.dumps(found.to_json() | named, indent=2))
@@ -72,8 +73,7 @@ def diagnose(
         counts = counted(len(demonstrations), "demonstration"), counted(len(found.undetermined), "sample")
         click.echo(f"{', '.join(counts)}; {said_recipe(recipe, first)}.")
         say_scale(policy, recipe)
-        unit = "" if policy.scale_ else unit_of(recipe.labels(first.units)[1])
-        _say(found, states, actions, unit, verbose)
+        _say(found, states, actions, "" if policy.scale_ else unit_of(recipe.labels(first.units)[1]), verbose)
     if report is not None:
         from ..pages.diagnosis import diagnosis_page
 

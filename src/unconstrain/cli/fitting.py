@@ -141,7 +141,8 @@ def learn(policy: uc.Policy, stream: uc.Stream, scheduler: str | None, to: Any) 
     else:
         uc.cluster.check_learner(policy.learner)  # before anybody is waited for
         if stream.leave_out - {stem(path) for path in stream.paths}:  # workers know their own files only
-            uc.readers.check_left_out(sorted(stream.leave_out), [one.name for one in recordings_of(stream)])
+            came = [one.name for one in recordings_of(stream, stream.recipe)]
+            uc.readers.check_left_out(sorted(stream.leave_out), came)
         with uc.cluster.connected(scheduler) as client:
             uc.cluster.fit_batches(policy, stream.parts(), client=client)
     if getattr(policy, "features", None) != "auto":

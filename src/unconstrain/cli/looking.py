@@ -20,7 +20,7 @@ from ..base.files import write
 from .constraining import arm_of, said_elsewhere
 from .informing import OF, TOLD, learnt_from
 from .printing import option_for_json, refuse_warnings, say_judged, say_verdict, say_written
-from .reading import as_options, options_for_reading, prepared, reading_of, typed
+from .reading import as_options, as_pattern, options_for_reading, prepared, reading_of, typed
 from .speaking import as_typed
 from .writing import check_outputs, option_for_force
 
@@ -259,4 +259,4 @@ def _to_fit(seen: Seen) -> tuple[str, str]:
     if seen.notes or "--state" not in given:
         acting = ("--by", "--action") if {"--by", "--action", "--differentiate"} & {*given} else ()
         known = as_options(seen.recipe, uc.readers.Reading(**seen.roles), [*given, *acting])
-    return shlex.join(["unconstrain", "fit", *map(str, seen.paths), *known, *given]), "-o policy.npz"
+    return f"unconstrain fit {as_pattern(seen.paths)} {shlex.join([*known, *given])}".rstrip(), "-o policy.npz"

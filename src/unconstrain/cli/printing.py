@@ -213,13 +213,16 @@ def judge_fit(moving: uc.Policy | uc.Guided, stream: uc.Stream, told: float | No
     to = guides(policy, demos) if moving is policy else None
     verdict = uc.evaluation.diagnosis.about_recordings(cured, demos, stream.recipe, moving)
     states = stream.recipe.labels(stream.first.units)[0]
-    verdict = to_copy(as_noted(verdict), click.get_current_context().params["output"], None, states)
+    verdict = to_copy(as_noted(verdict, count), click.get_current_context().params["output"], None, states)
     return Judged(verdict, ran.medians, *ran[3:], count, samples, 1.0 - missed, held_out, lost, noise, to)
 
 
-def as_noted(verdict: uc.evaluation.verdicts.Verdict) -> uc.evaluation.verdicts.Verdict:
-    """The same with what was noted: glitches, and units that differ; at best doubtful by these."""
-    told = click.get_current_context().meta
+def as_noted(verdict: uc.evaluation.verdicts.Verdict, count: int) -> uc.evaluation.verdicts.Verdict:
+    """The same with what was noted: stands in one recording alone; and, at best doubtful, glitches and units."""
+    told, name = click.get_current_context().meta, click.get_current_context().info_name or ""
+    if count == 1 and "pause" in told.get(TITLES, {}):
+        then = next_command(name, "--pauses", "cut", *["-o", "policy.npz"] * (name == "fit"), without=["pauses"])
+        verdict = verdict._replace(next=f"If demonstrations are between where it stands still, cut it there:\n{then}")
     if jumps := [title for title, one in told.get(TITLES, {}).get("glitch", {}).items() if not one.cured]:
         verdict = uc.evaluation.verdicts.of_glitches(verdict, listed(jumps, 4))
     if "rolled-out" in told.get(CODES, ()):

@@ -81,7 +81,10 @@ CURES = (
         "auto",
     ),
     of_words(
-        "--pauses", "drop keep", "Rows that stand still in the middle, before the start or after a sudden end.", "drop"
+        "--pauses",
+        "drop keep cut",
+        "Rows that stand still in the middle or at the ends; cut: apart there, too.",
+        "drop",
     ),
     of_words(
         "--glitches", "auto keep repair drop", "Samples far off: repair puts a line there, auto only of few.", "auto"
@@ -293,9 +296,10 @@ def of_files(recordings: Iterable[uc.Recording]) -> Iterator[None]:
         raise
 
 
-def recordings_of(stream: uc.Stream) -> Iterator[uc.Recording]:
-    """Read a stream's files once more."""
-    return (one for path in stream.paths for one in uc.readers.read_blocks(path, stream.reading, whole=True))
+def recordings_of(stream: uc.Stream, recipe: uc.Recipe) -> Iterator[uc.Recording]:
+    """Read a stream's files once more, cut as a recipe says."""
+    every = (one for path in stream.paths for one in uc.readers.read_blocks(path, stream.reading, whole=True))
+    return (piece for one in every for piece in uc.preparation.pieces(one, recipe))
 
 
 def next_command(name: str, *more: str, without: Sequence[str] = ()) -> str:
@@ -304,7 +308,7 @@ def next_command(name: str, *more: str, without: Sequence[str] = ()) -> str:
     known = {one.name for one in context.find_root().command.commands[name].params}  # type: ignore[attr-defined]
     others = [one.name or "" for one in context.command.params if one.name not in known]
     told = typed("files", "output", "report", "force", "verbose", "as_json", "strict", *others, *without)
-    return f"unconstrain {name} {_as_pattern(context.params['files'])} {shlex.join([*told, *more])}".rstrip()
+    return f"unconstrain {name} {as_pattern(context.params['files'])} {shlex.join([*told, *more])}".rstrip()
 
 
 def to_copy(
@@ -347,12 +351,12 @@ def as_options(recipe: uc.Recipe, how: uc.readers.Reading, without: Sequence[str
     return told
 
 
-def _as_pattern(files: Sequence[str]) -> str:
+def as_pattern(files: Sequence[str | Path]) -> str:
     """Files as they were typed; many by a pattern that stands for just these."""
     folder, pattern = Path(files[0]).parent, f"*{Path(files[0]).suffix}"
     if len(files) > 3 and sorted(map(Path, files)) == sorted(folder.glob(pattern)):
         return shlex.quote(str(folder / pattern))
-    return shlex.join(files)
+    return shlex.join(map(str, files))
 
 
 def likely_states(columns: Sequence[str]) -> tuple[str, ...]:
@@ -409,7 +413,7 @@ def prepared(paths: Sequence[Any], reading: dict[str, Any], notes: Mapping[str, 
     known = notes or {}
     asked = _but(uc.Recipe.from_dict(known.get("recipe", {})), recipe_of(**reading))
     how = _but(uc.readers.Reading(**reading_of(**known).roles), reading_of(**reading))
-    recordings = list(left_in(uc.read(paths, **how.arguments), reading["leave_out"]))
+    recordings = list(left_in(uc.read(paths, **how.arguments), reading["leave_out"], asked))
     if not recordings:
         raise ReadError(NOTHING_LEFT)
     with of_files(recordings):
@@ -434,10 +438,10 @@ def _but(kept: Any, asked: Any) -> Any:
     return replace(kept, **{name: value for name, value in vars(asked).items() if value != plain[name]})
 
 
-def left_in(recordings: Iterable[uc.Recording], names: Sequence[str]) -> Iterator[uc.Recording]:
-    """Recordings but those that are left out by name; a SettingError where a name is of none."""
+def left_in(recordings: Iterable[uc.Recording], names: Sequence[str], recipe: uc.Recipe) -> Iterator[uc.Recording]:
+    """Recordings, cut as a recipe says, but those that are left out by name; a SettingError where a name is of none."""
     came: dict[str, None] = {}
-    for recording in recordings:
+    for recording in (piece for one in recordings for piece in uc.preparation.pieces(one, recipe)):
         came[recording.name] = None
         if recording.name not in names:
             yield recording

@@ -194,7 +194,9 @@ def _reproduced(policy: Policy | Guided, demos: list[Demonstration], names: Sequ
         runs[key] = run[near(run.states)]
     picture = _drawn([("observed", _thin(demo)), *runs.items()], names)
     keys = ("observed", *runs)
-    caption = html.words("fit_rollout", name=demo.name, seconds=f"{step * len(demo):.3g}", tilt=f"{TILT:g}", runs=runs)
+    caption = html.words(
+        "fit_rollout", name=demo.name, seconds=f"{np.ptp(demo.times):.3g}", tilt=f"{TILT:g}", runs=runs
+    )
     return [html.section("A new surface", html.picture("rollout", [picture], caption, keys=keys))]
 
 

@@ -37,9 +37,6 @@ MOST_QUERIES = 4_000_000
 NEAR = 0.05
 """Within this share of the largest extent of the states is the same region."""
 
-PAUSE = 5.0
-"""So many usual intervals between samples that follow each other are a pause that was left out."""
-
 MOST_NUMBERS = 50_000
 """Of the covariances of a policy's weights; of more the page does not say where recordings tell the policy."""
 
@@ -136,23 +133,13 @@ def marks_of(recording: Recording, survey: Any, demonstration: Demonstration) ->
         row = None if remark.code == "clock-gap" else remark.row
         start = None if stamps is None or row is None else float(stamps[row]) - begin
         where = "" if remark.column is None else f" (column {remark.column})"
-        marks.append(Mark(remark.code, f"{remark.message}{where}", start))
-    return [*marks, *_pauses(kept, begin, marks)]
-
-
-def _pauses(times: Array | None, begin: float, marks: Sequence[Mark]) -> Iterator[Mark]:
-    """Intervals that are no gaps of the recording, and so were left out of the demonstration; told once."""
-    intervals = np.empty(0) if times is None else np.diff(times)
-    if times is None or len(intervals) < 2:
-        return
-    known = [gap.start for gap in marks if gap.code == "gap" and gap.start is not None]
-    usual = float(np.median(intervals))
-    for row in np.flatnonzero(intervals > PAUSE * usual):
-        start = float(times[row]) - begin
-        if not any(abs(start - gap) < 2 * usual for gap in known):
-            length = float(intervals[row])
-            said = "" if any(one.code == "pause" for one in marks) else f"stands still for {length:.3g} s, left out"
-            yield Mark("pause", said, start, length)
+        spans = (
+            [] if stamps is None or kept is None else [(stamps[one], stamps[last - 1]) for one, last in remark.spans]
+        )
+        left = [0.0 if ((kept > one) & (kept < last)).any() else float(last - one) for one, last in spans] or [0.0]
+        marks.append(Mark(remark.code, f"{remark.message}{where}", start, left[0]))
+        marks += [Mark(remark.code, "", float(spans[at][0]) - begin, left[at]) for at in range(1, len(spans))]
+    return marks
 
 
 def _packed(demos: Sequence[Demonstration], free: Sequence[Array] | None) -> Iterator[dict[str, Any]]:

@@ -44,7 +44,7 @@ class Remark(NamedTuple):
     """One thing to know about a recording.
 
     ``code`` is a word for programs, ``message`` a sentence for people; ``column``, ``row`` (from 0), and for people
-    ``place`` say where; ``cured`` is whether that was repaired on the way.
+    ``place`` say where, ``spans`` the half-open rows of each place of several; ``cured`` is whether that was repaired.
     """
 
     code: str
@@ -53,6 +53,7 @@ class Remark(NamedTuple):
     row: int | None = None
     place: str = ""
     cured: bool = False
+    spans: tuple[tuple[int, int], ...] = ()
 
     @property
     def warns(self) -> bool:

@@ -26,6 +26,7 @@ from .preparation.movements import prepare_one, warn
 from .preparation.plausibility.outlines import Outline
 from .preparation.plausibility.sets import compare, outline
 from .preparation.plausibility.subject import Subject
+from .preparation.surveys import pieces
 from .readers import Reading, check_left_out, expand, read_blocks
 from .readers.blocks import WHOLE_ROWS
 from .remarks import Remark
@@ -201,12 +202,12 @@ class Stream:
         self._outlines.clear()  # of a walk that was left
         for number, path in enumerate(self.paths, start=self._first_file):
             before = Counter[str]()
-            for recording in self._blocks(path, whole=not by_rows):
+            for recording in self._blocks(path, not by_rows, self.recipe):
                 with warnings.catch_warnings():
                     if self._walked:  # it was said on the first walk
                         warnings.simplefilter("ignore", UserWarning)
                     elif before[recording.name]:  # that it stands still in a part says nothing of the whole
-                        warnings.filterwarnings("ignore", "(rest|pause|stop): ", UserWarning)
+                        warnings.filterwarnings("ignore", "(rest|pause): ", UserWarning)
                     demonstration = self._prepared(recording, before[recording.name])
                 name = f"{number}/{recording.name}"
                 contents[name] = recording.content(self.recipe, contents.get(name))
@@ -217,9 +218,10 @@ class Stream:
                 yield name, demonstration
         self._rows, self.contents = read, [one.hexdigest() for one in contents.values()]
 
-    def _blocks(self, path: Path, whole: bool = False) -> Iterator[Recording]:
+    def _blocks(self, path: Path, whole: bool = False, cut: Recipe | None = None) -> Iterator[Recording]:
         with unchanged(path, self._stamps.setdefault(path, Stamp.of(path))):
-            for recording in read_blocks(path, self.reading, whole=whole):
+            every = read_blocks(path, self.reading, whole=whole)
+            for recording in (piece for one in every for piece in pieces(one, cut or Recipe())):
                 self._came[recording.name] = None
                 if recording.name not in self.leave_out:
                     yield recording

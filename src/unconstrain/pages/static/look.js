@@ -559,9 +559,9 @@
     const lengths = demos.map((demo) => `${demo.name}, ${number(lengthOf(demo))} ${clock}`);
     of("times").setAttribute("aria-label", `Time line: ${lengths.join("; ")}.`);
     of("notes-card").hidden = !warnings.length;
-    const signs = { "▲ warning": odd.some(({ mark }) => mark.start !== null && !mark.length),
+    const signs = { "▲ warning": warnings.some(({ mark }) => mark.start !== null && !mark.length),
       "dashes: gap": warnings.some(({ mark }) => mark.code === "gap"),
-      "thin line: pause, left out": warnings.some(({ mark }) => mark.code === "pause") };
+      "thin line: pause, left out": warnings.some(({ mark }) => mark.code === "pause" && mark.length > 0) };
     of("time-says").textContent = Object.keys(signs).filter((sign) => signs[sign]).join("; ");
     for (const { demo, mark } of warnings.filter((one) => one.mark.message)) {
       const item = made("li"), name = made("b", { textContent: `${mark.code}: ` });

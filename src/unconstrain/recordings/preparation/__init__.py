@@ -14,6 +14,7 @@ from .movements import PreparationWarning, differentiate, prepare, resample, tri
 from .plausibility.given import doubts_about
 from .plausibility.sets import doubts
 from .recipes import Recipe
+from .surveys import pieces as pieces
 from .surveys import survey, survey_set
 
 __all__ = [

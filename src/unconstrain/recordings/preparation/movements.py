@@ -23,8 +23,9 @@ from ..readers.clocks import usual
 from ..remarks import Remark
 from ..signals.jumps import glitches, repaired, seams
 from ..signals.smoothing import LEAST, kalman_velocities, white_noise
-from ..signals.stillness import pauses, rest_at_ends
+from ..signals.stillness import rest_at_ends, stands
 from .continuity import continuous
+from .cutting import between_stands
 from .decisions import decide
 from .plausibility.checks import examine, is_irregular
 from .plausibility.sets import PUSHED, compare, outline
@@ -80,7 +81,7 @@ def prepare(recordings: Recording | Sequence[Recording], recipe: Recipe | None =
     Returns
     -------
     list of Demonstration
-        One for each recording, in the same order.
+        One for each recording, or with ``pauses="cut"`` for each piece of it, in the same order.
 
     Warns
     -----
@@ -110,7 +111,7 @@ def prepare(recordings: Recording | Sequence[Recording], recipe: Recipe | None =
         raise InvalidDataError("got no recording, expected at least one.")
     whole, remarks = decide(recipe or Recipe(), every[0])
     warn(every[0].title, remarks, stacklevel=3)
-    subjects = [Subject(recording, whole) for recording in every]
+    subjects = [Subject(one, whole) for recording in every for one in between_stands(Subject(recording, whole))]
     demonstrations = [prepare_one(subject, stacklevel=4) for subject in subjects]
     for subject, remarks in zip(subjects, compare([outline(subject) for subject in subjects]), strict=True):
         warn(subject.recording.title, remarks, stacklevel=3)
@@ -438,10 +439,10 @@ def _split(piece: _Piece, recipe: Recipe) -> list[_Piece]:
     cuts = set((np.flatnonzero(np.diff(piece.times) > _longest(piece.times, recipe.max_gap_s)) + 1).tolist())
     if recipe.seams == "cut":
         cuts |= set(seams(piece.states))
-    drop = recipe.pauses == "drop"
+    drop = recipe.pauses != "keep"
     first, last = rest_at_ends(piece.states, _typical(piece.times)) if drop else (0, 0)
     rows = len(piece.times)
-    still = [(0, first), (rows - last, rows), *pauses(piece.states)] if drop else []
+    still = [(0, first), (rows - last, rows), *stands(piece.states, _typical(piece.times))] if drop else []
     bounds = sorted(cuts | {0, len(piece.times)} | {row for pause in still for row in pause})
     return [
         piece.at(slice(start, stop))

@@ -28,7 +28,7 @@ CHOICES = {
     "sort": (False, True),
     "glitches": ("auto", "keep", "repair", "drop"),
     "seams": ("keep", "cut"),
-    "pauses": ("drop", "keep"),
+    "pauses": ("drop", "keep", "cut"),
     "action_is": ("auto", "velocity", "target", "delta"),
 }
 """What the settings of few values may be."""
@@ -79,9 +79,10 @@ class Recipe:
         ``"auto"`` repairs at most three in a row, says so, and keeps more.
     seams : {"keep", "cut"}
         Whether nothing is smoothed across jumps to another place, as between demonstrations in one table.
-    pauses : {"drop", "keep"}
+    pauses : {"drop", "keep", "cut"}
         What becomes of rows in which nothing moves, in the middle of a demonstration, before it starts (who follows a
-        policy of the state and rests never starts) or after a sudden end. Time stamps stay as they are.
+        policy of the state and rests never starts) or after a sudden end. Time stamps stay as they are. ``"cut"``
+        makes a demonstration of what moves between any two stands, ``NAME.1``, ``NAME.2``, ...
     action_is : {"auto", "velocity", "target", "delta"}
         What the action columns are: velocities; states to come, so that the velocity of the states is learnt; changes
         to the next sample, so that they are divided by the interval. ``"auto"`` takes them for velocities unless the
@@ -154,6 +155,8 @@ class Recipe:
         return (
             self.actions is not None
             and self.action_is in ("auto", "velocity")
+            and self.pauses != "cut"
+            and self.pauses != "cut"
             and all(setting is None for setting in whole)
             and all(getattr(self, name) == getattr(defaults, name) for name in others)
         )

@@ -11,6 +11,7 @@ from ...base.display import counted, listed
 from ...base.errors import InvalidDataError, UnconstrainError
 from ..demonstration import Recording
 from ..remarks import Remark, titled
+from .cutting import between_stands
 from .decisions import in_radians, may_be_degrees, unused
 from .movements import Gap, find_gaps, prepare_one, window_used
 from .plausibility.checks import examine, once, rows_missing
@@ -95,7 +96,7 @@ def survey_set(recordings: Iterable[Recording], recipe: Recipe | None = None) ->
     """Look at recordings one by one, and at each beside the others; parameters as of :func:`survey`."""
     asked = recipe or Recipe()
     surveys, outlines, degrees = list[Survey](), [], tuple[str, ...]()
-    for recording in recordings:
+    for recording in (piece for one in recordings for piece in pieces(one, asked)):
         known = tuple(name for name in degrees if name in recording.columns)  # as of the first, which decides for a fit
         subject = subject_of(recording, replace(asked, degrees=known) if surveys else asked)
         degrees = degrees if surveys else subject.recipe.degrees or ()
@@ -171,6 +172,11 @@ def _prepared(subject: Subject) -> tuple[int | None, tuple[Remark, ...]]:
         return 0 if trimmed else None, (Remark("refused", said),)
     except UnconstrainError:  # what the options lack is said elsewhere
         return None, ()
+
+
+def pieces(recording: Recording, recipe: Recipe) -> list[Recording]:
+    """What a recipe with ``pauses="cut"`` makes of a recording before it is prepared; with others the recording."""
+    return between_stands(subject_of(recording, recipe)) if recipe.pauses == "cut" else [recording]
 
 
 def subject_of(recording: Recording, recipe: Recipe) -> Subject:

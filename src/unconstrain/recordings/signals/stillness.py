@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import BLOCK_ROWS, Array, slices
-from .jumps import resolution, stretches
+from .jumps import COUNTS, resolution, stretches
 
 SLOW = 0.08
 """Whoever moves by less than this share of a usual movement in the same time stands still."""
@@ -23,8 +23,8 @@ NOISE = 4.5
 SHORTEST = 10
 """Samples that a pause has at least."""
 
-SHORTEST_STOP_S, STOP_ROWS = 0.3, 6
-"""A stop takes so many seconds, and rows, at least: who turns a corner is slow for a shorter time."""
+SHORTEST_STOP_S, STOP_ROWS, BESIDE_S = 0.3, 6, 4.0
+"""A stop takes so many seconds, and rows, at least, and what moves within so many seconds of it tells it."""
 
 HALVES, HALF, ADDED_UP, SHARED = 2.0, 4, 3.0, 1.5
 """Means of both halves of a rest are nearer than so many standard errors of their difference, by white noise; or, where
@@ -40,11 +40,8 @@ SHORTER = 60
 
 LOUD, RISE, FINEST = 0.25, 0.7, 0.02
 """A stop is seen where noise is below the first share of usual movement, and begins and ends at the second share, near
-it. Noise counts as the third share at least.
-
-No stop is found in 210 strokes of handwriting, 12 contours and ten bouts of wiping; two in six recordings of wiping
-are, rightly, rests between bouts. Of stops of 0.3 to 0.6 s that are put in, 97 % are found. Strokes to and fro on a
-line, which turn in 4 s or more, seem to stop from noise of a hundredth of them on."""
+it. Noise counts as the third share at least. None is found in handwriting and contours; strokes to and fro on a line,
+which turn in 4 s or more, seem to stop from noise of a hundredth of them on."""
 
 
 def noise_share(values: Array) -> Array:
@@ -74,13 +71,29 @@ def is_noise(values: Array) -> bool:
     return bool((noise_share(values) > 0.5).all())
 
 
-def pauses(values: Array) -> list[tuple[int, int]]:
-    """Half-open stretches of rows, with movement before and after, in which nothing moves.
+def stands(values: Array, interval: float = 0.0) -> list[tuple[int, int]]:
+    """Half-open stretches of rows (T, n), with movement before and after, in which nothing moves.
 
-    Parameters
-    ----------
-    values : ndarray, shape (T, n)
+    Each is told by what moves within :data:`BESIDE_S` of it, whatever else there is; where it takes a good share of all
+    rows, or their interval is not known (0 or NaN, seconds), by the whole.
     """
+    found = pauses(values)
+    if not 0.0 < interval <= SHORTEST_STOP_S / STOP_ROWS:
+        return found
+    shortest, beside = round(SHORTEST_STOP_S / interval), round(BESIDE_S / interval)
+    for first, last in _slow_runs(values, shortest, 0.9)[1]:
+        start = max(first - beside, 0) // shortest * shortest  # a row or two of one run make no other window
+        near = values[start : -(-(last + beside) // shortest) * shortest]
+        least = SLOW * float(np.linalg.norm(_usual(near, shortest)))
+        both = [*pauses(near), *_stops(near, shortest)]
+        both = [one for one in both if min(_spread(near[: one[1]]), _spread(near[one[0] :])) > least]
+        inner = [(start + one, start + two) for one, two in both if start + one < last and first < start + two]
+        found += [run for run in inner if min(run[0], len(values) - run[1]) >= shortest]
+    return stretches(np.isin(np.arange(len(values)), [row for run in found for row in range(*run)]))
+
+
+def pauses(values: Array) -> list[tuple[int, int]]:
+    """Stretches as :func:`stands` finds, of a good share of all rows (T, n)."""
     if len(values) < 4 * SHORTEST:
         return []
     smooth = noise_share(values) < 0.3
@@ -91,29 +104,21 @@ def pauses(values: Array) -> list[tuple[int, int]]:
     return _slow(moving, shortest) or _motionless(moving, max(shortest, 2 * SHORTEST))
 
 
-def stops(values: Array, shortest: int) -> list[tuple[int, int]]:
-    """Half-open stretches of so many rows (T, n) or more in which nothing moves, however long the recording is.
+def _stops(values: Array, shortest: int) -> list[tuple[int, int]]:
+    """Stretches of so many rows (T, n) or more in which nothing moves.
 
     Means of neighbouring thirds of so many rows are compared in units of their noise. At a turning point these are near
     each other, too, but not long before and after: there a stop is left at the usual pace, to go somewhere.
     """
-    moved, runs, fast = _slow_runs(values, shortest)
+    moved, runs, fast = _slow_runs(values, shortest, 0.5)
     last = 1 - 2 * (shortest // 3)
     found = [run for run in runs if _is_sudden(moved, run[0], run[1] + last, shortest, fast)]
-    left = _left(found, values, LEFT * np.ptp(values, axis=0))
-    least = SLOW * float(np.linalg.norm(_usual(values, shortest))) if left else 0.0
-    return [one for one in left if min(_spread(values[: one[1]]), _spread(values[one[0] :])) > least]
+    exact = [_exact(values, run, NOISE * _noise(values)) or run for run in found]
+    return _left([run for run in exact if run[1] - run[0] >= shortest], values, LEFT * np.ptp(values, axis=0))
 
 
 def rest_at_ends(values: Array, interval: float = 0.0) -> tuple[int, int]:
-    """Rows (T, n) before the start, and after an end that is sudden, in which nothing moves.
-
-    Parameters
-    ----------
-    values : ndarray, shape (T, n)
-    interval : float
-        Seconds between rows; 0 or NaN where it is not known.
-    """
+    """Rows (T, n) before the start, and after an end that is sudden, in which nothing moves; ``interval`` as above."""
     known = 0.0 < interval <= SHORTEST_STOP_S / STOP_ROWS
     shortest = round(SHORTEST_STOP_S / interval) if known else max(20, len(values) // 10)
     first, last = _standing(values, shortest), _standing(values[::-1], shortest, only_sudden=True)
@@ -179,21 +184,22 @@ def _near(values: Array, place: Array, far: Array) -> int:
     return int(gone[0]) if len(gone) else len(values)
 
 
-def _slow_runs(values: Array, shortest: int) -> tuple[Array, list[tuple[int, int]], float]:
-    """How far means before and after each row are apart, stretches where hardly, and what is fast; none where loud."""
+def _slow_runs(values: Array, shortest: int, share: float) -> tuple[Array, list[tuple[int, int]], float]:
+    """How far means before and after each row are apart, stretches where hardly beside a quantile, and what is fast."""
     if len(values) < 4 * shortest:
         return values[:0, 0], [], np.inf
     span = shortest // 3
     moved = np.sqrt(sum(_moved(column, span) ** 2 for column in values.T))
-    usual, noise = float(np.quantile(moved, 0.5)), np.sqrt(values.shape[1]) + 1.0
+    noise = np.sqrt(values.shape[1]) + 1.0
+    usual = float(np.quantile(moved[moved > noise], share)) if (moved > noise).any() else 0.0
     runs = _stretches(moved <= max(SLOW * usual, noise), 2 * span - 1, shortest) if noise <= LOUD * usual else []
     return moved, runs, RISE * usual
 
 
 def _is_sudden(moved: Array, first: int, last: int, least: int, fast: float) -> bool:
-    """Whether there is fast movement on both sides of a slow stretch, within its length or a least number of rows."""
+    """Whether movement just before and after a slow stretch, in their geometric mean, is fast."""
     near = max(last - first, least)
-    return bool(min(moved[max(first - near, 0) : first + 1].max(), moved[last - 1 :][:near].max()) > fast)
+    return bool(moved[max(first - near, 0) : first + 1].max() * moved[last - 1 :][:near].max() > fast**2)
 
 
 def _moved(column: Array, span: int) -> Array:
@@ -202,7 +208,8 @@ def _moved(column: Array, span: int) -> Array:
     means = (sums[span:] - sums[:-span]) / span
     moved = np.abs(means[span:] - means[:-span])
     noise = float(np.median(np.abs(np.diff(column, 3)))) / (0.6745 * np.sqrt(20.0)) * np.sqrt(2.0 / span)
-    return np.asarray(moved / (max(noise, FINEST * float(np.quantile(moved, 0.9))) or 1.0))
+    count = float(resolution(column[:, None])[0]) / COUNTS
+    return np.asarray(moved / (max(noise, count, FINEST * float(np.quantile(moved, 0.9))) or 1.0))
 
 
 def _slow(values: Array, shortest: int) -> list[tuple[int, int]]:
@@ -212,19 +219,24 @@ def _slow(values: Array, shortest: int) -> list[tuple[int, int]]:
         usual = _usual(values, span)
         near = np.maximum(noise, 0.3 * usual / span)
         runs = _runs(values, span, SLOW * usual, shortest)
-        exact = [_around(values, *run, np.maximum(near, _trembling(values[slice(*run)]))) for run in runs]
-        long = [one for one, run in zip(exact, runs, strict=True) if 2 * (one[1] - one[0]) > run[1] - run[0]]
-        if found := _left(long, values, LEFT * np.ptp(values, axis=0)):
+        exact = [_exact(values, run, near) for run in runs]
+        if found := _left([run for run in exact if run is not None], values, LEFT * np.ptp(values, axis=0)):
             return found
         span *= 2
     return []
 
 
+def _exact(values: Array, run: tuple[int, int], near: Array) -> tuple[int, int] | None:
+    """The stretch around the middle of another that is near one place; None where it is less than half as long."""
+    start, stop = _around(values, *run, np.maximum(near, _trembling(values[slice(*run)])))
+    return (start, stop) if 2 * (stop - start) > run[1] - run[0] else None
+
+
 def _trembling(values: Array) -> Array:
     """How far rows are from one place by their own noise, shape (n,): nothing for columns that go on meanwhile."""
     inner = values[len(values) // 4 : -(len(values) // 4)]
-    parts = _parts(inner)
-    gone = np.abs(parts[HALF:].mean(axis=0) - parts[:HALF].mean(axis=0))
+    half = len(parts := _parts(inner)) // 2
+    gone = np.abs(parts[half:].mean(axis=0) - parts[:half].mean(axis=0))
     steps, noise = np.median(np.abs(np.diff(parts, axis=0)), axis=0), np.maximum(inner.std(axis=0), _noise(values))
     return np.asarray(np.where(gone < ADDED_UP * steps / np.sqrt(HALF), NOISE * noise, 0.0))
 

@@ -12,7 +12,7 @@ from ....base.display import counted, listed
 from ...readers.clocks import UNITS, find_clock, usual
 from ...remarks import Remark
 from ...signals.orientations import TURNS, wraps
-from ...signals.stillness import SHORTEST_STOP_S, STOP_ROWS, is_noise, noise_share, rest_at_ends, stops
+from ...signals.stillness import is_noise, noise_share, rest_at_ends
 from ..meaning import are_backwards, are_targets
 from .subject import FLIPS, GAP_INTERVALS, LEAST_ROWS, Subject
 
@@ -141,7 +141,7 @@ def irregular(subject: Subject) -> Remark | None:
     if rows := rows_missing(steady, typical):
         said = f"{'1 row is' if rows == 1 else f'{rows} rows are'} missing between the gaps"
         return Remark("rows-missing", f"{said}, as the time stamps show, {to}")
-    return Remark("irregular", f"time stamps are irregular, {to}")
+    return Remark("irregular", f"time stamps are irregular, {to}") if steady.std() > 2 * STEADY * typical else None
 
 
 def rows_missing(intervals: Array, typical: float) -> int:
@@ -268,33 +268,23 @@ def targets(subject: Subject) -> Remark | None:
 
 def pause(subject: Subject) -> Remark | None:
     """Standing still in the middle."""
-    if not (found := subject.pauses):
+    if not (found := subject.stands):
         return None
-    rows = sum(stop - start for start, stop in found)
-    done = "left out (pauses='keep')" if subject.recipe.pauses == "drop" else "kept (pauses='drop')"
-    message = f"stands still for {subject.lasting(rows)} in the middle; they are {done}."
-    return Remark("pause", message, row=subject.row(found[0][0]))
-
-
-def stop(subject: Subject) -> Remark | None:
-    """Stopping in the middle for less long than a pause."""
-    if (stamps := subject.stamps) is None or not subject.moves or subject.topic is not None or subject.pauses:
-        return None
-    interval = float(np.median(np.diff(stamps)))
-    if not 0.0 < interval <= SHORTEST_STOP_S / STOP_ROWS:
-        return None
-    found = stops(subject.clean, round(SHORTEST_STOP_S / interval))
-    told = [f"{stamps[last - 1] - stamps[row]:.2g} s from {stamps[row] - stamps[0]:.3g} s on" for row, last in found]
-    said = f"stops on the way for {listed(told, 3)}, and moves on: learnt as rest there; cut it in two there, or leave "
-    return Remark("stop", f"{said}it out with leave_out=.", row=subject.row(found[0][0])) if found else None
+    rows, stamps = sum(stop - start for start, stop in found), subject.stamps
+    done = {"drop": "left out (pauses='keep')", "keep": "kept (pauses='drop')", "cut": "left out"}
+    message = f"stands still for {subject.lasting(rows)} in the middle; they are {done[subject.recipe.pauses]}"
+    at = [] if stamps is None else [(stamps[row] - stamps[0], subject.interval * (last - row)) for row, last in found]
+    message += f": at {listed([f'{begin:.3g} s for {lasting:.2g} s' for begin, lasting in at], 3)}" * bool(at)
+    spans = tuple((subject.row(row), subject.row(last - 1) + 1) for row, last in found)
+    message += ". If demonstrations are between, cut it there: pauses='cut'."
+    return Remark("pause", message, row=spans[0][0], spans=spans)
 
 
 def rest(subject: Subject) -> Remark | None:
     """Standing still before the start, and after an end that is sudden."""
     if subject.recipe.still or not subject.moves:
         return None
-    interval = 0.0 if subject.stamps is None else float(np.median(np.diff(subject.stamps)))
-    dropped, ends = subject.recipe.pauses == "drop", rest_at_ends(subject.clean, interval)
+    dropped, ends = subject.recipe.pauses != "keep", rest_at_ends(subject.clean, subject.interval)
     lasting = [
         f"{subject.lasting(rows)} {at}"
         for rows, at in zip(ends, ("before it starts", "at its end"), strict=True)
@@ -346,7 +336,6 @@ CHECKS: tuple[Callable[[Subject], Remark | None], ...] = (
     seam,
     targets,
     pause,
-    stop,
     rest,
     at_rest,
     all_zero,

@@ -15,7 +15,7 @@ from ....base.arrays import Array
 from ...demonstration import Recording
 from ...signals.jumps import Glitch, glitches, repaired, seams, stretches, topics
 from ...signals.orientations import Wrap, continuous_quaternions, quaternion_flips, rotation_flips, wraps
-from ...signals.stillness import pauses
+from ...signals.stillness import stands
 from ..continuity import continuous, unturned
 from ..recipes import Recipe, select, stamps
 
@@ -181,15 +181,20 @@ class Subject:
         return [row for row in found if intervals[row - 1] <= GAP_INTERVALS * float(np.median(intervals))]
 
     @cached_property
-    def pauses(self) -> list[tuple[int, int]]:
+    def stands(self) -> list[tuple[int, int]]:
         """Half-open stretches of :attr:`states` that stand still in the middle, between seams."""
         bounds = [0, *self.seams, len(self.rows)] if self.moves and self.topic is None else []
-        pieces = [(first, pauses(self.clean[first:last])) for first, last in pairwise(bounds)]
+        pieces = [(first, stands(self.clean[first:last], self.interval)) for first, last in pairwise(bounds)]
         return [(first + start, first + stop) for first, found in pieces for start, stop in found]
+
+    @cached_property
+    def interval(self) -> float:
+        """Median seconds between :attr:`rows`; 0 where they have no stamps."""
+        return 0.0 if self.stamps is None else float(np.median(np.diff(self.stamps)))
 
     def lasting(self, rows: int) -> str:
         """So many rows of all, in seconds, too, where these are known."""
-        seconds = "" if self.stamps is None else f" ({rows * float(np.median(np.diff(self.stamps))):.3g} s)"
+        seconds = "" if self.stamps is None else f" ({rows * self.interval:.3g} s)"
         return f"{rows} of {len(self.rows)} rows{seconds}"
 
     def row(self, index: int) -> int:
