@@ -62,6 +62,39 @@ def test_what_was_held_is_found_and_improves_the_policy(one_row):
     assert error(policy) < 5e-3
 
 
+SPATIAL = Arm.from_dh([0.0, 0.4, 0.35], [np.pi / 2, 0.0, 0.0], [0.3, 0.0, 0.0], [2.0, 2.0, 2.0])
+PLACE = np.array([0.2, 0.6, 1.2])
+
+
+def bent(states):
+    """To a place, round about it."""
+    e = PLACE - states
+    return np.column_stack([0.6 * e[:, 0] + 0.5 * e[:, 1], 0.6 * e[:, 1] - 0.5 * e[:, 0], 0.7 * np.tanh(1.2 * e[:, 2])])
+
+
+def on_tables(seed, count=10, free=0):
+    """Movements with the hand on another table each time, the last of them free, with noise of two per cent."""
+    rng = np.random.default_rng(seed)
+    for index in range(count):
+        normal, start = rng.normal(size=(1, 3)), PLACE + rng.uniform(-1, 1, 3) * [0.9, 0.6, 0.7]
+        held = None if index >= count - free else lambda x, t, normal=normal: normal @ SPATIAL.jacobian(x)[:, :3]
+        shown = uc.rollout(bent, start, 100, 0.05, held)
+        noise = 0.02 * np.sqrt((shown.actions**2).mean()) * rng.normal(size=shown.actions.shape)
+        yield uc.Demonstration(shown.states, shown.actions + noise, shown.times)
+
+
+@pytest.mark.parametrize(("seed", "free"), [(1, 0), (3, 0), (3, 2)])
+def test_rows_that_each_demonstration_held_alone_are_found(seed, free):
+    demos, errors = list(on_tables(seed, free=free)), {}
+    for jacobian in (SPATIAL.jacobian, None):
+        policy = uc.ParametricPolicy(uc.Affine(), uc.Robust(jacobian=jacobian)).fit_demonstrations(demos)
+        states = uc.stack(demos).states
+        errors[policy.solution_.method] = np.linalg.norm(policy(states) - bent(states))
+    (method, known), (_, unknown) = errors.items()
+    assert method.startswith("own rows of the Jacobian (of ")
+    assert known < 0.75 * unknown
+
+
 def test_much_noise_does_not_speak_against_the_right_kinematics():
     """Noise turns the directions of actions, by which a long policy looks worse than one that misses what is held."""
     demos = demonstrate([[[1.0, 0.0]]], noise=0.2)

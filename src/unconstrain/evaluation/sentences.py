@@ -76,6 +76,7 @@ _WAYS = {
     "likelihood": "samples look free, or constrained at random",
     "hybrid": "consistent with the actions, and as near to them as that allows",
     "rows of the Jacobian": "with so many directions of the task held, in each kind of demonstration",
+    "own rows of the Jacobian": "with directions of the task held, by each demonstration its own",
 }
 
 

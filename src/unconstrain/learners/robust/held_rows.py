@@ -82,6 +82,7 @@ class HeldRows:
     def __init__(self, actions: Array, jacobians: Array, groups: NDArray[np.intp], noise: float) -> None:
         self._groups, self._noise = groups, noise
         self._count, self._size = int(groups.max()) + 1, float(np.vecdot(actions, actions).mean()) / actions.shape[1]
+        self._dimension = actions.shape[1]
         self._moved = np.einsum("nrd,nd->nr", jacobians, actions)  # v = J u
         self._metric = jacobians @ jacobians.swapaxes(1, 2)  # J Jᵀ
         self._some = np.arange(len(groups)) % -(-len(groups) // (SAMPLES_OF_KIND * self._count)) == 0
@@ -98,6 +99,14 @@ class HeldRows:
             labels[found[1]] = len(rows)
             rows.append(found[0])
         return Kinds(labels, tuple(rows))
+
+    def alone(self) -> Kinds:
+        """A kind for each demonstration, of the rows that it held as far as noise tells, with motion left; or none."""
+        most = self._dimension - 1
+        every = [self._held(np.array([group]), self._noise)[:most] for group in range(self._count)]
+        shown = np.array([len(rows) > 0 for rows in every])
+        labels = np.where(shown, np.cumsum(shown) - 1, UNKNOWN)
+        return Kinds(labels, tuple(rows for rows in every if len(rows)))
 
     def _largest(self, left: NDArray[np.intp], variance: float) -> tuple[Array, NDArray[np.intp]] | None:
         """Λ of the kind that holds most samples in most directions, and the demonstrations of it."""

@@ -21,12 +21,17 @@ from .noise import corrected
 KNOWING = -1.0
 """Softness of those who know more of the constraints than actions tell."""
 
+OF_POSITION = 3
+"""Of a hand's Jacobian the first three rows are of its position: six fit a short movement by chance."""
+
 Jacobian = Callable[[Array], Array]
 """States (N, n) to Jacobians (N, r, d)."""
 
 
 def with_jacobian(samples: Samples, jacobian: Jacobian, noise: float) -> Iterator[Candidate]:
     """A candidate for each way in which demonstrations fall into kinds that held the same rows of a Jacobian.
+
+    And those for which each held rows of its own, of all or of the hand's position.
 
     Parameters
     ----------
@@ -51,6 +56,10 @@ def with_jacobian(samples: Samples, jacobian: Jacobian, noise: float) -> Iterato
             yield _candidate(
                 f"rows of the Jacobian (within {misfit:.1%}) held: {held}", samples, kinds, jacobians, noise
             )
+    for count in dict.fromkeys((jacobians.shape[1], min(jacobians.shape[1], OF_POSITION))):
+        some = jacobians[:, :count]
+        if (kinds := HeldRows(samples.actions, some, samples.groups, noise).alone()).rows:
+            yield _candidate(f"own rows of the Jacobian (of {count})", samples, kinds, some, noise)
 
 
 def _evaluated(jacobian: Jacobian, samples: Samples) -> Array:
