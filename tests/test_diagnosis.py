@@ -239,7 +239,7 @@ class TestCommand:
             "Noise and misfit: ",
             "Learnt as likelihood: ",
             "Estimated squared error of other ways to learn, as times that of this (more is worse): ",
-            "Trust: The policy at these states, up to noise and misfit of ",
+            "Trust: The policy at these states, to about ",
             "Next: Demonstrate where nobody was.",
         ):
             assert words in " ".join(said.split())

@@ -1,5 +1,7 @@
 """The default learner with the Jacobian of a task: which of its rows were held is found, and used where it explains."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -93,6 +95,16 @@ def test_rows_that_each_demonstration_held_alone_are_found(seed, free):
     (method, known), (_, unknown) = errors.items()
     assert method.startswith("own rows of the Jacobian (of ")
     assert known < 0.75 * unknown
+
+
+@pytest.mark.parametrize(("seed", "first"), [(1, "free"), (4, "flat")])
+def test_free_movements_of_an_arm_that_are_nearly_flat_are_not_said_to_be_held(seed, first):
+    demos = list(on_tables(seed, free=2))
+    found = uc.evaluation.diagnose(uc.ParametricPolicy(uc.Affine()).fit_demonstrations(demos), demos)
+    assert [one.looks for one in found.movements] == 8 * ["constrained"] + [first, "free"]
+    said = uc.evaluation.diagnosis.about_freedom(found)
+    assert 0.75 < int(re.search(r"(\d+)% held", said)[1]) / 100 < 0.85
+    assert ("recordings cannot tell" in said) == (first == "flat")
 
 
 def test_much_noise_does_not_speak_against_the_right_kinematics():

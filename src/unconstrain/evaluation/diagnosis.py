@@ -278,12 +278,13 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
     free = solution.free if len(solution.free) == len(states) else None
     known &= free is None or len({one.states.tobytes() for one in demos}) >= ENOUGH  # a copy tells nothing more
     together = belief.together if free is not None and len(belief.together) == len(states) else known
+    jitter = float(np.sqrt(robust.noise_by_differences(actions, groups)))
     return Diagnosis(
         method=solution.method,
         candidates={name: one.risk for name, one in belief.candidates.items()},
         noise=solution.noise,
         noise_share=float(np.sqrt(d)) * solution.noise / typical,
-        jitter=float(np.sqrt(robust.noise_by_differences(actions, groups))),
+        jitter=jitter,
         typical=typical,
         directions=models * solution.directions,
         directions_determined=solution.determined_share,
@@ -292,7 +293,7 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
         free_share=solution.free_share,
         undecided_share=belief.undecided_share,
         regions=_regions(policy, demos, undetermined, known, typical, known | together),
-        movements=_movements(demos, undetermined, known, free),
+        movements=_movements(demos, undetermined, known, free, max(jitter, 0.1 * SMALL * typical)),
         suspects=() if free is None else tuple(places_of(belief.suspects, zip(names_of(demos), demos, strict=True))),
         planes=len(planes_of(demos)),
         told=known.astype(int) + (known | together),
@@ -423,10 +424,10 @@ def _least_determined(policy: Policy, states: Array) -> tuple[Array, Array]:
 
 
 def _movements(
-    demos: list[Demonstration], undetermined: Array, known: NDArray[np.bool_], free: Array | None
+    demos: list[Demonstration], undetermined: Array, known: NDArray[np.bool_], free: Array | None, noise: float
 ) -> tuple[Movement, ...]:
     groups, found = stack(demos).groups, list[Movement]()
-    for index, (name, plane) in enumerate(zip(names_of(demos), crossed(demos), strict=True)):
+    for index, (name, plane) in enumerate(zip(names_of(demos), crossed(demos, noise), strict=True)):
         part = groups == index
         mean, told = None if free is None else float(free[part].mean()), float(known[part].mean())
         how = None if mean is None else looks(mean, told, plane)

@@ -150,9 +150,11 @@ def about_freedom(found: Diagnosis) -> str:
     if not others:
         said = "No sample is said to be free: each demonstration looks held, by a plane of its own all along"
         return f"{said}; a short free stroke may, too. {look}"
-    free = sum(one.samples * (one.free or 0.0) for one in others) / sum(one.samples for one in found.movements)
+    every = sum(one.samples for one in found.movements)
+    free, all_ = (sum(one.samples * (one.free or 0.0) for one in some) / every for some in (others, found.movements))
     share = free if len(others) < len(found.movements) else found.free_share
-    unsure = found.undecided_share * (found.undecided_share >= LITTLE)
+    unsure = found.undecided_share + all_ - free  # of those on a plane that others cross
+    unsure *= unsure >= LITTLE
     much, held, open_ = percents((share, 1.0 - share - unsure, unsure))
     said = f"Of the samples {much} look free (nothing that shows above the noise held them), {held} held"
     if unsure:

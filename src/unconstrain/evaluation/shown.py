@@ -15,6 +15,9 @@ from .marks import ENOUGH, Mark, Verdict
 FLAT, ONE = 0.1, 0.03
 """Held are directions of less spread than the first share of the longest, and all on one plane below the second."""
 
+WITHIN = 3.0
+"""Who keeps to a plane moves across it by no more than so many times the noise."""
+
 SLOW, LONG, MOSTLY = 0.2, 0.1, 0.9
 """Slower than the first share of a usual speed is rest, for more than the second share of the samples a long one, of
 which the third is slow: at its end noise of positions has the largest velocities."""
@@ -47,14 +50,18 @@ def planes_of(demonstrations: Sequence[Demonstration]) -> Array:
     return each[:, 2] if together and each[:, 2].any(axis=1).all() and not each[:, 1].any() else whole[:0]
 
 
-def crossed(demonstrations: Sequence[Demonstration]) -> list[bool]:
-    """Whether each demonstration in space keeps to a plane that others move across, as what is held does."""
+def crossed(demonstrations: Sequence[Demonstration], noise: float = np.inf) -> list[bool]:
+    """Whether each demonstration in space keeps to a plane that others move across, as what is held does.
+
+    To it it keeps if it moves across it by no more than thrice the noise, a standard deviation of each action.
+    """
     states, actions, groups = stack(list(demonstrations))
     found = [False] * len(demonstrations)
     for index in range(len(found) if (states.shape[1], actions.shape[1]) == (3, 3) else 0):
-        held, others = flat(states[groups == index])[0], actions[groups != index]
+        held, (own, others) = flat(states[groups == index])[0], (actions[groups == index], actions[groups != index])
         across = ((others @ held[2]) ** 2).sum() > FLAT**2 * (others**2).sum()
-        found[index] = bool(held[2].any() and not held[1].any() and across)
+        kept = np.sqrt(((own @ held[2]) ** 2).mean()) <= WITHIN * noise
+        found[index] = bool(held[2].any() and not held[1].any() and across and kept)
     return found
 
 

@@ -273,8 +273,9 @@ def of_diagnosis(found: Diagnosis, first: str = "") -> Verdict:
     if found.noise_share > 3 * SMALL:
         mark = no_better(mark)
         said = f"{said[:-1]}, though noise is {percent(found.noise_share)} of a typical action."
-    trust = f"The policy {'at these states' if share == 1 else 'where three or more tell it'}, up to noise and misfit "
-    trust += f"of {percent(found.noise_share)} of a typical action"
+    spread = np.hypot(found.undetermined, found.from_noise)[found.told == 2]
+    trust = f"The policy {'at these states' if share == 1 else 'where three or more tell it'}, to about "
+    trust += f"{percent(np.linalg.norm(spread) / max(len(spread), 1) ** 0.5)} of a typical action, a standard deviation"
     if open_spread := share == 1 and (worst := found.regions[0].along) > SMALL:
         trust += f"; at the place that comes next, up to {percent(worst)}, where noise leaves more open"
     trust = f"{trust}." * (round(share, 2) > 0)
