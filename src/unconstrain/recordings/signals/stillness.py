@@ -157,18 +157,22 @@ def _goes_nowhere(values: Array, white: float, usual: float) -> bool:
     Parts of it show what noise there is, white or not: by noise neighbours differ as much as halves do, but movement,
     however slow, adds up.
     """
+    if _spread(values) > max(2.0 * white, SLOW * usual):
+        return False
     parts = _parts(values)
     half = len(parts) // 2
     gone = float(np.linalg.norm(parts[half:].mean(axis=0) - parts[:half].mean(axis=0)))
     steps = float(np.median(np.linalg.norm(np.diff(parts, axis=0), axis=1))) if len(values) >= 4 * HALF else 0.0
     shared = steps > SHARED * white * np.sqrt(2.0 * len(parts) / len(values))
     chance = max(2.0 * HALVES * white / np.sqrt(len(values)), shared * ADDED_UP * steps / np.sqrt(HALF))
-    return gone <= max(chance, SLOW * FINEST * usual) and _spread(values) <= max(2.0 * white, SLOW * usual)
+    return gone <= max(chance, SLOW * FINEST * usual)
 
 
 def _parts(values: Array) -> Array:
     """Means of so many parts, one after the other, shape (2 HALF, n) or fewer."""
-    return np.array([part.mean(axis=0) for part in np.array_split(values, min(2 * HALF, len(values)))])
+    count = min(2 * HALF, len(values))
+    sizes = len(values) // count + (np.arange(count) < len(values) % count)
+    return np.asarray(np.add.reduceat(values, np.cumsum(sizes) - sizes, axis=0) / sizes[:, None])
 
 
 def _spread(values: Array) -> float:
