@@ -156,8 +156,8 @@ def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Repl
 def _strays(guided: Any, plain: Any, demos: Any, recipe: Recipe, _: Any, units: Mapping[str, str], *__: Any) -> str:
     """How far guided runs go from recorded paths, the rest of a sentence; empty where unguided ones do nearly so."""
     most, least = (
-        max((cKDTree(one.done.states).query(one.run.states)[0].max() for one in runs if one.held), default=0.0)
-        for runs in (guided, plain)
+        max((cKDTree(one.done.states).query(one.run.states)[0].max() for one in runs if one.held), default=none)
+        for runs, none in ((guided, 0.0), (plain, np.inf))
     )
     if most <= max(FARTHER * least, STRAYS * float(np.linalg.norm(np.ptp(stack(demos).states, axis=0)))):
         return ""
