@@ -97,7 +97,7 @@ def _missed(judged: Any, moving: Any, demonstrations: Sequence[uc.Demonstration]
 
 
 def _left(judged: Any, moving: Any, demonstrations: Sequence[uc.Demonstration]) -> Any:
-    """A verdict with how many samples leave where a policy was learnt, if most of more than noise is missed there."""
+    """A verdict with how many samples leave where a policy learnt, if it misses more than noise, most of it there."""
     along, verdicts = uc.evaluation.metrics.along_motion, uc.evaluation.verdicts
     far = [support_of(innermost(moving), one.states) < verdicts.NEARBY for one in demonstrations]
     off = [one[rows] for one, rows in zip(demonstrations, far, strict=True) if rows.any()]
