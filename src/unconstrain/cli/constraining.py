@@ -242,7 +242,8 @@ def _numbers(learnt: uc.LearntConstraint) -> dict[str, Any]:
 
 def options_for_held(what: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Add the options that name a constraint."""
-    plane = f"Normal of a plane {what}; one number for each action, such as 0,0.3,1."
+    plane = f"Normal of a plane {what}; one number for each action, such as 0,0.3,1. Of joints, in the space of their "
+    plane += "velocities, not of the workshop."
     learnt = click.option("--constraint", type=click.Path(), help=f"Learnt constraint {what} (.npz).")
     return with_options(click.option("--plane", type=numbers, help=plane), learnt)
 

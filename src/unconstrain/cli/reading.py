@@ -306,6 +306,7 @@ def next_command(name: str, *more: str, without: Sequence[str] = ()) -> str:
     """Another command, to copy: of the files and options of this one, as far as it has them."""
     context = click.get_current_context()
     known = {one.name for one in context.find_root().command.commands[name].params}  # type: ignore[attr-defined]
+    known -= set() if "jacobian" in known else {"tip"}  # which there belongs to another option
     others = [one.name or "" for one in context.command.params if one.name not in known]
     told = typed("files", "output", "report", "force", "verbose", "as_json", "strict", *others, *without)
     return f"unconstrain {name} {as_pattern(context.params['files'])} {shlex.join([*told, *more])}".rstrip()

@@ -76,7 +76,8 @@ def rollout(
 ) -> None:
     """Roll POLICY out, freely or under a constraint, to a CSV.
 
-    It stops where demonstrations no longer support it, and says so; where they do not support the start, it is refused.
+    It stops where demonstrations no longer support it (--least-support); a start there is refused, unless the policy is
+    guided. Where "no demonstration passes near" is not as far: farther than nearly all recorded states, but followed.
     """
     check_outputs(() if output == "-" else (output,), (policy, constraint), force)
     moving, notes = fitted_policy(policy), uc.storage.load_notes(policy)

@@ -73,7 +73,7 @@ def score(
     judged = verdicts.of_forbidden(_left(found.verdict, moving, demonstrations), whole.get("npoe", 0.0))
     verdict = to_copy(verdicts.of_unit(judged, _times(learnt, states)), policy, notes, of=files)
     if not as_json:
-        _print_scores(verdict, [*before, *rows], whole, {"hardly moved": still, "too short": short}, found.in_figures)
+        _print_scores(verdict, [*before, *rows, whole], (still, short), found.in_figures, demonstrations)
         return
     told = {"policy": policy, "rows": rows, "all": whole, "learnt_from": known, "learnt": before, "hardly_moved": still}
     more = {"too_short": short, "in_planes": _known(planes), "replayed": found.medians, "ran": found.in_figures}
@@ -97,14 +97,15 @@ def _missed(judged: Any, moving: Any, demonstrations: Sequence[uc.Demonstration]
 
 
 def _left(judged: Any, moving: Any, demonstrations: Sequence[uc.Demonstration]) -> Any:
-    """A verdict with how many samples leave where a policy was learnt, if most of what it misses is there."""
+    """A verdict with how many samples leave where a policy learnt, if it misses more than noise, most of it there."""
     along, verdicts = uc.evaluation.metrics.along_motion, uc.evaluation.verdicts
     far = [support_of(innermost(moving), one.states) < verdicts.NEARBY for one in demonstrations]
     off = [one[rows] for one, rows in zip(demonstrations, far, strict=True) if rows.any()]
     usual = float(_motion(demonstrations).sum() / (size := sum(map(len, demonstrations)))) ** 0.5
     missed, motion = along(moving, demonstrations, usual)
     there = along(moving, off, usual)[0] if off else 0.0
-    if missed <= (1 - verdicts.MOSTLY) * motion or there <= 0.5 * missed:
+    noise = uc.evaluation.metrics.missed_for_noise(moving, demonstrations) ** 2 * motion
+    if missed - noise <= (1 - verdicts.MOSTLY) * motion or there <= 0.5 * missed:
         return judged
     left = f"leave where it was learnt, at {percent(sum(map(len, off)) / size)} of their samples"
     said = f"{judged.said} What it misses is likely ({percent(there / missed)}) as these recordings {left}."
@@ -112,20 +113,22 @@ def _left(judged: Any, moving: Any, demonstrations: Sequence[uc.Demonstration]) 
     return judged._replace(said=said, next=then.rstrip())
 
 
-def _print_scores(verdict: Any, rows: Any, whole: dict[str, Any], left: dict[str, list[str]], ran: str) -> None:
+def _print_scores(verdict: Any, rows: Any, left: Sequence[list[str]], ran: str, of: Sequence[Any]) -> None:
     """A verdict, scores of each demonstration and all, why others have none, and figures of runs from their starts."""
     say_verdict(verdict)
-    head = ["demonstration", "fast samples", "explains", "normalised inconsistency", "nPOE", "nCPE"][: len(whole) - 1]
-    each = [_row(*one.values()) for one in (*rows, whole)]
-    none = [[name, "", f"{why}: no score"] for why, names in left.items() for name in names]
-    print_table(head, [*each[:-1], *none, each[-1]])
+    noisy = any(one.noise is not None for one in of)  # which samples are fast is not known else
+    head = ["demonstration", "fast " * noisy + "samples", "explains", "normalised inconsistency", "nPOE", "nCPE"]
+    each = [_row(noisy, *one.values()) for one in rows]
+    why = zip(("hardly moved", "too short"), left, strict=True)
+    none = [[name, "", f"{how}: no score"] for how, names in why for name in names]
+    print_table(head[: len(rows[-1]) - 1], [*each[:-1], *none, each[-1]])
     click.echo(f"Run from the same starts: {ran}." if ran else "", nl=bool(ran))
 
 
-def _row(name: str, size: int, fast: int, share: float, *rest: float | None) -> list[str]:
+def _row(noisy: bool, name: str, size: int, fast: int, share: float, *rest: float | None) -> list[str]:
     said = percent(share) if share >= -1 else "worse than standing still"
     said = said if fast >= LEAST else "slow: cannot be judged"
-    return [name, f"{fast} of {size}", said, *(number(one, "{:.4g}") for one in rest)]
+    return [name, f"{fast} of {size}" if noisy else str(size), said, *(number(one, "{:.4g}") for one in rest)]
 
 
 def _long_enough(demonstrations: Sequence[uc.Demonstration]) -> list[uc.Demonstration]:

@@ -26,7 +26,7 @@ MIDDLE = 0.2
 """Where V is as level as nearer to the middle than this share of the radius, motion is slower in proportion."""
 
 STRAY = 0.1
-"""The pace is the one learnt from the demonstrations to within this share."""
+"""The speed along the cycle is that of B, learnt from the demonstrations, to within this share."""
 
 AROUND, TIMED = 64, 12
 """Places on the cycle at which its pace is measured, and how often it is then set to the demonstrated one."""
@@ -88,17 +88,18 @@ class Orbit(Shown):
     @property
     def promise(self) -> str:
         """What is added, when that is right, and what is guaranteed, in words."""
-        middle = ", ".join(f"{each:.4g}" for each in self.potential.goal)
+        middle, off = ", ".join(f"{each:.4g}" for each in self.potential.goal), 1 / (1 - STRAY) - 1
         return (
             "Where the policy does not lead to the cycle, and round it, a velocity is added that does. Right where "
             "every movement is to go round; ways from new starts are not learnt. A closed surface without dents that "
             f"the cycle lies on, fitted to the demonstrations and typically {self.radius:.4g} off its middle "
             f"({middle}), attracts from every state but that middle, free and under any flat constraint that it is "
             f"told of ({TOLD}): the distance from it shrinks at rates of {PULL * self.rate:.4g} to "
-            f"{RUSH * self.rate:.4g} per second. A plane through its inside cuts it in one cycle, on which the pace is "
-            f"within {STRAY:.0%} of the one learnt wherever the plane lets it turn. With steps of up to "
-            f"{self.dt:.3g} s, to which twice any delay counts, the cycle is wider by a few per cent of its size, with "
-            "longer ones by more. A constraint that moves or is not told, or an obstacle, may lead off it."
+            f"{RUSH * self.rate:.4g} per second. A plane through its inside cuts it in one cycle. Where the plane lets "
+            f"it turn, a round takes the time learnt of that plane, within {off:.0%}: on those of demonstrations about "
+            f"as long as theirs did, on average. With steps of up to {self.dt:.3g} s, to which twice any delay "
+            "counts, the cycle is wider by a few per cent of its size, with longer ones by more. A constraint that "
+            "moves or is not told, or an obstacle, may lead off it."
         )
 
     def correction(self) -> Correction:

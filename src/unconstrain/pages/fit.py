@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.display import counted_off, innermost, listening
+from ..base.display import counted_off, innermost, listening, percent
 from ..base.errors import InvalidDataError, SettingError
 from ..constraints import Plane
 from ..evaluation import diagnosis, metrics, ncpe, nupe, verdicts
@@ -152,14 +152,17 @@ def _which(n: int, names: Sequence[str]) -> str:
 
 def _drawn(tracks: list[tuple[str, Demonstration]], names: Sequence[str]) -> object:
     """Keys and movements over two or three states, or one state over time."""
-    first = tracks[0][1]
-    n = first.states.shape[1]
-    if n >= 3:
-        axes = (names[0], names[1], names[2])
-        return figures.movements([(key, demo.states[:, :3]) for key, demo in tracks], labels=axes)
-    flat = [(key, demo.states if n == 2 else np.column_stack([_times(demo), demo.states])) for key, demo in tracks]
-    labels = (names[0], names[1]) if n == 2 else (_time_label(first), names[0])
-    return figures.paths(flat, labels=labels, equal=n == 2)
+    if len(names) > 1:
+        return _lines([(key, demo.states) for key, demo in tracks], names)
+    flat = [(key, np.column_stack([_times(demo), demo.states])) for key, demo in tracks]
+    return figures.paths(flat, labels=(_time_label(tracks[0][1]), names[0]), equal=False)
+
+
+def _lines(tracks: list[tuple[str, Array]], names: Sequence[str]) -> object:
+    """Keys and states (T, n) over the first two or three of them."""
+    if len(names) > 2:
+        return figures.movements([(key, one[:, :3]) for key, one in tracks], labels=(names[0], names[1], names[2]))
+    return figures.paths(tracks, labels=(names[0], names[1]))
 
 
 def _replays(runs: Sequence[Replay], said: str, names: Sequence[str]) -> list[html.Markup]:
@@ -188,16 +191,21 @@ def _reproduced(policy: Policy | Guided, demos: list[Demonstration], names: Sequ
     tilt = np.radians(TILT)
     normal = np.cos(tilt) * axes[:, 0] + np.sin(tilt) * axes[:, -1]
     step = float(np.median(np.diff(demo.times)))
-    runs, (moving, near) = {}, bounded(policy, stack(demos).states)
+    drawn, away, (moving, near) = [("observed", _thin(demo).states)], [], bounded(policy, stack(demos).states)
     for key, held in (("roll-out, free", None), ("roll-out, new plane", Plane(normal))):
         run = rollout(moving, demo.states[0], len(demo), step, held, least_support=0.0)
-        runs[key] = run[near(run.states)]
-    picture = _drawn([("observed", _thin(demo)), *runs.items()], names)
-    keys = ("observed", *runs)
-    caption = html.words(
-        "fit_rollout", name=demo.name, seconds=f"{np.ptp(demo.times):.3g}", tilt=f"{TILT:g}", runs=runs
-    )
-    return [html.section("A new surface", html.picture("rollout", [picture], caption, keys=keys))]
+        run = run[near(run.states)]
+        [support] = _support(innermost(policy), [run]) or [np.ones(len(run))]
+        far = support < verdicts.NEARBY
+        away.append(percent(far.mean()) if far.any() else "")
+        on = far | np.append(far[1:], False)  # lines of both kinds meet
+        parts = (key, far), ("extrapolated", ~on)
+        drawn += [(name, np.where(off[:, None], np.nan, run.states)) for name, off in parts if not off.all()]
+    start, plane = (",".join(f"{float(f'{one:.4g}'):g}" for one in each) for each in (demo.states[0], normal))
+    told = {"name": demo.name, "seconds": f"{np.ptp(demo.times):.3g}", "tilt": f"{TILT:g}", "away": away}
+    caption = html.words("fit_rollout", **told, start=start, plane=plane, dt=f"{step:.4g}", steps=len(demo))
+    keys = tuple(dict.fromkeys(key for key, _ in drawn))
+    return [html.section("A new surface", html.picture("rollout", [_lines(drawn, names)], caption, keys=keys))]
 
 
 def _field(policy: Policy | Guided, demos: list[Demonstration], names: Sequence[str]) -> object:
@@ -256,8 +264,8 @@ def _errors(policy: Policy, demos: list[Demonstration], held_out: list[Array] | 
     every = range(len(demos))
     shown = every if len(demos) <= MOST_ROWS else sorted(_worst(demos, held_out or learnt)[:MOST_ROWS])
     rows = [cells(demos[index].name or f"demonstration {index + 1}", [index]) for index in shown]
-    words = {"support": support is not None, "truth": known, "held_out": held_out is not None}
-    note = html.words("fit_errors", shown=len(shown), every=len(demos), **words)
+    words = {"support": support is not None, "truth": known, "held_out": held_out is not None, "most": MOST_REFITTED}
+    note = html.words("fit_errors", shown=len(shown), every=len(demos), samples=sum(map(len, demos)), **words)
     return html.table(header, [*rows, cells("all", every)], note=note, rules=(len(shown),))
 
 

@@ -40,6 +40,9 @@ MODELS = {"auto": "", "Affine": "So may a --model that bends: 'local', or 'auto'
 """What else may cure a policy of some features, by what they are called; of others :data:`ANOTHER`."""
 ANOTHER = "So may another --model, such as cubic; 'auto' tries several."
 
+FARTHER, STRAYS = 3.0, 0.05
+"""Guided runs stray if they go so many times as far off as unguided ones, and by this share of the whole extent."""
+
 ROUNDS = 1.5
 """Rounds, at least, that have a pace, and of which the last is compared with the first: a bent reach may make one."""
 
@@ -140,8 +143,26 @@ def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Repl
     more = f" {but}, {plain.in_words}." if plain.in_words else ""
     worse = order(guided.verdict.mark) > order(plain.verdict.mark)
     then = verdicts.UNGUIDED if worse else judged.next.partition(" 'unconstrain fit --guided")[0]  # it is
+    judged = judged._replace(said=judged.said + more, next=then)
+    if strays := _strays(guided.runs, plain.runs, *of):
+        guided = guided._replace(in_words=f"{strays}{f'; else {guided.in_words}' * bool(guided.in_words)}")
+        swing = " Where demonstrations swing in to the cycle, leave that out (--trim 1,0: of each the first second)."
+        then = verdicts.UNGUIDED + swing * hasattr(policy.aim_, "turn")
+        judged = verdicts.doubted(judged, f"guided, {strays}")._replace(next=then)
     both = ["; unguided ".join(filter(None, one)) for one in zip(guided[3:], plain[3:], strict=True)]
-    return Replayed(judged._replace(said=judged.said + more, next=then), *guided[1:3], *both)
+    return Replayed(judged, *guided[1:3], *both)
+
+
+def _strays(guided: Any, plain: Any, demos: Any, recipe: Recipe, _: Any, units: Mapping[str, str], *__: Any) -> str:
+    """How far guided runs go from recorded paths, the rest of a sentence; empty where unguided ones do nearly so."""
+    most, least = (
+        max((cKDTree(one.done.states).query(one.run.states)[0].max() for one in runs if one.held), default=none)
+        for runs, none in ((guided, 0.0), (plain, np.inf))
+    )
+    if most <= max(FARTHER * least, STRAYS * float(np.linalg.norm(np.ptp(stack(demos).states, axis=0)))):
+        return ""
+    unit = unit_of(recipe.labels(units)[0]) or "(unit of the states)"
+    return f"it strays up to {most:.3g} {unit} from the recorded paths, unguided {least:.3g} at most"
 
 
 def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Any, demos: Any) -> verdicts.Verdict:

@@ -43,7 +43,10 @@ THINNED = (
     "what solution_.free is about; those that look wrong are left out, but not listed."
 )
 
-EXPLAINS_LITTLE = "The policy explains next to nothing of held-out motion ({:.2g}): look at columns, units and groups=."
+EXPLAINS_LITTLE = "The policy explains next to nothing of held-out motion ({:.2g}){}."
+LITTLE_IN_COMMON = ", but {} of what it learnt from: demonstrations have too little in common. Demonstrate between them"
+LOOK_AT = ": look at columns, units, and what tells demonstrations apart (groups= in Python, --group typed)"
+FITTED_WELL = 0.9  # where more of what was learnt from is explained, columns and units are not to blame
 NOTHING_MOVED = "No action is other than zero: nothing can be learnt of them. Look at the columns."
 BY_AGREEMENT = (
     "One model misses no more than noise of all demonstrations, but each is needed: of some that are left out in turn, "
@@ -76,7 +79,7 @@ class SampleLearner(Learner):
         thinned = _thinned(training)
         listed = suspects[:0] if thinned else suspects  # which they are among all is not known
         found = replace(found, belief=replace(found.believed, suspects=listed))
-        return replace(found, notes=(*found.notes, *thinned, *_warned(found.believed, training.samples)))
+        return replace(found, notes=(*found.notes, *thinned, *_warned(found.believed, found.weights, training.samples)))
 
     def _learnt(self, training: Training, everything: Samples) -> Solution:
         samples = held_out_together(everything.counted)
@@ -417,11 +420,14 @@ def _compared(best: Mapping[str, Candidate], views: Mapping[str, Samples]) -> Co
     return Comparison(list(best.values()), np.minimum(noise, min(one.variance for one in best.values())), each)
 
 
-def _warned(belief: Belief, samples: Samples) -> tuple[str, ...]:
+def _warned(belief: Belief, weights: Array, samples: Samples) -> tuple[str, ...]:
     """Warn of what makes a policy next to worthless; the warning, for its notes."""
     if samples.energy > 0.0 and not belief.held_out_score < LEAST_EXPLAINED:
         return ()
-    said = EXPLAINS_LITTLE.format(belief.held_out_score) if samples.energy > 0.0 else NOTHING_MOVED
+    missed, motion = along_motion(samples.actions, samples.predict(weights), samples.counts, noise=belief.noise**2)
+    learnt = 1.0 - missed / (motion or 1.0)
+    why = LITTLE_IN_COMMON.format(percent(learnt)) if learnt > FITTED_WELL else LOOK_AT
+    said = EXPLAINS_LITTLE.format(belief.held_out_score, why) if samples.energy > 0.0 else NOTHING_MOVED
     warnings.warn(said, UserWarning, stacklevel=9)
     return (said,)
 

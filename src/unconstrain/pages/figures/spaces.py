@@ -7,7 +7,7 @@ import numpy as np
 
 from ...base.arrays import Array, require_extra
 from .planes import broken
-from .style import COLOURS, PALETTE, figure, keyed
+from .style import COLOURS, DASHES, PALETTE, figure, keyed
 
 
 def movements(
@@ -35,7 +35,8 @@ def movements(
     for key, corners in plates:
         axes.add_collection3d(faces([corners], alpha=0.12, **keyed(key, **own.get(key, {}))))
     for key, states in tracks:
-        axes.plot(*broken(states).T, **keyed(key, linewidth=0.9 if key == "training" else 1.3, **own.get(key, {})))
+        look = {"linewidth": 0.9 if key == "training" else 1.3, "linestyle": DASHES.get(key, "-")}
+        axes.plot(*broken(states).T, **keyed(key, **look, **own.get(key, {})))
     seen = np.concatenate([states for _, states in tracks])
     low, high = np.nanmin(seen, axis=0), np.nanmax(seen, axis=0)
     size = np.maximum(high - low, 0.25 * max(float((high - low).max()), 1e-12))

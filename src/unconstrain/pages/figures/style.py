@@ -28,6 +28,7 @@ COLOURS = {
     "held out": "#cc79a7",
     "roll-out, free": "#56b4e9",
     "roll-out, new plane": "#e69f00",
+    "extrapolated": "#80868b",
 }
 """The same on every page."""
 
@@ -43,10 +44,11 @@ LABELS = {
     "observed": "demonstration",
     "training": "training data",
     "held out": "held out",
+    "extrapolated": "no demonstration passes near",
 }
 
 MARKERS = {"direct": "o", "inconsistency": "s", "hybrid": "D", "robust": "^"}
-DASHES = {"direct": "--", "inconsistency": ":", "hybrid": "-", "robust": "-"}
+DASHES = {"direct": "--", "inconsistency": ":", "hybrid": "-", "robust": "-", "extrapolated": "--"}
 
 INK = "#33373d"
 RULE = "#e3e6ea"
