@@ -50,8 +50,8 @@ FOLLOWED = 0.1
 """What held is known, or that nothing did, if the policy under it misses less than this share of squared actions."""
 
 SPANNED = 0.4
-"""A plane tells that it held what spreads over it by this share of its longest extent, across its longest way, too: what
-bends less lies nearly in some plane, whatever held it."""
+"""A plane tells that it held what spreads over it by this share of its longest extent, across that, too: what bends
+less lies nearly in some plane, whatever held it."""
 
 AWAY = 10.0
 """Farther from the middle of demonstrations than this many times their extent, a run has no size: it ran away."""
@@ -203,7 +203,7 @@ def replays(
 
 
 def _told(policy: Any, demo: Demonstration) -> bool:
-    """Whether a demonstration tells what held it: by a straight way, by spanning a plane, or as the policy explains it."""
+    """Whether a demonstration tells what held it: it is straight, spans a plane, or is as the policy says."""
     rows, across, bent = (diagnosis.flat(demo.states, share)[0] for share in (diagnosis.FLAT, diagnosis.ONE, SPANNED))
     actions = policy(demo.states)
     off = demo.actions - actions + actions @ rows.T @ rows
