@@ -369,7 +369,7 @@ def test_fit_says_what_it_did(files, tmp_path):
         "The inconsistency determined 100% of 6 weight directions.",
     ]
     assert re.fullmatch(r"Share of the motion explained, .*: 1 on the training data, 1 where held out\.", lines[3])
-    assert lines[4].startswith("Run from the same starts: for 2 of 8 demonstrations that look flat ")
+    assert lines[4].startswith("Run from the same starts: for 1 of 8 demonstrations that look flat ")
     assert lines[5:] == [f"policy: {tmp_path / 'p.npz'}"]
 
 

@@ -45,11 +45,17 @@ options_for_arm = with_options(
 )
 
 
-def jacobian_of(urdf: str | None, tip: str | None) -> Any:
-    """Joint angles (N, n) to the Jacobian (N, 6, n) of a robot's hand, by the options; None where there are none."""
+def hand_of(urdf: str | None, tip: str | None) -> Any:
+    """The chain of a robot up to its hand, by the options; None where there are none."""
     if (urdf is None) != (tip is None):
         raise SettingError("--jacobian and --tip belong together: a URDF file, and the link that is held.")
-    return None if urdf is None else arm_of(urdf, tip).jacobian
+    return None if urdf is None else arm_of(urdf, tip)
+
+
+def jacobian_of(urdf: str | None, tip: str | None) -> Any:
+    """Joint angles (N, n) to the Jacobian (N, 6, n) of a robot's hand, by the options; None where there are none."""
+    arm = hand_of(urdf, tip)
+    return None if arm is None else arm.jacobian
 
 
 @click.command(epilog="\b\nExample:\n  unconstrain constraint wipe_*.csv --state x,y,z --differentiate -o plate.npz")
@@ -243,24 +249,27 @@ def _numbers(learnt: uc.LearntConstraint) -> dict[str, Any]:
 def options_for_held(what: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Add the options that name a constraint."""
     plane = f"Normal of a plane {what}; one number for each action, such as 0,0.3,1. Of joints, in the space of their "
-    plane += "velocities, not of the workshop."
+    plane += "velocities; with --jacobian three, in that of the hand."
     learnt = click.option("--constraint", type=click.Path(), help=f"Learnt constraint {what} (.npz).")
-    return with_options(click.option("--plane", type=numbers, help=plane), learnt)
+    return with_options(click.option("--plane", type=numbers, help=plane), learnt, options_for_arm)
 
 
 def held_of(
-    plane: tuple[float, ...] | None, path: str | None, recipe: uc.Recipe, at: Any, actions: int, meaning: str
+    plane: tuple[float, ...] | None, path: str | None, arm: Any, recipe: uc.Recipe, at: Any, actions: int
 ) -> uc.constraints.Constraint | None:
-    """The constraint of the options, a plane or a learnt one, to be used at states (N, n) that a recipe prepares."""
+    """The constraint of the options, a plane or a learnt one, to be used at states (N, n) that a recipe prepares.
+
+    Where there is an ``arm``, its hand is on the plane.
+    """
     if plane is not None and path is not None:
         raise SettingError("--plane: got --constraint too, expected one of them.")
+    if arm is not None and plane is None:
+        raise SettingError("--jacobian: got no --plane, expected that of the hand; a --constraint knows its own robot.")
+    if arm is not None and ({arm.joints} != {len(at[0]), actions} or recipe.centre):
+        got = f"{len(at[0])} states{' relative to a mean' * recipe.centre} and {actions} actions"
+        raise SettingError(f"--jacobian: got {got}, expected angles and velocities of {arm.joints} joints.")
     if plane is not None:
-        if len(plane) != actions:
-            raise SettingError(f"--plane: got {len(plane)} numbers, expected {actions}, {meaning}.")
-        import numpy as np
-
-        with of_option("--plane"):
-            return uc.constraints.Plane(np.array(plane))
+        return _plane_of(plane, arm, actions)
     if path is None:
         return None
     learnt = loaded(path, uc.LearntConstraint)
@@ -278,6 +287,18 @@ def held_of(
     if notes.get(NAMED):
         click.echo(f"Note: {path}: {MAY_LEAVE.format(notes[NAMED])}", err=True)
     return learnt if learnt.task or HELD_BY not in notes else uc.constraints.mechanisms.restored(notes[HELD_BY])
+
+
+def _plane_of(plane: tuple[float, ...], arm: Any, actions: int) -> uc.constraints.Constraint:
+    """A plane of actions; or of the hand of an arm, one row of its Jacobian."""
+    import numpy as np
+
+    count, meaning = (actions, "one for each action") if arm is None else (3, "a normal in the frame of its base")
+    if len(plane) != count:
+        raise SettingError(f"--plane: got {len(plane)} numbers, expected {count}, {meaning}.")
+    with of_option("--plane"):
+        held = uc.constraints.Plane(np.array(plane))
+    return held if arm is None else lambda states, _times: held.normal @ arm.jacobian(states)[:, None, :3]
 
 
 def said_elsewhere(notes: Mapping[str, Any], states: Any) -> str:

@@ -18,7 +18,7 @@ import unconstrain as uc
 from ..base.display import counted, innermost, unit_of
 from ..base.errors import DivergedError, InvalidDataError, SettingError, SupportEndsWarning
 from ..base.files import write
-from .constraining import held_of, options_for_held
+from .constraining import hand_of, held_of, options_for_held
 from .informing import TOLD, doubted
 from .printing import doubt_degrees, of_option, option_for_json, say_verdict, say_written, show_warning
 from .reading import fitted_policy, numbers, of_words, to_copy
@@ -79,20 +79,19 @@ def rollout(
     It stops where demonstrations no longer support it (--least-support); a start there is refused, unless the policy is
     guided. Where "no demonstration passes near" is not as far: farther than nearly all recorded states, but followed.
     """
-    check_outputs(() if output == "-" else (output,), (policy, constraint), force)
+    check_outputs(() if output == "-" else (output,), (policy, constraint, how["jacobian"]), force)
     moving, notes = fitted_policy(policy), uc.storage.load_notes(policy)
     learnt, recipe = innermost(moving), uc.Recipe.from_dict(notes.get("recipe", {}))
-    if len(start) != learnt.n_features_in_:
-        raise SettingError(f"--start: got {len(start)} numbers, expected {learnt.n_features_in_}, one for each state.")
     _check_start(moving, recipe, start, how["least_support"])
     places = learnt.n_outputs_ if how["order"] == 2 else len(start)  # what a constraint is a function of
     at = replace(recipe, states=recipe.states and recipe.states[:places])
-    held = held_of(plane, constraint, at, [start[:places]], learnt.n_outputs_, "one for each action")
+    arm = hand_of(how.pop("jacobian"), how.pop("tip"))
+    held = held_of(plane, constraint, arm, at, [start[:places]], learnt.n_outputs_)
     task = held.target if isinstance(held, uc.LearntConstraint) and held.task else None
     round_ = [_obstacle(given, len(start)) for given in obstacles]
     path, why, trouble = _as_far_as_it_goes(moving, list(start), constraint=held, task=task, obstacles=round_, **how)
     named = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))
-    kept = "the plane" if plane is not None else getattr(held, "title", "")
+    kept = f"the plane{' that its hand keeps to' * bool(arm)}" if plane is not None else getattr(held, "title", "")
     verdict = to_copy(_supported(moving, path, why, round_, kept, notes), policy, notes)
     accelerations = named.actions or tuple(f"a{name}" for name in (named.states or ())[:places])
     columns = ["t", *sum(replace(named, actions=accelerations if how["order"] == 2 else None).labels({}), ())]
@@ -124,6 +123,8 @@ def _obstacle(given: tuple[float, ...], n: int) -> uc.motion.obstacles.Ellipsoid
 
 def _check_start(policy: uc.Policy | uc.Guided, recipe: uc.Recipe, start: tuple[float, ...], least: float) -> None:
     """Note angles that look like degrees; refuse to begin where nothing was demonstrated, unless it is guided."""
+    if len(start) != (count := innermost(policy).n_features_in_):
+        raise SettingError(f"--start: got {len(start)} numbers, expected {count}, one for each state.")
     doubt_degrees("--start", start, recipe)
     if innermost(policy) is not policy:
         return

@@ -14,7 +14,7 @@ import unconstrain as uc
 
 from ..base.display import innermost, listed, percent
 from ..base.errors import InvalidDataError, SettingError
-from .constraining import held_of, options_for_held
+from .constraining import hand_of, held_of, options_for_held
 from .informing import TOLD, learnt_from
 from .printing import explained, number, option_for_json, print_table, refuse_warnings, say_verdict
 from .progress import shown
@@ -48,12 +48,12 @@ def score(
     from ..pages.fit import replayed
 
     moving, notes, verdicts = fitted_policy(policy), uc.storage.load_notes(policy), uc.evaluation.verdicts
-    learnt = innermost(moving)
+    learnt, arm = innermost(moving), hand_of(reading.pop("jacobian"), reading.pop("tip"))
     with shown("reading"):
         demonstrations, recipe, recordings = prepared(files, reading, notes)
     refuse_warnings(reading["strict"])
     states, known = uc.stack(demonstrations).states, learnt_from(learnt, notes, recordings, recipe)
-    held = held_of(plane, constraint, recipe, states, learnt.n_outputs_, "one for each action")
+    held = held_of(plane, constraint, arm, recipe, states, learnt.n_outputs_)
     if (support_of(learnt, states) < uc.models.SUPPORTED).mean() > 0.5:
         click.echo(f"Note: {policy}: learnt far from most of these states: another task, or other units?", err=True)
     with shown("scoring"):

@@ -35,6 +35,7 @@ from .sentences import needs_more as needs_more
 from .sentences import sentences as sentences
 from .sentences import to_record as to_record
 from .shown import FLAT as FLAT
+from .shown import ONE as ONE
 from .shown import about_recordings as about_recordings
 from .shown import crossed, names_of
 from .shown import flat as flat

@@ -171,7 +171,8 @@ def _replays(runs: Sequence[Replay], said: str, names: Sequence[str]) -> list[ht
         return []
     keys = ["hybrid" if one.held else "roll-out, free" for one in runs]
     drawn = [("training", one.done) for one in runs] + [(key, one.run) for key, one in zip(keys, runs, strict=True)]
-    caption = html.words("fit_replays", held=keys.count("hybrid"), every=len(runs), flat=f"{diagnosis.FLAT:.0%}")
+    shares = {"flat": f"{diagnosis.FLAT:.0%}", "one": f"{diagnosis.ONE:.0%}"}
+    caption = html.words("fit_replays", held=keys.count("hybrid"), every=len(runs), **shares)
     shown = [key for key in ("training", "hybrid", "roll-out, free") if key in {name for name, _ in drawn}]
     labels = {"training": "demonstrations", "hybrid": "roll-outs, held alike or free alike"}
     picture = html.picture(

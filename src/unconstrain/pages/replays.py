@@ -50,7 +50,11 @@ PASSING = 0.2
 """Nearer to the middle than this share of the usual distance from it, noise turns what goes straight."""
 
 FOLLOWED = 0.1
-"""A demonstration was free if the policy misses less than this share of its squared actions, across them, too."""
+"""What held is known, or that nothing did, if the policy under it misses less than this share of squared actions."""
+
+SPANNED = 0.4
+"""A plane tells that it held what spreads over it by this share of its longest extent, across that, too: what bends
+less lies nearly in some plane, whatever held it."""
 
 AWAY = 10.0
 """Farther from the middle of demonstrations than this many times their extent, a run has no size: it ran away."""
@@ -198,7 +202,7 @@ def replays(
     """Compare at most twenty demonstrations; none where :func:`unlike` says why not."""
     chosen = [] if unlike(demos, recipe) else _moving(demos)
     if not free and held is None:
-        chosen = [one for one in chosen if diagnosis.flat(one.states)[0].any() or _free(policy, one)]
+        chosen = [one for one in chosen if _told(policy, one)]
     if not chosen:
         return []
     chosen = [chosen[k] for k in np.linspace(0, len(chosen) - 1, min(len(chosen), MOST)).astype(int)]
@@ -208,21 +212,24 @@ def replays(
     shapes = [diagnosis.flat(one.states) for one in chosen]
     task = held.target if getattr(held, "task", False) else None
     starts, steps = np.array([one.states[0] for one in chosen]), round(max(lasted) / dt) + 1
-    own = [partial(_same, rows) for rows, _ in shapes] if held is None else held
+    known = [held is not None or not free or _told(policy, one) for one in chosen]  # others were not chosen
+    own = [partial(_same, rows * how) for (rows, _), how in zip(shapes, known, strict=True)] if held is None else held
     moving, near = bounded(policy, stack(demos).states)
     runs = rollout(moving, starts, steps, dt, own, task=task, least_support=0.0)
     cut = [run[: round(seconds / dt) + 1] for run, seconds in zip(runs, lasted, strict=True)]
-    known = [held is not None or not free or bool(rows.any()) for rows, _ in shapes]  # others were not chosen
     return [
-        _compared(one, run, along, how or _free(policy, one), near(run.states))
+        _compared(one, run, along, how, near(run.states))
         for one, run, (_, along), how in zip(chosen, cut, shapes, known, strict=True)
     ]
 
 
-def _free(policy: Any, demo: Demonstration) -> bool:
-    """Whether the policy was followed all along, so that nothing was taken away from it."""
-    off, actions = demo.actions - policy(demo.states), demo.actions
-    return bool(np.vecdot(off, off).sum() < FOLLOWED * np.vecdot(actions, actions).sum())
+def _told(policy: Any, demo: Demonstration) -> bool:
+    """Whether a demonstration tells what held it: it is straight, spans a plane, or is as the policy says."""
+    rows, across, bent = (diagnosis.flat(demo.states, share)[0] for share in (diagnosis.FLAT, diagnosis.ONE, SPANNED))
+    actions = policy(demo.states)
+    off = demo.actions - actions + actions @ rows.T @ rows
+    followed = np.vecdot(off, off).sum() < FOLLOWED * np.vecdot(demo.actions, demo.actions).sum()
+    return bool(followed or (across.any() and (across == bent).all()))
 
 
 def bounded(policy: Any, states: Array) -> tuple[Any, Callable[[Array], NDArray[np.bool_]]]:
