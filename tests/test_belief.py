@@ -347,5 +347,7 @@ class TestWords:
 
     def test_free_motion(self):
         _, said = self.said(FREE)
-        assert "held in the same way" not in said
+        assert "% look free (nothing that shows above the noise held them), 1% held, and of 12% " in said, (
+            "one of eight"
+        )
         assert "How 8 demonstrations look: 7 free, 1 on a plane that others cross (as what is held, or a short" in said

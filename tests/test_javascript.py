@@ -12,6 +12,7 @@ import unconstrain as uc
 from conftest import POLICIES
 from samples import Samples, draw, samples_of, spiral
 from unconstrain.base.errors import SettingError
+from unconstrain.learners.robust import consistent
 from unconstrain.learners.robust.segments import projections_of
 from unconstrain.learners.robust.softened import softened
 
@@ -154,7 +155,8 @@ def on_rails(alike):
 
 
 @pytest.mark.parametrize("alike", [True, False], ids=["a rail each", "rails that turn"])
-def test_the_page_compares_ways_to_learn_by_what_python_says_they_miss(browser, tmp_path, alike):
+def test_the_page_compares_ways_to_learn_by_what_python_says_they_miss(browser, tmp_path, monkeypatch, alike):
+    monkeypatch.setattr(consistent, "where_agreed", lambda *_: None)  # of which the page knows nothing
     data, kernels = on_rails(alike), uc.NormalisedRBF.grid(-1, 1, 4, width=1.0)
     parts = [data.groups == group for group in range(6)]
     demonstrations = [{"states": data.states[p].tolist(), "actions": data.actions[p].tolist()} for p in parts]

@@ -148,7 +148,9 @@ def test_the_noise_of_velocities_is_that_of_positions_after_the_filter(method, s
     assert_allclose(found.noise, np.sqrt((off**2).mean(axis=0)), rtol=0.35)
     neighbours = np.sqrt((np.diff(found.actions, n=4, axis=0) ** 2).mean() / 70.0)
     assert neighbours < 0.5 * found.noise.mean() or method == "central"
-    by_differences = uc.learners.robust.noise_by_differences(found.actions, np.zeros(len(found), dtype=int)) ** 0.5
+    every = prepare([uc.Recording(("x", "y"), noisy(size, seed), TIMES) for seed in (3, 4)], recipe)
+    _, actions, groups = uc.stack(every)
+    by_differences = uc.learners.robust.noise_by_differences(actions, groups) ** 0.5
     if size < 0.01:  # more is not told from movement
         assert_allclose(by_differences, found.noise.mean(), rtol=0.35)
 

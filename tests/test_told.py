@@ -210,7 +210,7 @@ def test_a_start_that_is_refused_is_farther_than_one_that_no_demonstration_passe
     told = words(run("rollout", "--help"))
     assert "no longer support it (--least-support); a start there is refused, unless the policy is guided." in told
     assert '"no demonstration passes near" is not as far' in told
-    assert "Of joints, in the space of their velocities, not of the workshop." in told
+    assert "Of joints, in the space of their velocities; with --jacobian three, in that of the hand." in told
 
 
 @pytest.mark.parametrize(("speed", "cut"), [(0.48, True), (0.32, False)])
