@@ -139,7 +139,9 @@ def _standing(values: Array, shortest: int, only_sudden: bool = False) -> int:
     if 2.0 * HALVES * loud / np.sqrt(shortest) > LOUD * usual:
         return 0
     tried = np.geomspace(3 * len(values) // 4, least, SHORTER).astype(int).tolist()
-    rows = next((rows for rows in tried if _goes_nowhere(values[:rows], loud, usual)), tried[0])
+    place = _spreads(values, tried) <= 1.01 * max(2.0 * loud, SLOW * usual)  # quick, and all but exact
+    near = (rows for rows, still in zip(tried, place, strict=True) if still)
+    rows = next((rows for rows in near if _goes_nowhere(values[:rows], loud, usual)), tried[0])
     if rows == tried[0]:
         return 0
     first = values[: 3 * rows // 4]
@@ -177,6 +179,15 @@ def _parts(values: Array) -> Array:
 
 def _spread(values: Array) -> float:
     return float(np.linalg.norm(values.std(axis=0)))
+
+
+def _spreads(values: Array, counts: list[int]) -> Array:
+    """That of the first so many rows, for each count."""
+    rows, squares = np.array(counts), np.zeros(len(counts))
+    for off in (column - column[0] for column in values.T):  # one at a time: a recording may be long
+        first, second = (np.cumsum(one)[rows - 1] / rows for one in (off, off**2))
+        squares += np.maximum(second - first**2, 0.0)
+    return np.sqrt(squares)
 
 
 def _near(values: Array, place: Array, far: Array) -> int:
