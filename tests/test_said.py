@@ -64,7 +64,7 @@ def test_fit_score_and_info_say_how_much_of_what_is_missed_is_noise(tmp_path, no
     said += [text(call("info", tmp_path / "p.npz")), text(call("score", tmp_path / "p.npz", files[5]))]
     for one in said:
         found = re.search(
-            r"misses (<?\d+)% of a typical action( \(noise along the motion alone makes that (\d+)% or mor)?", one
+            r"misses (<?\d+)% of a typical action( \(noise, which turns slow motion, makes that (\d+)% or mor)?", one
         )
         assert bool(found[2]) == (noise > 0)
         if noise:
@@ -76,7 +76,7 @@ def test_fit_score_and_info_say_how_much_of_what_is_missed_is_noise(tmp_path, no
 def test_what_is_far_more_than_is_missed_is_not_called_noise():
     """Constraints that change at every sample look like noise by differences in time."""
     assert verdicts.misses(0.99, 0.5) == "misses 10% of a typical action"
-    assert verdicts.misses(0.99, 0.11).endswith("(noise along the motion alone makes that 10% or more)")
+    assert verdicts.misses(0.99, 0.11).endswith("(noise, which turns slow motion, makes that 10% or more)")
     assert verdicts.misses(0.99, 0.001) == "misses 10% of a typical action"
 
 
@@ -700,9 +700,9 @@ def test_a_score_says_that_recordings_leave_where_the_policy_was_learnt_if_it_mi
 
 def test_what_is_missed_of_whole_demonstrations_is_in_the_headline():
     found, little, plain = (verdicts.of_explained(0.995, 8, left_out=share) for share in (0.66, 0.05, 0.0))
-    said = "if one model holds for all: good. But of the motion of demonstrations left out whole it misses"
-    assert f"{said} 66%" in found.said
-    assert f"{said} 5%" in little.said
+    assert "if one model holds for all: good. But where demonstrations that were held alike are left out" in found.said
+    assert "it misses 66% of their motion" in found.said
+    assert "it misses 5% of their motion" in little.said
     assert [one.mark.name for one in (found, little)] == ["DOUBTFUL", "GOOD"]
     assert "held-out" not in found.said
     assert plain.said == "The policy explains >99% of held-out motion: good."

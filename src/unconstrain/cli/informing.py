@@ -187,7 +187,8 @@ def doubted(policy: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> str:
     if notes.get(MARK) not in ("doubtful", "bad"):
         return ""
     if (found := explained_by(policy, notes)).mark is not uc.evaluation.verdicts.Mark.GOOD:
-        return found.said[0].lower() + found.said[1:].partition(". ")[0].rstrip(".")
+        *_, said = found.said.rstrip(".").split(". But ")
+        return said[0].lower() + said[1:].partition(". ")[0]
     return _doubt(notes)
 
 

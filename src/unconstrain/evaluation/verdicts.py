@@ -51,7 +51,7 @@ def misses(share: float, noise: float) -> str:
     """What is left of a share of motion, as one of a typical action, and what noise alone makes, if believable."""
     missed = float(np.sqrt(max(1.0 - share, 0.0)))
     known = 0.005 <= noise <= 1.2 * missed  # more is constraints that change at every sample, not noise
-    more = f" (noise along the motion alone makes that {percent(min(noise, missed))} or more)" * known
+    more = f" (noise, which turns slow motion, makes that {percent(min(noise, missed))} or more)" * known
     return f"misses {percent(missed)} of a typical action{more}"
 
 
@@ -78,6 +78,12 @@ def of_untold(share: float) -> str:
     if (said := percent(max(share, 0.0))) == "0%":
         return "all recordings together tell the policy at every recorded state"
     return f"at {said} of the recorded states no recording tells the policy in some direction"
+
+
+def _of_left_out(share: float) -> str:
+    much = percent(share) if share < 1.0 else "more than all"
+    alike = "where demonstrations that were held alike are left out together"
+    return f" But {alike}, it misses {much} of their motion: the others tell little of them."
 
 
 def of_explained(
@@ -125,8 +131,7 @@ def of_explained(
     trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
     said = f"{little}{who} {_explains(share, what)}: {word}.{retold}"
     if left_out:
-        much = percent(left_out) if left_out < 1.0 else "more than all there is"
-        said += f" But of the motion of demonstrations left out whole it misses {much}: the others tell little of them."
+        said += _of_left_out(left_out)
         mark = no_better(mark) if left_out > 1.0 - FAIR else mark
     return Verdict(mark, said, trust, across, advice)
 

@@ -127,7 +127,7 @@ def replayed(
         words, strays = f"{away}{f'; else {words}' * bool(words)}", ["way", *strays]
     if len(known) < len(demos):
         some = f"{len(known)} of {len(demos)} demonstrations"
-        why = ", which look flat or free; what held the others is not known" * (held is None and len(runs) < MOST)
+        why = "; what held the others, if anything, they do not tell well enough" * (held is None and len(runs) < MOST)
         words, of = f"{words}, as far as compared ({some}{why})", f"for {some}{alike}, {of}"
     judged = _advised(verdicts.of_replays(found, words, strays, starts), found, policy, demos)
     return Replayed(judged, told | {"away": gone}, runs, verdicts.size_and_pace(extents, paces, lasts, of, said), words)

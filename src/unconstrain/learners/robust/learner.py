@@ -49,9 +49,10 @@ LOOK_AT = ": look at columns, units, and what tells demonstrations apart (groups
 FITTED_WELL = 0.9  # where more of what was learnt from is explained, columns and units are not to blame
 NOTHING_MOVED = "No action is other than zero: nothing can be learnt of them. Look at the columns."
 BY_AGREEMENT = (
-    "One model misses no more than noise of all demonstrations, but each is needed: of some that are left out in turn, "
-    "the others tell too little, and {} of the motion is missed. So what is said of held-out motion is what to expect "
-    "if the policy has the form of this model (generalised cross-validation). Recordings at other places would test it."
+    "One model fits all demonstrations but for noise, and each is needed: where those that were held alike are left "
+    "out together, the others tell too little of them, and {} of their motion is missed. So what it explains is not "
+    "taken from held-out motion, but from how well all agree (generalised cross-validation), which is right if the "
+    "policy has the form of this model. Recordings at other places would test it."
 )
 UNUSED = "The Jacobian that was given is not used: {}."
 OUTDONE = "no policy that uses it is of less estimated error"
