@@ -50,10 +50,11 @@ def planes_of(demonstrations: Sequence[Demonstration]) -> Array:
     return each[:, 2] if together and each[:, 2].any(axis=1).all() and not each[:, 1].any() else whole[:0]
 
 
-def crossed(demonstrations: Sequence[Demonstration], noise: float = np.inf) -> list[bool]:
+def crossed(demonstrations: Sequence[Demonstration], noise: float) -> list[bool]:
     """Whether each demonstration in space keeps to a plane that others move across, as what is held does.
 
-    To it it keeps if it moves across it by no more than thrice the noise, a standard deviation of each action.
+    It keeps to it if it moves across it by no more than :data:`WITHIN` times the noise, a standard deviation of each
+    action.
     """
     states, actions, groups = stack(list(demonstrations))
     found = [False] * len(demonstrations)

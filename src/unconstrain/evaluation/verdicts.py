@@ -102,8 +102,8 @@ def of_explained(
     give no verdict. ``determined`` is the share of the recorded states at which recordings tell the policy, and
     ``there`` what to record where fewer show it. ``learnt`` is the share of what was learnt from, and ``lost`` what
     guiding takes of that, None where it is not guided: a guided policy is judged by what is left, or worse. What
-    is missed for ``noise`` alone is a share of a typical action. If ``left_out`` is the share missed of demonstrations
-    left out whole, ``share`` is what to expect if one model holds.
+    is missed for ``noise`` alone is a share of a typical action. Where ``left_out``, the share missed where those
+    held alike are left out together, is not 0, ``share`` is what to expect if one model holds.
     """
     across, little = "What constraints hid: no recording shows it, so no score does.", ""
     alone, share = share, share - (lost or 0.0)

@@ -89,8 +89,8 @@ class Belief(Shown):
     held_out_score : float
         Share of the squared motion that is explained where held out, as by ``Policy.score``.
     left_out : float
-        Share of the squared motion that is missed of demonstrations left out in turn, where ``held_out_score`` is not
-        about these, but about what to expect if one model holds for all; else 0.
+        Share of the squared motion that is missed where demonstrations that were held alike are left out together, if
+        ``held_out_score`` is not about that, but about what to expect if one model holds for all; else 0.
     candidates : dict
         Judged error of each candidate, by name, where the learner chose among several.
     undecided_share : float
@@ -246,7 +246,7 @@ class Solution(Shown):
 
     @property
     def left_out(self) -> float:
-        """Share that is missed of demonstrations left out whole, where what is held out tells another; else 0."""
+        """Share of the motion that is missed where those held alike are left out together; see :class:`Belief`."""
         return 0.0 if self.belief is None else self.belief.left_out
 
     @property

@@ -56,10 +56,10 @@ def with_jacobian(samples: Samples, jacobian: Jacobian, noise: float) -> Iterato
             yield _candidate(
                 f"rows of the Jacobian (within {misfit:.1%}) held: {held}", samples, kinds, jacobians, noise
             )
-    for count in dict.fromkeys((jacobians.shape[1], min(jacobians.shape[1], OF_POSITION))):
-        some = jacobians[:, :count]
-        if (kinds := HeldRows(samples.actions, some, samples.groups, noise).alone()).rows:
-            yield _candidate(f"own rows of the Jacobian (of {count})", samples, kinds, some, noise)
+    for some in [jacobians, jacobians[:, :OF_POSITION]] if jacobians.shape[1] > OF_POSITION else [jacobians]:
+        part = shown if some is jacobians else HeldRows(samples.actions, some, samples.groups, noise)
+        if (kinds := part.alone()).rows:
+            yield _candidate(f"own rows of the Jacobian (of {some.shape[1]})", samples, kinds, some, noise)
 
 
 def _evaluated(jacobian: Jacobian, samples: Samples) -> Array:

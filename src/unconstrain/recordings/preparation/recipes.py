@@ -156,7 +156,6 @@ class Recipe:
             self.actions is not None
             and self.action_is in ("auto", "velocity")
             and self.pauses != "cut"
-            and self.pauses != "cut"
             and all(setting is None for setting in whole)
             and all(getattr(self, name) == getattr(defaults, name) for name in others)
         )

@@ -89,7 +89,10 @@ def stands(values: Array, interval: float = 0.0) -> list[tuple[int, int]]:
         both = [one for one in both if min(_spread(near[: one[1]]), _spread(near[one[0] :])) > least]
         inner = [(start + one, start + two) for one, two in both if start + one < last and first < start + two]
         found += [run for run in inner if min(run[0], len(values) - run[1]) >= shortest]
-    return stretches(np.isin(np.arange(len(values)), [row for run in found for row in range(*run)]))
+    still = np.zeros(len(values), dtype=bool)
+    for first, last in found:
+        still[first:last] = True
+    return stretches(still)
 
 
 def pauses(values: Array) -> list[tuple[int, int]]:
@@ -139,8 +142,8 @@ def _standing(values: Array, shortest: int, only_sudden: bool = False) -> int:
     if 2.0 * HALVES * loud / np.sqrt(shortest) > LOUD * usual:
         return 0
     tried = np.geomspace(3 * len(values) // 4, least, SHORTER).astype(int).tolist()
-    place = _spreads(values, tried) <= 1.01 * max(2.0 * loud, SLOW * usual)  # quick, and all but exact
-    near = (rows for rows, still in zip(tried, place, strict=True) if still)
+    together = _spreads(values, tried) <= max(2.0 * loud, SLOW * usual)
+    near = (rows for rows, one in zip(tried, together, strict=True) if one)
     rows = next((rows for rows in near if _goes_nowhere(values[:rows], loud, usual)), tried[0])
     if rows == tried[0]:
         return 0
@@ -154,13 +157,11 @@ def _standing(values: Array, shortest: int, only_sudden: bool = False) -> int:
 
 
 def _goes_nowhere(values: Array, white: float, usual: float) -> bool:
-    """Whether a stretch (T, n) is near one place beside usual movement, and its halves differ by no more than noise.
+    """Whether halves of a stretch (T, n) near one place differ by no more than noise.
 
     Parts of it show what noise there is, white or not: by noise neighbours differ as much as halves do, but movement,
     however slow, adds up.
     """
-    if _spread(values) > max(2.0 * white, SLOW * usual):
-        return False
     parts = _parts(values)
     half = len(parts) // 2
     gone = float(np.linalg.norm(parts[half:].mean(axis=0) - parts[:half].mean(axis=0)))
