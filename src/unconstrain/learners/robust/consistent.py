@@ -81,13 +81,13 @@ def _nearest(loss: Array, distance: Array) -> int:
     return int(near[np.abs(distance[near]).argmin()])
 
 
-def by_segments(samples: Samples, projections: Array) -> Candidate:
+def by_segments(samples: Samples, projections: Array, name: str = "segments") -> Candidate:
     """Minimise the constrained error with each sample's projection (N, d, d), with a prior of standard risk.
 
     Predictions are cross-validated by fold, except for the projections: each is from all samples of its segment.
     """
     errors = [part.constrained(projections[samples.folds == fold]) for fold, part in enumerate(samples.by_fold())]
-    found = replace(least_error("segments", samples, errors), by_segments=True)
+    found = replace(least_error(name, samples, errors), by_segments=True)
     return where_agreed(found, samples, projections) or found
 
 

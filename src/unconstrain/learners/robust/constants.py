@@ -273,6 +273,15 @@ and each other one has more than this. Seen beside the action alone, over 32 kin
 of the best candidate went from 1.27 to 1.16, and on plates tilted by 5 to 30 degrees from 5.0 to 1.1.
 """
 
+VARIANCES_OF_CURVED = 4.0
+"""A direction that turns with the state was held where the variance along it is below so many times the noise's."""
+
+STRETCHES = 4
+"""Stretches of a demonstration that are left out in turn, to see whether what it held turned with the state."""
+
+LEAST_OF_CURVED = 2
+"""Samples for each number of such a direction, at least."""
+
 LEAST_CONSTRAINTS = 3
 """With fewer clusters of them, demonstrations are held out one by one."""
 

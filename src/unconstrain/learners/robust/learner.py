@@ -31,7 +31,7 @@ from .kinematics import KNOWING, Jacobian, with_jacobian
 from .likelihood import free_probability, maximise
 from .noise import beyond_misfit, hides_sphere, most_noise, noise_of_each
 from .posterior import Posterior
-from .segments import found_segments, held_throughout, projections_of
+from .segments import curved_projections, found_segments, held_throughout, projections_of
 from .softened import softened
 
 SUMS_ALONE = (
@@ -331,8 +331,12 @@ class Robust(_Maximising):
         learnt = [*softened(samples), corrected, noise_corrected(samples, worth=1.0)]
         each = samples.actions, samples.groups, beyond_misfit(noise, samples)
         projections = projections_of(*each)
-        if samples.groups.max() > 0 and not np.allclose(projections, np.eye(samples.actions.shape[1])):
-            learnt.append(by_segments(samples, projections))
+        if samples.groups.max() > 0:
+            curved = curved_projections(samples.states, *each[:2], projections, each[2])
+            if not np.allclose(projections, np.eye(samples.actions.shape[1])):
+                learnt.append(by_segments(samples, projections))
+            if not np.allclose(curved, projections):
+                learnt.append(by_segments(samples, curved, "curved segments"))
         likely, mixture = self._maximised(samples, training, corrected)
         if 1.0 - mixture[-1] > LEAST_INFORMATIVE and not hides_sphere(likely.variance, samples):
             free = samples.counts * free_probability(samples, samples.predict(likely.weights), likely.variance, mixture)

@@ -5,14 +5,30 @@ estimated by the singular vectors of the segment's actions whose singular
 values exceed the noise. With it the constrained error ``Σ w ‖u − N π̃‖²`` is
 minimised as if the constraint were known. It uses more than the
 inconsistency: all directions of the range, from all samples of the segment.
+
+The direction that a curved surface holds turns with the state. To first order
+it is affine, ``b(x) = B [1; x]``, and exactly so on planes, spheres, cylinders
+and all other surfaces of second order, whose gradient it is. Along a
+demonstration ``b(x)ᵀu = 0``, so that vec B is an eigenvector of
+``Σ (u ⊗ [1; x]) (u ⊗ [1; x])ᵀ`` with an eigenvalue within the noise. Short,
+smooth movements have such eigenvectors by chance: those count that, learnt
+without a stretch of the demonstration, hold there too.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array
-from ...risks import unit_actions
-from .constants import HELD_VARIANCES, LEAST_SEGMENT, SEGMENT_SIGNAL_TO_NOISE, SHARE_ALONG_HELD
+from ...risks import null_space_projection, unit_actions
+from .constants import (
+    HELD_VARIANCES,
+    LEAST_OF_CURVED,
+    LEAST_SEGMENT,
+    SEGMENT_SIGNAL_TO_NOISE,
+    SHARE_ALONG_HELD,
+    STRETCHES,
+    VARIANCES_OF_CURVED,
+)
 
 
 def projection_of(actions: Array, noise: float) -> Array:
@@ -99,6 +115,65 @@ def projections_of(actions: Array, labels: NDArray[np.intp], noise: Array) -> Ar
         rows = labels == label
         found[rows] = projection_of(actions[rows], float(np.sqrt(noise[rows][0])))
     return found
+
+
+def curved_projections(states: Array, actions: Array, labels: NDArray[np.intp], flat: Array, noise: Array) -> Array:
+    """N̂ of each sample (N, d, d), where segments also held directions that turn with the state; else the flat one.
+
+    Parameters
+    ----------
+    states : ndarray, shape (N, n)
+    actions : ndarray, shape (N, d)
+    labels : ndarray of int, shape (N,)
+        Segment of each sample.
+    flat : ndarray, shape (N, d, d)
+        From :func:`projections_of`.
+    noise : ndarray, shape (N,)
+        Variance of the noise on each action coordinate.
+    """
+    found = flat.copy()
+    for label in np.unique(labels):
+        rows = labels == label
+        values, axes = np.linalg.eigh(flat[rows][0])
+        axes = axes[:, values > 0.5]
+        if axes.shape[1] > 1:
+            left = _curved(states[rows], actions[rows] @ axes, float(noise[rows].mean()))
+            found[rows] = axes @ left @ axes.T
+    return found
+
+
+def _curved(states: Array, actions: Array, variance: float) -> Array:
+    """What a demonstration's curved constraint leaves of each action, (T, d, d): all where nothing shows one."""
+    count, d = actions.shape
+    regressors, stretch = _affine(states), np.arange(count) * STRETCHES // count
+    if count >= LEAST_OF_CURVED * regressors.shape[1] * d:
+        moved = (regressors[:, :, None] * actions[:, None, :]).reshape(count, -1)
+        values, normals = np.linalg.eigh(moved.T @ moved / count)
+        parts = [
+            (np.linalg.eigh(moved[rest].T @ moved[rest])[1], ~rest) for rest in (stretch != k for k in range(STRETCHES))
+        ]
+        for held in range(min(int((values < VARIANCES_OF_CURVED * variance).sum()), d - 1), 0, -1):
+            leak = 0.0
+            for other, rows in parts:
+                N = _leaving(regressors[rows], other[:, :held], d)
+                leak += float(((actions[rows] - np.einsum("nab,nb->na", N, actions[rows])) ** 2).sum())
+            if leak < VARIANCES_OF_CURVED * held * variance * count:
+                return _leaving(regressors, normals[:, :held], d)
+    return np.tile(np.eye(d), (count, 1, 1))
+
+
+def _affine(states: Array) -> Array:
+    """A constant and the states' principal components, all of mean square one, (T, 1 + k)."""
+    centred = states - states.mean(axis=0)
+    values, axes = np.linalg.eigh(centred.T @ centred / len(states))
+    kept = values > 1e-6 * values[-1]
+    return np.column_stack([np.ones(len(states)), centred @ axes[:, kept] / np.sqrt(values[kept])])
+
+
+def _leaving(regressors: Array, normals: Array, d: int) -> Array:
+    """Projections (T, d, d) onto what normals leave that are linear in the regressors (T, p), by weights (p d, k)."""
+    turned = np.einsum("np,pdk->nkd", regressors, normals.reshape(regressors.shape[1], d, -1))
+    return null_space_projection(turned, 1e-3)
 
 
 def held_throughout(actions: Array, labels: NDArray[np.intp], noise: Array) -> tuple[NDArray[np.bool_], Array]:
