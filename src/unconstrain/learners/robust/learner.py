@@ -340,7 +340,7 @@ class Robust(_Maximising):
         likely, mixture = self._maximised(samples, training, corrected)
         if 1.0 - mixture[-1] > LEAST_INFORMATIVE and not hides_sphere(likely.variance, samples):
             free = samples.counts * free_probability(samples, samples.predict(likely.weights), likely.variance, mixture)
-            unshown = 2.0 * float(free @ held_throughout(*each)[0]) > free.sum()
+            unshown = 2.0 * float(free @ held_throughout(*each, samples.states)[0]) > free.sum()
             learnt.append(replace(likely, softness=np.inf) if unshown else likely)
         least = min(most, corrected.variance)
         found = Comparison(learnt, np.minimum(noise, least), samples)

@@ -15,11 +15,13 @@ smooth movements have such eigenvectors by chance: those count that, learnt
 without a stretch of the demonstration, hold there too.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array
-from ...risks import null_space_projection, unit_actions
+from ...risks import null_space_projection, project, unit_actions
 from .constants import (
     HELD_VARIANCES,
     LEAST_OF_CURVED,
@@ -135,31 +137,33 @@ def curved_projections(states: Array, actions: Array, labels: NDArray[np.intp], 
     for label in np.unique(labels):
         rows = labels == label
         values, axes = np.linalg.eigh(flat[rows][0])
-        axes = axes[:, values > 0.5]
-        if axes.shape[1] > 1:
-            left = _curved(states[rows], actions[rows] @ axes, float(noise[rows].mean()))
-            found[rows] = axes @ left @ axes.T
+        found[rows] = _curved(states[rows], actions[rows], axes[:, values > 0.5], float(noise[rows].mean()))
     return found
 
 
-def _curved(states: Array, actions: Array, variance: float) -> Array:
-    """What a demonstration's curved constraint leaves of each action, (T, d, d): all where nothing shows one."""
-    count, d = actions.shape
-    regressors, stretch = _affine(states), np.arange(count) * STRETCHES // count
-    if count >= LEAST_OF_CURVED * regressors.shape[1] * d:
-        moved = (regressors[:, :, None] * actions[:, None, :]).reshape(count, -1)
-        values, normals = np.linalg.eigh(moved.T @ moved / count)
-        parts = [
-            (np.linalg.eigh(moved[rest].T @ moved[rest])[1], ~rest) for rest in (stretch != k for k in range(STRETCHES))
-        ]
-        for held in range(min(int((values < VARIANCES_OF_CURVED * variance).sum()), d - 1), 0, -1):
-            leak = 0.0
-            for other, rows in parts:
-                N = _leaving(regressors[rows], other[:, :held], d)
-                leak += float(((actions[rows] - np.einsum("nab,nb->na", N, actions[rows])) ** 2).sum())
-            if leak < VARIANCES_OF_CURVED * held * variance * count:
-                return _leaving(regressors, normals[:, :held], d)
-    return np.tile(np.eye(d), (count, 1, 1))
+def _curved(states: Array, actions: Array, axes: Array, variance: float) -> Array:
+    """N̂ (T, d, d) of a demonstration that moved along orthonormal axes (d, r): onto these, or what a surface left."""
+    moved, (count, rank) = actions @ axes, (len(actions), axes.shape[1])
+    regressors = _affine(states)
+    stretch = regressors[:, -1].argsort(kind="stable").argsort() * STRETCHES // count
+    flat, size = np.tile(axes @ axes.T, (count, 1, 1)), regressors.shape[1] * rank
+    if count < LEAST_OF_CURVED * size or rank < 2:
+        return flat
+    each = (regressors[:, :, None] * moved[:, None, :]).reshape(count, size)
+    values, normals = np.linalg.eigh(each.T @ each / count)
+    others = [np.linalg.eigh(each[stretch != part].T @ each[stretch != part])[1] for part in range(STRETCHES)]
+
+    def left(by: Array, rows: Any) -> Array:
+        turned = np.einsum("np,prk->nkr", regressors[rows], by.reshape(-1, rank, by.shape[1]))
+        return null_space_projection(turned, 1e-3)
+
+    for held in range(min(int((values < VARIANCES_OF_CURVED * variance).sum()), rank - 1), 0, -1):
+        N = np.empty((count, rank, rank))
+        for part, by in enumerate(others):
+            N[stretch == part] = left(by[:, :held], stretch == part)
+        if ((moved - project(N, moved)) ** 2).sum() < VARIANCES_OF_CURVED * held * variance * count:
+            return axes @ left(normals[:, :held], slice(None)) @ axes.T
+    return flat
 
 
 def _affine(states: Array) -> Array:
@@ -170,13 +174,9 @@ def _affine(states: Array) -> Array:
     return np.column_stack([np.ones(len(states)), centred @ axes[:, kept] / np.sqrt(values[kept])])
 
 
-def _leaving(regressors: Array, normals: Array, d: int) -> Array:
-    """Projections (T, d, d) onto what normals leave that are linear in the regressors (T, p), by weights (p d, k)."""
-    turned = np.einsum("np,pdk->nkd", regressors, normals.reshape(regressors.shape[1], d, -1))
-    return null_space_projection(turned, 1e-3)
-
-
-def held_throughout(actions: Array, labels: NDArray[np.intp], noise: Array) -> tuple[NDArray[np.bool_], Array]:
+def held_throughout(
+    actions: Array, labels: NDArray[np.intp], noise: Array, states: Array | None = None
+) -> tuple[NDArray[np.bool_], Array]:
     """Which samples are of segments that were clearly held in the same directions all the time, and where they moved.
 
     That is where noise explains the motion along some directions, there was much along all others, and other segments
@@ -189,6 +189,8 @@ def held_throughout(actions: Array, labels: NDArray[np.intp], noise: Array) -> t
         Segment of each sample.
     noise : ndarray, shape (N,)
         Variance of the noise on each action coordinate.
+    states : ndarray, shape (N, n), optional
+        If given, directions that turned with the state count, too.
 
     Returns
     -------
@@ -206,4 +208,8 @@ def held_throughout(actions: Array, labels: NDArray[np.intp], noise: Array) -> t
         much = squares > SHARE_ALONG_HELD * squares.sum()
         if much.sum() < whole.sum() and (still != much).all():
             held[rows], moved[rows] = True, axes[:, much] @ axes[:, much].T
+        elif states is not None:
+            onto = _curved(states[rows], actions[rows], axes[:, ~still], float(noise[rows].mean()))
+            if np.trace(onto[0]) < (~still).sum() - 0.5:
+                held[rows], moved[rows] = True, onto
     return held, moved
