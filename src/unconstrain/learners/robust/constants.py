@@ -274,10 +274,17 @@ of the best candidate went from 1.27 to 1.16, and on plates tilted by 5 to 30 de
 """
 
 VARIANCES_OF_CURVED = 4.0
-"""A direction that turns with the state was held where the variance along it is below so many times the noise's."""
+"""A direction that turns with the state was held where the variance along it is below so many times the noise's.
+
+On 14 recorded movements under planes that turn, 2, 4 and 9 find the same; 9 finds one that is none on a straight line.
+"""
 
 STRETCHES = 4
-"""Stretches of a demonstration that are left out in turn, to see whether what it held turned with the state."""
+"""Stretches along the longest axis of a demonstration that are left out in turn, to see if what it held turned.
+
+Without, errors on 24 movements each under planes that turn and that switch are .88 and 1.01 times those without curved
+constraints, and with four stretches .75 and 1.00.
+"""
 
 LEAST_OF_CURVED = 2
 """Samples for each number of such a direction, at least."""

@@ -157,11 +157,12 @@ def _curved(states: Array, actions: Array, axes: Array, variance: float) -> Arra
         turned = np.einsum("np,prk->nkr", regressors[rows], by.reshape(-1, rank, by.shape[1]))
         return null_space_projection(turned, 1e-3)
 
-    for held in range(min(int((values < VARIANCES_OF_CURVED * variance).sum()), rank - 1), 0, -1):
+    most = VARIANCES_OF_CURVED * variance
+    for held in range(min(int((values < most).sum()), rank - 1), 0, -1):
         N = np.empty((count, rank, rank))
         for part, by in enumerate(others):
             N[stretch == part] = left(by[:, :held], stretch == part)
-        if ((moved - project(N, moved)) ** 2).sum() < VARIANCES_OF_CURVED * held * variance * count:
+        if ((moved - project(N, moved)) ** 2).sum() < most * held * count:
             return axes @ left(normals[:, :held], slice(None)) @ axes.T
     return flat
 
