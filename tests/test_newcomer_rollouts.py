@@ -13,6 +13,7 @@ from test_cli import call, refused, run, write
 from unconstrain.cli.informing import TOLD
 from unconstrain.evaluation.verdicts import Mark, Verdict, moves, of_replays, size_and_pace
 from unconstrain.pages.fit import policy_page
+from unconstrain.base.display import percent
 from unconstrain.pages.replays import replayed
 
 MM = dict.fromkeys("xyz", "mm")
@@ -719,3 +720,43 @@ def test_of_copies_of_one_recording_no_free_or_constrained_ones_are_counted(tmp_
     assert ("How 4 demonstrations look: 4 free." in said) == (not copies)
     assert ({one["looks"] for one in told} == {"untold"}) == copies
     assert ("Mean probability that a sample was free" in said) == (not copies)
+
+
+def to_a_goal(folder, held):
+    """Files of strokes to a goal in space, along a bend, each ``held`` to a plane of its own, or free."""
+    rng, files = np.random.default_rng(3), []
+    for k in range(8):
+        normal, start = rng.normal(size=3), rng.uniform(-200, 200, 3)
+        swirl = np.array([[-1.0, -0.8, 0.0], [0.8, -1.0, 0.3], [0.0, -0.3, -1.0]])
+        along = uc.constraints.Plane(normal) if held else None
+        one = uc.rollout(lambda x, to=swirl: x @ to.T, start, 200, 0.02, along)
+        rows = np.column_stack([one.times, one.states + 0.1 * rng.standard_normal((200, 3))])
+        files.append(write(folder / f"s{k}.csv", "t [s],x [mm],y [mm],z [mm]", rows))
+    return files
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_runs_that_are_held_where_a_stroke_lies_are_compared_free_too(tmp_path, held):
+    files, policy = to_a_goal(tmp_path, held), tmp_path / "p.npz"
+    said = words(run("fit", *files, "--state", "x,y,z", "--model", "affine", "-o", policy))
+    assert "un from the same starts, it keeps size" in said
+    for told in (said, words(run("info", policy)), words(run("export", policy, "-o", tmp_path / "p.c"))):
+        assert bool(re.search(r"each held to the plane \(\d\).*; run free, (\d) of \1 go elsewhere, 's", told)) == held
+        assert ("farthest, which is wrong if they were free strokes" in told) == held
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_a_diagnosis_says_of_freedom_what_its_json_says(tmp_path, held):
+    how = "diagnose", *to_a_goal(tmp_path, held)[:5], "--state", "x,y,z", "--model", "cubic"
+    said, found = words(run(*how)), json.loads(run(*how, "--json"))
+    free, unsure = found["free_share"], found["undecided_share"]
+    flat = [one["samples"] * one["free"] for one in found["movements"] if one["looks"] == "flat"]
+    assert bool(flat) == held
+    seem = sum(one["samples"] * one["free"] for one in found["movements"])
+    assert free <= (seem - sum(flat)) / sum(one["samples"] for one in found["movements"]) + 1e-9
+    assert sum(flat) == 0.0 or unsure > 0.0
+    assert free + unsure <= 1.0 + 1e-9
+    told = re.search(r"Of the samples (\d+|<1|>99)% look free", said)
+    assert ("No sample is said to be free" in said) if told is None else percent(free) == f"{told[1]}%"
+    open_ = re.search(r"of (\d+|<1|>99)% recordings cannot tell", said)
+    assert unsure < 0.01 if open_ is None else percent(unsure) == f"{open_[1]}%"

@@ -165,9 +165,9 @@ class Diagnosis:
     told_together : float
         That, or if more the share at which all demonstrations together determine it, and one or two may be needed.
     free_share : float
-        Estimated share of samples that nothing constrained.
+        Estimated share of samples that nothing constrained; none on a plane that others cross.
     undecided_share : float
-        Estimated share of samples that were free or always held in the same way: the data cannot tell.
+        Estimated share of samples that were free or always held in the same way: the data cannot tell, nor there.
     regions : tuple of Region
         First those that all demonstrations leave open; of these, and of others, by decreasing spread ``along``.
     movements : tuple of Movement
@@ -280,6 +280,8 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
     known &= free is None or len({one.states.tobytes() for one in demos}) >= ENOUGH  # a copy tells nothing more
     together = belief.together if free is not None and len(belief.together) == len(states) else known
     jitter = float(np.sqrt(robust.noise_by_differences(actions, groups)))
+    movements = _movements(demos, undetermined, known, free, max(jitter, 0.1 * SMALL * typical))
+    free_share, undecided_share = _freedom(movements, solution.free_share, belief.undecided_share)
     return Diagnosis(
         method=solution.method,
         candidates={name: one.risk for name, one in belief.candidates.items()},
@@ -291,10 +293,10 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
         directions_determined=solution.determined_share,
         states_determined=float(known.mean()),
         told_together=max(float(known.mean()), 0.0 if free is None else belief.told_together),
-        free_share=solution.free_share,
-        undecided_share=belief.undecided_share,
+        free_share=free_share,
+        undecided_share=undecided_share,
         regions=_regions(policy, demos, undetermined, known, typical, known | together),
-        movements=_movements(demos, undetermined, known, free, max(jitter, 0.1 * SMALL * typical)),
+        movements=movements,
         suspects=() if free is None else tuple(places_of(belief.suspects, zip(names_of(demos), demos, strict=True))),
         planes=len(planes_of(demos)),
         told=known.astype(int) + (known | together),
@@ -435,6 +437,15 @@ def _movements(
         spread = float(np.sqrt((undetermined[part] ** 2).mean()))
         found.append(Movement(name, int(part.sum()), mean, told, spread, how))
     return tuple(found)
+
+
+def _freedom(movements: Sequence[Movement], free: float, undecided: float) -> tuple[float, float]:
+    """Shares of samples that look free, and that recordings cannot tell: what seems free on a plane that others cross."""
+    others = [one for one in movements if one.looks != "flat"]
+    if len(others) == len(movements):
+        return free, undecided
+    seem = sum(one.samples * (one.free or 0.0) for one in others) / sum(one.samples for one in movements)
+    return (told := min(free, seem)), free + undecided - told
 
 
 def _numbers(values: Array) -> tuple[float, ...]:

@@ -144,18 +144,13 @@ def looks(free: float, told: float, flat: bool) -> str:
 def about_freedom(found: Diagnosis) -> str:
     """What looks free, and how demonstrations look."""
     many = Counter(one.looks for one in found.movements)
-    others = [one for one in found.movements if one.looks != "flat"]
     look = ", ".join(f"{many[how]} {words}" for how, words in LOOKS.items() if many[how])
     look = f"How {counted(len(found.movements), 'demonstration')} look: {look}."
-    if not others:
+    if many["flat"] == len(found.movements):
         said = "No sample is said to be free: each demonstration looks held, by a plane of its own all along"
         return f"{said}; a short free stroke may, too. {look}"
-    every = sum(one.samples for one in found.movements)
-    free, all_ = (sum(one.samples * (one.free or 0.0) for one in some) / every for some in (others, found.movements))
-    share = free if len(others) < len(found.movements) else found.free_share
-    unsure = found.undecided_share + all_ - free  # of those on a plane that others cross
-    unsure *= unsure >= LITTLE
-    much, held, open_ = percents((share, 1.0 - share - unsure, unsure))
+    unsure = found.undecided_share * (found.undecided_share >= LITTLE)
+    much, held, open_ = percents((found.free_share, 1.0 - found.free_share - unsure, unsure))
     said = f"Of the samples {much} look free (nothing that shows above the noise held them), {held} held"
     if unsure:
         said += f", and of {open_} recordings cannot tell: they were free or always held in the same way, which "
