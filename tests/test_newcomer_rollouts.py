@@ -10,10 +10,11 @@ import pytest
 import unconstrain as uc
 from seen import opened
 from test_cli import call, refused, run, write
+from unconstrain.base.display import percent
+from unconstrain.cli import informing
 from unconstrain.cli.informing import TOLD
 from unconstrain.evaluation.verdicts import Mark, Verdict, moves, of_replays, size_and_pace
 from unconstrain.pages.fit import policy_page
-from unconstrain.base.display import percent
 from unconstrain.pages.replays import replayed
 
 MM = dict.fromkeys("xyz", "mm")
@@ -760,3 +761,54 @@ def test_a_diagnosis_says_of_freedom_what_its_json_says(tmp_path, held):
     assert ("No sample is said to be free" in said) if told is None else percent(free) == f"{told[1]}%"
     open_ = re.search(r"of (\d+|<1|>99)% recordings cannot tell", said)
     assert unsure < 0.01 if open_ is None else percent(unsure) == f"{open_[1]}%"
+
+
+def test_held_strokes_that_end_apart_are_guided_to_where_their_policy_rests(tmp_path):
+    how = *to_a_goal(tmp_path, True), "--state", "x,y,z", "--model", "affine"
+    said = words(run("fit", *how, "--guided", "auto", "-o", tmp_path / "guided.npz"))
+    goal = re.search(r"movements arrive: free at \((.*?)\), and", said)[1]
+    assert np.abs([*map(float, goal.split(", "))]).max() < 3.0
+    run("fit", *how, "-o", tmp_path / "p.npz")
+    run("export", tmp_path / "p.npz", "--ros2", tmp_path / "node")
+    assert (
+        "can be guided to: what was shown ('unconstrain fit --guided auto')"
+        in (tmp_path / "node/README.md").read_text()
+    )
+    certified = words(run("certify", tmp_path / "guided.npz"))
+    assert re.match(r"[✔!] \S+guided.npz: guaranteed is that movements end at its goal, not how they move\.", certified)
+    assert ("But run from the starts of demonstrations" in certified) == certified.startswith("!")
+
+
+def test_strokes_to_goals_of_their_own_are_not_guided_and_it_is_said_how_to_give_one(tmp_path):
+    rng, files = np.random.default_rng(1), []
+    for k, end in enumerate([(0.0, 0.0), (300.0, 10.0), (20.0, 300.0), (280.0, 310.0)]):
+        one = uc.rollout(lambda x, to=np.array(end): to - x, np.array(end) + rng.uniform(100, 200, 2), 200, 0.02)
+        rows = np.column_stack([one.times, one.states + 0.05 * rng.standard_normal((200, 2))])
+        files.append(write(tmp_path / f"s{k}.csv", "t [s],x [mm],y [mm]", rows))
+    how = "fit", *files, "--state", "x,y", "-o", tmp_path / "p.npz"
+    said = words(refused(*how, "--guided", "auto"))
+    assert (
+        "--guided: demonstrations end at rest, no two of them in one place; give it with --guided, a number for "
+        in said
+    )
+    assert re.search(r"in the units of the data \(the mean of their ends is --guided 1\d\d[\d.]*,1\d\d[\d.]*\)", said)
+    run(*how)
+    run("export", tmp_path / "p.npz", "--ros2", tmp_path / "node")
+    assert "can be guided to: a goal that is given (" in (tmp_path / "node/README.md").read_text()
+
+
+@pytest.mark.parametrize(
+    ("moves", "mark"), [("it strays up to 157 mm from the recorded paths", "!"), ("it keeps size", "✔")]
+)
+def test_a_certificate_says_beside_what_is_guaranteed_that_runs_stray(tmp_path, moves, mark):
+    shown = uc.rollout(lambda x: -x, np.array([[90.0, 20.0], [-80.0, 50.0], [10.0, -70.0]]), 200, 0.03)
+    policy = uc.ParametricPolicy(uc.Affine(), "direct").fit_demonstrations(shown)
+    guided, notes = (
+        uc.Guided(policy, demonstrations=shown),
+        {informing.MOVES: f"{moves}; unguided it goes round too small"},
+    )
+    uc.save(guided, tmp_path / "guided.npz", notes)
+    said = words(run("certify", tmp_path / "guided.npz"))
+    assert said.startswith(f"{mark} ")
+    assert (f"But run from the starts of demonstrations, {moves}. Trust:" in said) == (mark == "!")
+    assert "unguided" not in said

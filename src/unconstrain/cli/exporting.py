@@ -11,7 +11,7 @@ import click
 import unconstrain as uc
 
 from ..base.errors import SettingError
-from .informing import MARK, MOVES, RAN, verdict_of
+from .informing import GUIDE, MARK, MOVES, RAN, verdict_of
 from .printing import option_for_json, say_judged
 from .reading import fitted_policy, of_words
 from .writing import check_outputs, option_for_force
@@ -36,6 +36,11 @@ _UNIT += "1000.0 for millimetres, 100.0 for centimetres, 57.29578 for degrees."
 
 _MEANT = {"pose": "pose ({} as x, y, z; --messages joints for joints)"}
 _MEANT["joints"] = "joints (set 'joints' in its config to the robot's own names, for {}; --messages pose for a pose)"
+
+_GUIDES = {
+    name: f"{to} ('unconstrain fit --guided {name}')" for name, to in (("auto", "what was shown"), ("cycle", "a cycle"))
+}
+_GUIDES["goal"] = "a goal that is given ('unconstrain fit --guided X,Y,...')"
 
 _CENTRED = " States as measured: it takes them relative to the mean of a demonstration; first subtract that."
 
@@ -78,6 +83,7 @@ def export(
     found, limits = verdict_of(learnt, notes), _limits(notes, ros2)
     judged = found._replace(doubt=f"{limits} {found.doubt}".rstrip())
     notes |= {MARK: f"{judged.mark.name.lower()}. {judged.said} Do not trust: {judged.doubt}", RAN: None, MOVES: None}
+    notes[GUIDE] = _GUIDES.get(notes.get(GUIDE, ""))
     written, then = dict[str, str](), _NEXT_ROS2
     if ros2 is not None:
         taken = learnt.export_ros2(ros2, name, messages=messages, notes=notes)

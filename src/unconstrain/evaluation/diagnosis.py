@@ -440,7 +440,7 @@ def _movements(
 
 
 def _freedom(movements: Sequence[Movement], free: float, undecided: float) -> tuple[float, float]:
-    """Shares of samples that look free, and that recordings cannot tell: what seems free on a plane that others cross."""
+    """Shares of samples that look free, and that recordings cannot tell: and that on a plane that others cross."""
     others = [one for one in movements if one.looks != "flat"]
     if len(others) == len(movements):
         return free, undecided

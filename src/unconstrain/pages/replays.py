@@ -161,6 +161,7 @@ def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Repl
     if alone is policy:
         return guided
     plain = replayed(found, alone, *of)
+    plain = plain._replace(**{name: getattr(plain, name).partition("; each held")[0] for name in plain._fields[3:]})
     order = [*verdicts.Mark].index
     judged = max(guided.verdict, plain.verdict, key=lambda one: order(one.mark))  # the first, where both are as good
     if judged is plain.verdict and guided.in_words:
@@ -212,7 +213,7 @@ def guides(policy: Policy | Guided, demos: Sequence[Demonstration]) -> str:
         return ""
     with warnings.catch_warnings(action="always", record=True) as doubts:
         try:
-            Guided.goes_round(demos, policy=lambda states: np.asarray(policy(states)))  # without proposing a goal
+            Guided.goes_round(demos, policy=policy)
         except (SettingError, InvalidDataError) as error:
             with suppress(SettingError, InvalidDataError):
                 if "orbit=" in str(error):
