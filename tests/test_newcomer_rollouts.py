@@ -770,10 +770,7 @@ def test_held_strokes_that_end_apart_are_guided_to_where_their_policy_rests(tmp_
     assert np.abs([*map(float, goal.split(", "))]).max() < 3.0
     run("fit", *how, "-o", tmp_path / "p.npz")
     run("export", tmp_path / "p.npz", "--ros2", tmp_path / "node")
-    assert (
-        "can be guided to: what was shown ('unconstrain fit --guided auto')"
-        in (tmp_path / "node/README.md").read_text()
-    )
+    assert "can be guided to: what was shown (fit --guided auto)" in (tmp_path / "node/README.md").read_text()
     certified = words(run("certify", tmp_path / "guided.npz"))
     assert re.match(r"[✔!] \S+guided.npz: guaranteed is that movements end at its goal, not how they move\.", certified)
     assert ("But run from the starts of demonstrations" in certified) == certified.startswith("!")
@@ -781,8 +778,8 @@ def test_held_strokes_that_end_apart_are_guided_to_where_their_policy_rests(tmp_
 
 def test_strokes_to_goals_of_their_own_are_not_guided_and_it_is_said_how_to_give_one(tmp_path):
     rng, files = np.random.default_rng(1), []
-    for k, end in enumerate([(0.0, 0.0), (300.0, 10.0), (20.0, 300.0), (280.0, 310.0)]):
-        one = uc.rollout(lambda x, to=np.array(end): to - x, np.array(end) + rng.uniform(100, 200, 2), 200, 0.02)
+    for k, end in enumerate(np.array([[0.0, 0.0], [300.0, 10.0], [20.0, 300.0], [280.0, 310.0]])):
+        one = uc.rollout(lambda x, to=end: to - x, end + rng.uniform(100, 200, 2), 200, 0.02)
         rows = np.column_stack([one.times, one.states + 0.05 * rng.standard_normal((200, 2))])
         files.append(write(tmp_path / f"s{k}.csv", "t [s],x [mm],y [mm]", rows))
     how = "fit", *files, "--state", "x,y", "-o", tmp_path / "p.npz"

@@ -68,8 +68,8 @@ def _judged(policy: str, stored: Any, found: uc.motion.certificate.Certificate) 
     where = "come to its cycle" if hasattr(aim, "turn") else "end at its goal" if aim else "come to one place"
     said = f"{policy}: guaranteed is that movements {where}, not how they move. {unit}"
     judged = verdicts.Verdict(verdicts.Mark.GOOD, said, promise.strip(), doubt, then)
-    guided = (notes.get(MOVES) or "").partition("; unguided ")[0]
-    if aim and guided and (otherwise := astray({MOVES: guided})):
+    guided = (notes.get(MOVES) or "it keeps").partition("; unguided ")[0]
+    if aim and (otherwise := astray({MOVES: guided})):
         judged = verdicts.doubted(judged, f"run from the starts of demonstrations, {otherwise}")
     whole = getattr(aim, "whole", 1.0)
     said = f"only {percent(whole)} of the demonstrations that its cycle was drawn from go all the way round"

@@ -37,10 +37,8 @@ _UNIT += "1000.0 for millimetres, 100.0 for centimetres, 57.29578 for degrees."
 _MEANT = {"pose": "pose ({} as x, y, z; --messages joints for joints)"}
 _MEANT["joints"] = "joints (set 'joints' in its config to the robot's own names, for {}; --messages pose for a pose)"
 
-_GUIDES = {
-    name: f"{to} ('unconstrain fit --guided {name}')" for name, to in (("auto", "what was shown"), ("cycle", "a cycle"))
-}
-_GUIDES["goal"] = "a goal that is given ('unconstrain fit --guided X,Y,...')"
+_GUIDES = {"auto": "what was shown (fit --guided auto)", "cycle": "a cycle (fit --guided cycle)"}
+_GUIDES["goal"] = "a goal that is given (fit --guided X,Y,...)"
 
 _CENTRED = " States as measured: it takes them relative to the mean of a demonstration; first subtract that."
 

@@ -440,12 +440,11 @@ def _movements(
 
 
 def _freedom(movements: Sequence[Movement], free: float, undecided: float) -> tuple[float, float]:
-    """Shares of samples that look free, and that recordings cannot tell: and that on a plane that others cross."""
+    """Shares of samples that look free, and that recordings do not tell, such as those on planes that others cross."""
     others = [one for one in movements if one.looks != "flat"]
-    if len(others) == len(movements):
-        return free, undecided
     seem = sum(one.samples * (one.free or 0.0) for one in others) / sum(one.samples for one in movements)
-    return (told := min(free, seem)), free + undecided - told
+    told = free if len(others) == len(movements) else min(free, seem)
+    return told, free + undecided - told
 
 
 def _numbers(values: Array) -> tuple[float, ...]:

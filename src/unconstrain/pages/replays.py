@@ -78,10 +78,6 @@ class Replay(NamedTuple):
     """Mean distance of the states of the roll-out to the nearest of the demonstration, unit of the states."""
     held: bool
     """Whether what held the demonstration is known: given, seen as it is flat, or nothing, as the policy says."""
-    left: int
-    """Of a run held where its demonstration lies, directions left: 1 on a line, 2 on a plane; 0 where not so held."""
-    loose: float
-    """How far a free run goes from the recorded path at most, unit of the states, where the run was so held, else 0."""
     done: Demonstration
     run: Demonstration
     away: float | None  # seconds until it goes beyond AWAY, where it ends; None where it stays
@@ -134,25 +130,31 @@ def replayed(
         some = f"{len(known)} of {len(demos)} demonstrations"
         why = "; what held the others, if anything, they do not tell well enough" * (held is None and len(runs) < MOST)
         words, of = f"{words}, as far as compared ({some}{why})", f"for {some}{alike}, {of}"
-    on, figures = _held_on(known, demos), verdicts.size_and_pace(extents, paces, lasts, of, said)
-    words, figures = (one and one + on for one in (words, figures))
+    on = _held_on(policy, known, demos, recipe) if held is None else ""
+    words, figures = (one and one + on for one in (words, verdicts.size_and_pace(extents, paces, lasts, of, said)))
     judged = _advised(verdicts.of_replays(found, words, strays, starts), found, policy, demos)
     return Replayed(judged, told | {"away": gone}, runs, figures, words)
 
 
-def _held_on(runs: Sequence[Replay], demos: Sequence[Demonstration]) -> str:
-    """On what runs were held that may have been free, the rest of a sentence; empty where free ones do the same.
+def _held_on(policy: Any, runs: Sequence[Replay], demos: Sequence[Demonstration], recipe: Recipe) -> str:
+    """Where runs were held that may have been free, the rest of a sentence; empty where free ones do nearly the same.
 
     Who goes round in a plane was held there; a shorter stroke may lie in one by itself.
     """
-    held = [one for one in runs if one.left and not np.isfinite(one.pace)]
-    off = sorted((one for one in held if one.loose > _astray(demos)), key=lambda one: -one.loose)
-    if not off:
+    n, far = demos[0].states.shape[1], STRAYS * float(np.linalg.norm(np.ptp(stack(demos).states, axis=0)))
+    short = [(one.done, diagnosis.flat(one.done.states)[0].any(axis=1).sum()) for one in runs if one.pace != one.pace]
+    held = [one for one, tied in short if tied]
+    free = replays(policy, held, recipe, partial(_same, np.zeros((n, n)))) if held else []
+    if not (off := sorted((away, one.done.name) for one in free if (away := _farthest(one)) > far)):
         return ""
-    named = Counter({1: "line", 2: "plane"}.get(one.left, f"flat of {one.left} dimensions") for one in held)
+    named = Counter({1: "line", 2: "plane"}.get(n - tied, "flat") for _, tied in short if tied)
     to = " or ".join(f"{name} ({count})" for name, count in named.most_common())
-    free = f"run free, {len(off)} of {len(held)} go elsewhere, '{off[0].done.name}' farthest"
-    return f"; each held to the {to} that it lies in; {free}, which is wrong if they were free strokes"
+    said = f"run free, {len(off)} of {len(free)} go elsewhere, '{off[-1][1]}' farthest, which is wrong if they were"
+    return f"; each held to the {to} that it lies in; {said} free strokes"
+
+
+def _farthest(one: Replay) -> float:
+    return float(cKDTree(one.done.states).query(one.run.states)[0].max())
 
 
 def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Replayed:
@@ -183,17 +185,13 @@ def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Repl
 def _strays(guided: Any, plain: Any, demos: Any, recipe: Recipe, _: Any, units: Mapping[str, str], *__: Any) -> str:
     """How far guided runs go from recorded paths, the rest of a sentence; empty where unguided ones do nearly so."""
     most, least = (
-        max((cKDTree(one.done.states).query(one.run.states)[0].max() for one in runs if one.held), default=none)
+        max((_farthest(one) for one in runs if one.held), default=none)
         for runs, none in ((guided, 0.0), (plain, np.inf))
     )
-    if most <= max(FARTHER * least, _astray(demos)):
+    if most <= max(FARTHER * least, STRAYS * float(np.linalg.norm(np.ptp(stack(demos).states, axis=0)))):
         return ""
     unit = unit_of(recipe.labels(units)[0]) or "(unit of the states)"
     return f"it strays up to {most:.3g} {unit} from the recorded paths, unguided {least:.3g} at most"
-
-
-def _astray(demos: Sequence[Demonstration]) -> float:
-    return STRAYS * float(np.linalg.norm(np.ptp(stack(demos).states, axis=0)))
 
 
 def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Any, demos: Any) -> verdicts.Verdict:
@@ -242,15 +240,11 @@ def replays(
     known = [held is not None or not free or _told(policy, one) for one in chosen]  # others were not chosen
     own = [partial(_same, rows * how) for (rows, _), how in zip(shapes, known, strict=True)] if held is None else held
     moving, near = bounded(policy, stack(demos).states)
-    under = [own, None] if held is None else [own]
-    runs = [rollout(moving, starts, steps, dt, how, task=task, least_support=0.0) for how in under]
-    ends = [round(seconds / dt) + 1 for seconds in lasted]
-    tied = [int(rows.any(axis=1).sum()) * (how and held is None) for (rows, _), how in zip(shapes, known, strict=True)]
+    runs = rollout(moving, starts, steps, dt, own, task=task, least_support=0.0)
+    cut = [run[: round(seconds / dt) + 1] for run, seconds in zip(runs, lasted, strict=True)]
     return [
-        _compared(one, run[:end], free[:end], along, how, count, near)
-        for one, run, free, end, (_, along), how, count in zip(
-            chosen, runs[0], runs[-1], ends, shapes, known, tied, strict=True
-        )
+        _compared(one, run, along, how, near(run.states))
+        for one, run, (_, along), how in zip(chosen, cut, shapes, known, strict=True)
     ]
 
 
@@ -315,20 +309,16 @@ def _same(rows: Array, states: Array, _times: Array) -> Array:
     return np.broadcast_to(rows, (len(states), *rows.shape))
 
 
-def _compared(
-    done: Demonstration, run: Demonstration, free: Demonstration, plane: Array, held: bool, tied: int, near: Any
-) -> Replay:
-    """As seen along two directions in rows, (2, n); it ends where it is not ``near``, and is held in ``tied`` ones."""
-    inside, far = near(run.states), cKDTree(done.states).query
-    away, run = None if inside.all() else float(np.asarray(run.times)[inside.argmin()]), run[inside]
+def _compared(done: Demonstration, run: Demonstration, plane: Array, held: bool, near: NDArray[np.bool_]) -> Replay:
+    """As seen along two directions in rows, (2, n); it ends where it is not ``near``."""
+    away, run = None if near.all() else float(np.asarray(run.times)[near.argmin()]), run[near]
     both = done.states, run.states
     size = [float(np.sqrt(one.var(axis=0).sum())) for one in both]
     turns = [_turns((one - one.mean(axis=0)) @ plane.T) for one in both]
     pace = turns[1][-1] / turns[0][-1] if abs(turns[0][-1]) >= ROUNDS else np.nan
     lasting = [_lasting(one, done) for one, done in zip(both, turns, strict=True)]
-    left, loose = (done.states.shape[1] - tied, float(far(free.states)[0].max())) if tied else (0, 0.0)
-    apart, last = float(far(run.states)[0].mean()), lasting[1] / lasting[0]
-    return Replay(size[1] / size[0], float(pace), last, apart, held, left, loose, done, run, away)
+    apart = cKDTree(done.states).query(run.states)[0].mean()
+    return Replay(size[1] / size[0], float(pace), lasting[1] / lasting[0], float(apart), held, done, run, away)
 
 
 def _turns(points: Array) -> Array:
