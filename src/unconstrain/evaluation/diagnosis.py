@@ -125,7 +125,7 @@ class Region:
 class Movement:
     """One demonstration: its name, samples, mean probability of a free sample (None if unknown), and as in Region.
 
-    It ``looks`` free, constrained, unsure, flat if it keeps to a plane that others cross, or untold; None if unknown.
+    It ``looks`` free, constrained, unsure, flat or line if it keeps to such a one that others leave, untold; or None.
     """
 
     name: str
@@ -430,10 +430,10 @@ def _movements(
     demos: list[Demonstration], undetermined: Array, known: NDArray[np.bool_], free: Array | None, noise: float
 ) -> tuple[Movement, ...]:
     groups, found = stack(demos).groups, list[Movement]()
-    for index, (name, plane) in enumerate(zip(names_of(demos), crossed(demos, noise), strict=True)):
+    for index, (name, kept) in enumerate(zip(names_of(demos), crossed(demos, noise), strict=True)):
         part = groups == index
         mean, told = None if free is None else float(free[part].mean()), float(known[part].mean())
-        how = None if mean is None else looks(mean, told, plane)
+        how = None if mean is None else looks(mean, told, kept)
         spread = float(np.sqrt((undetermined[part] ** 2).mean()))
         found.append(Movement(name, int(part.sum()), mean, told, spread, how))
     return tuple(found)
@@ -441,7 +441,7 @@ def _movements(
 
 def _freedom(movements: Sequence[Movement], free: float, undecided: float) -> tuple[float, float]:
     """Shares of samples that look free, and that recordings do not tell, such as those on planes that others cross."""
-    others = [one for one in movements if one.looks != "flat"]
+    others = [one for one in movements if one.looks not in ("flat", "line")]
     seem = sum(one.samples * (one.free or 0.0) for one in others) / sum(one.samples for one in movements)
     told = free if len(others) == len(movements) else min(free, seem)
     return told, free + undecided - told

@@ -50,19 +50,19 @@ def planes_of(demonstrations: Sequence[Demonstration]) -> Array:
     return each[:, 2] if together and each[:, 2].any(axis=1).all() and not each[:, 1].any() else whole[:0]
 
 
-def crossed(demonstrations: Sequence[Demonstration], noise: float) -> list[bool]:
-    """Whether each demonstration in space keeps to a plane that others move across, as what is held does.
+def crossed(demonstrations: Sequence[Demonstration], noise: float) -> list[str]:
+    """Whether each demonstration in space keeps to a plane ("flat") or "line" that others leave, as if held, else "".
 
-    It keeps to it if it moves across it by no more than :data:`WITHIN` times the noise, a standard deviation of each
+    They keep to it if they move across it by no more than :data:`WITHIN` times the noise, a standard deviation of each
     action.
     """
     states, actions, groups = stack(list(demonstrations))
-    found = [False] * len(demonstrations)
+    found = [""] * len(demonstrations)
     for index in range(len(found) if (states.shape[1], actions.shape[1]) == (3, 3) else 0):
         held, (own, others) = flat(states[groups == index])[0], (actions[groups == index], actions[groups != index])
-        across = ((others @ held[2]) ** 2).sum() > FLAT**2 * (others**2).sum()
-        kept = np.sqrt(((own @ held[2]) ** 2).mean()) <= WITHIN * noise
-        found[index] = bool(held[2].any() and not held[1].any() and across and kept)
+        across = ((others @ held.T) ** 2).sum() > FLAT**2 * (others**2).sum()
+        if across and held[2].any() and (np.sqrt(((own @ held.T) ** 2).mean(axis=0)) <= WITHIN * noise).all():
+            found[index] = "line" if held[1].any() else "flat"
     return found
 
 

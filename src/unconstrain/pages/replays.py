@@ -200,8 +200,20 @@ def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Any, de
         return judged
     features = getattr(innermost(policy), "features", None)
     model = MODELS.get(features if isinstance(features, str) else type(features).__name__, ANOTHER)
-    more = model, GUIDES[guides(policy, demos)] if innermost(policy) is policy else ""
+    more = model, _seem_free(policy, demos), GUIDES[guides(policy, demos)] if innermost(policy) is policy else ""
     return judged._replace(next=" ".join(filter(None, (judged.next, *more))))
+
+
+def _seem_free(policy: Any, demos: Sequence[Demonstration]) -> str:
+    """What to try where a few demonstrations look free among others that were held: a curved wall looks so, too."""
+    solution, ends = getattr(innermost(policy), "solution_", None), np.cumsum([len(one) for one in demos])
+    known = solution is not None and len(solution.free) == ends[-1]
+    parts = np.split(solution.free, ends[:-1]) if known else []
+    names = [one.name for one, free in zip(demos, parts, strict=known) if free.mean() > diagnosis.FREE]
+    if not 0 < 2 * len(names) < len(demos):
+        return ""
+    looks = f"{listed([*map(repr, names)], 4)} look free, as do some that curved walls held, which spoil it"
+    return f"{looks}: compare without them (--leave-out {','.join(names)})."
 
 
 def guides(policy: Policy | Guided, demos: Sequence[Demonstration]) -> str:
