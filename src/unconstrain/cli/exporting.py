@@ -37,9 +37,6 @@ _UNIT += "1000.0 for millimetres, 100.0 for centimetres, 57.29578 for degrees."
 _MEANT = {"pose": "pose ({} as x, y, z; --messages joints for joints)"}
 _MEANT["joints"] = "joints (set 'joints' in its config to the robot's own names, for {}; --messages pose for a pose)"
 
-_GUIDES = {"auto": "what was shown (fit --guided auto)", "cycle": "a cycle (fit --guided cycle)"}
-_GUIDES["goal"] = "a goal that is given (fit --guided X,Y,...)"
-
 _CENTRED = " States as measured: it takes them relative to the mean of a demonstration; first subtract that."
 
 TARGETS = {
@@ -80,8 +77,8 @@ def export(
     notes["units"] = uc.Recipe.from_dict(notes.get("recipe", {})).units(notes.get("units", {}))  # as recorded, if old
     found, limits = verdict_of(learnt, notes), _limits(notes, ros2)
     judged = found._replace(doubt=f"{limits} {found.doubt}".rstrip())
-    notes |= {MARK: f"{judged.mark.name.lower()}. {judged.said} Do not trust: {judged.doubt}", RAN: None, MOVES: None}
-    notes[GUIDE] = _GUIDES.get(notes.get(GUIDE, ""))
+    notes |= {MARK: f"{judged.mark.name.lower()}. {judged.said} Do not trust: {judged.doubt}"}
+    notes |= dict.fromkeys((RAN, MOVES, GUIDE))
     written, then = dict[str, str](), _NEXT_ROS2
     if ros2 is not None:
         taken = learnt.export_ros2(ros2, name, messages=messages, notes=notes)

@@ -168,15 +168,9 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
 
 def _doubt(notes: Mapping[str, Any]) -> str:
     """What ``fit`` doubted of a policy that explains enough: how it moves, or else what it noted of recordings."""
-    moves = astray(notes)
-    return f"run from the same starts, {moves}" if moves else "its recordings are not all as they should be"
-
-
-def astray(notes: Mapping[str, Any]) -> str:
-    """How a policy moves otherwise than was demonstrated, as noted; empty where it keeps size and pace."""
     moves = notes.get(MOVES) or "it moves otherwise than was demonstrated"
     kept = all(one.startswith(("it keeps", "it nearly keeps")) for one in moves.split("; unguided "))
-    return "" if kept else moves
+    return "its recordings are not all as they should be" if kept else f"run from the same starts, {moves}"
 
 
 def explained_by(held: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:

@@ -281,7 +281,9 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
     together = belief.together if free is not None and len(belief.together) == len(states) else known
     jitter = float(np.sqrt(robust.noise_by_differences(actions, groups)))
     movements = _movements(demos, undetermined, known, free, max(jitter, 0.1 * SMALL * typical))
-    free_share, undecided_share = _freedom(movements, solution.free_share, belief.undecided_share)
+    others = [one for one in movements if one.looks not in ("flat", "line")]
+    seem = sum(one.samples * (one.free or 0.0) for one in others) / len(states) if others != [*movements] else 1.0
+    free_share = min(solution.free_share, seem)  # what is on a plane or line that others leave is not told
     return Diagnosis(
         method=solution.method,
         candidates={name: one.risk for name, one in belief.candidates.items()},
@@ -294,7 +296,7 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
         states_determined=float(known.mean()),
         told_together=max(float(known.mean()), 0.0 if free is None else belief.told_together),
         free_share=free_share,
-        undecided_share=undecided_share,
+        undecided_share=solution.free_share + belief.undecided_share - free_share,
         regions=_regions(policy, demos, undetermined, known, typical, known | together),
         movements=movements,
         suspects=() if free is None else tuple(places_of(belief.suspects, zip(names_of(demos), demos, strict=True))),
@@ -437,14 +439,6 @@ def _movements(
         spread = float(np.sqrt((undetermined[part] ** 2).mean()))
         found.append(Movement(name, int(part.sum()), mean, told, spread, how))
     return tuple(found)
-
-
-def _freedom(movements: Sequence[Movement], free: float, undecided: float) -> tuple[float, float]:
-    """Shares of samples that look free, and that recordings do not tell, such as those on planes that others cross."""
-    others = [one for one in movements if one.looks not in ("flat", "line")]
-    seem = sum(one.samples * (one.free or 0.0) for one in others) / sum(one.samples for one in movements)
-    told = free if len(others) == len(movements) else min(free, seem)
-    return told, free + undecided - told
 
 
 def _numbers(values: Array) -> tuple[float, ...]:

@@ -118,9 +118,9 @@ def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[st
     where, along = f"Near {named(region.state, states)}", f"along {named(region.direction, actions)}"
     if len(region.shown_by) >= ENOUGH:
         return f"{where} what was seen {along} is too little, or does not agree."
-    who = f"only {' and '.join(map(repr, region.shown_by))}" if region.shown_by else "nobody"
+    but = f" but {' and '.join(map(repr, region.shown_by))}, with a part of the motion" * bool(region.shown_by)
     more = ("three", "two", "one")[len(region.shown_by)]
-    return f"{where} {who} moved {along} by more than noise: record {more} more there."
+    return f"{where} nobody moved {along} by more than noise{but}: record {more} more there."
 
 
 def needs_more(found: Diagnosis) -> bool:

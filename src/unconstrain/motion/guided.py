@@ -399,18 +399,22 @@ def _found(demos: Sequence[Demonstration], policy: Any, wanted: Array) -> Array:
     rests = _resting(demos)
     slow = rests & (left <= max(_STILL, 2.0 * float(left[rests].min(initial=1.0)))) & (left <= _AT_REST)
     all_ends, ends = (stack(demos).states[last[some]] for some in (rests, slow if slow.any() else rests))
-    if why := _scattered(demos, ends, all_ends):
+    extent = float(np.linalg.norm(np.ptp(stack(demos).states, axis=0)))
+    gaps = np.linalg.norm(all_ends[:, None] - all_ends, axis=2)[np.triu_indices(len(all_ends), 1)]
+    if _apart(demos, ends) > _TOGETHER or (len(all_ends) >= _SEVERAL and gaps.min() > _TOGETHER * extent):
         rest = _rest_of(policy, all_ends, demos, wanted)
-        if rest is not None and rest[1] < _TOLD * np.linalg.norm(np.ptp(stack(demos).states, axis=0)):
+        if rest is not None and rest[1] < _TOLD * extent:
             return rest[0]  # constraints held them off it, each elsewhere
         told = (
-            ""
-            if rest is None
-            else f" The policy's own rest is told to within {rest[1]:.2g} only: record more, held in "
+            f" The policy's own rest is told to within {rest[1]:.2g} only: record more, held in other ways."
+            if rest
+            else ""
         )
         mean = ", ".join(f"{value:.4g}" for value in all_ends.mean(axis=0))
-        said = f"{_given(demos)} (the mean of their ends is goal=({mean}))"
-        raise InvalidDataError(f"goal: {why}; {said}.{told and f'{told}other ways.'}")
+        raise InvalidDataError(
+            f"goal: demonstrations end at rest in places up to {_apart(demos, all_ends):.0%} of their extent from the "
+            f"mean of these; expected one place; {_given(demos)} (the mean of their ends is goal=({mean})).{told}"
+        )
     place, rest = ends.mean(axis=0), _rest_of(policy, ends, demos, wanted)
     scatter = np.linalg.norm(all_ends - place, axis=1).max()
     if rest is not None and max(rest[1], np.linalg.norm(rest[0] - place)) < scatter:
@@ -424,17 +428,6 @@ def _found(demos: Sequence[Demonstration], policy: Any, wanted: Array) -> Array:
             stacklevel=3,
         )
     return np.asarray(place)
-
-
-def _scattered(demos: Sequence[Demonstration], ends: Array, every: Array) -> str:
-    """Why ends (K, n), or all that are at rest, show no goal by themselves; empty where they do."""
-    apart = np.linalg.norm(every[:, None] - every, axis=2)[np.triu_indices(len(every), 1)]
-    if len(every) >= _SEVERAL and apart.min() > _TOGETHER * np.linalg.norm(np.ptp(stack(demos).states, axis=0)):
-        return "demonstrations end at rest, no two of them in one place"
-    if (far := _apart(demos, ends)) <= _TOGETHER:
-        return ""
-    where = f"in places up to {far:.0%} of their extent from the mean of these; expected one place"
-    return f"demonstrations end at rest {where}"
 
 
 def _doubt_goal(demos: Sequence[Demonstration], place: Array) -> None:

@@ -137,10 +137,7 @@ def replayed(
 
 
 def _held_on(policy: Any, runs: Sequence[Replay], demos: Sequence[Demonstration], recipe: Recipe) -> str:
-    """Where runs were held that may have been free, the rest of a sentence; empty where free ones do nearly the same.
-
-    Who goes round in a plane was held there; a shorter stroke may lie in one by itself.
-    """
+    """Where runs were held that go round in no plane, so may have been free; empty if free ones do the same."""
     n, far = demos[0].states.shape[1], STRAYS * float(np.linalg.norm(np.ptp(stack(demos).states, axis=0)))
     short = [(one.done, diagnosis.flat(one.done.states)[0].any(axis=1).sum()) for one in runs if one.pace != one.pace]
     held = [one for one, tied in short if tied]
@@ -200,16 +197,19 @@ def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Any, de
         return judged
     features = getattr(innermost(policy), "features", None)
     model = MODELS.get(features if isinstance(features, str) else type(features).__name__, ANOTHER)
-    more = model, _seem_free(policy, demos), GUIDES[guides(policy, demos)] if innermost(policy) is policy else ""
+    more = (
+        model,
+        _seem_free(innermost(policy), demos),
+        GUIDES[guides(policy, demos)] if innermost(policy) is policy else "",
+    )
     return judged._replace(next=" ".join(filter(None, (judged.next, *more))))
 
 
 def _seem_free(policy: Any, demos: Sequence[Demonstration]) -> str:
     """What to try where a few demonstrations look free among others that were held: a curved wall looks so, too."""
-    solution, ends = getattr(innermost(policy), "solution_", None), np.cumsum([len(one) for one in demos])
-    known = solution is not None and len(solution.free) == ends[-1]
-    parts = np.split(solution.free, ends[:-1]) if known else []
-    names = [one.name for one, free in zip(demos, parts, strict=known) if free.mean() > diagnosis.FREE]
+    belief, ends = getattr(getattr(policy, "solution_", None), "belief", None), np.cumsum([len(one) for one in demos])
+    parts = np.split(belief.free, ends[:-1]) if belief is not None and len(belief.free) == ends[-1] else []
+    names = [one.name for one, free in zip(demos, parts, strict=False) if free.mean() > diagnosis.FREE]
     if not 0 < 2 * len(names) < len(demos):
         return ""
     looks = f"{listed([*map(repr, names)], 4)} look free, as do some that curved walls held, which spoil it"
