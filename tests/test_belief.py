@@ -335,7 +335,7 @@ class TestWords:
         assert found.directions == 12
         assert found.directions_determined == pytest.approx(8 / 12)
         assert "were free or always held in the same way" in said
-        assert "How 8 demonstrations look: 8 not to be told" in said
+        assert "How 8 demonstrations look: 8 undecided (" in said
         assert abs(np.dot(found.regions[0].direction, ALIKE) / np.linalg.norm(ALIKE)) > 0.95
 
     def test_what_one_demonstration_shows_alone(self):

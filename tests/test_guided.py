@@ -436,7 +436,7 @@ def test_guides_that_retrace_what_they_were_fitted_to_make_no_doubtful_fit_a_goo
     alone, guided, known = [json.loads(one.stdout)["verdict"] for one in ran]
     assert [one["mark"] for one in (alone, guided, known)] == [mark] * 3
     assert "Unguided it explains about as much; what guiding takes is of what it was fitted to" in guided["said"]
-    moves = "4 of 4 go round too small in the last round" if mark == "doubtful" else "it keeps size and pace"
+    moves = "in the last round 4 of 4 go round too small" if mark == "doubtful" else "it keeps size and pace"
     unguided = "But unguided" if mark == "doubtful" else "Unguided"
     assert f"Run from the same starts, it keeps size and pace. {unguided}, {moves}." in guided["said"]
     assert f"un from the same starts, it keeps size and pace; unguided {moves}." in known["said"]
@@ -574,7 +574,7 @@ def test_who_winds_down_to_several_places_is_told_of_both_options_and_the_verdic
     ran = CliRunner().invoke(main, [*learn, "--guided", "auto"])
     said = flat(ran.output)
     assert ran.exit_code == 2
-    assert "in one place; pass --guided its place, a number for each state, or --guided cycle" in said
+    assert "one place; pass --guided its place, a number for each state, or --guided cycle" in said
     for name, show, advised in (("apart", demos, "--guided GOAL'"), ("one", runs, "--guided auto'")):
         folder = tmp_path / name
         folder.mkdir()

@@ -197,12 +197,9 @@ def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Any, de
         return judged
     features = getattr(innermost(policy), "features", None)
     model = MODELS.get(features if isinstance(features, str) else type(features).__name__, ANOTHER)
-    more = (
-        model,
-        _seem_free(innermost(policy), demos),
-        GUIDES[guides(policy, demos)] if innermost(policy) is policy else "",
-    )
-    return judged._replace(next=" ".join(filter(None, (judged.next, *more))))
+    to = GUIDES[guides(policy, demos)] if innermost(policy) is policy else ""
+    more = judged.next, model, _seem_free(innermost(policy), demos), to
+    return judged._replace(next=" ".join(filter(None, more)))
 
 
 def _seem_free(policy: Any, demos: Sequence[Demonstration]) -> str:
