@@ -784,10 +784,7 @@ def test_strokes_to_goals_of_their_own_are_not_guided_and_it_is_said_how_to_give
         files.append(write(tmp_path / f"s{k}.csv", "t [s],x [mm],y [mm]", rows))
     how = "fit", *files, "--state", "x,y", "-o", tmp_path / "p.npz"
     said = words(refused(*how, "--guided", "auto"))
-    assert (
-        "--guided: demonstrations end at rest, no two of them in one place; give it with --guided, a number for "
-        in said
-    )
+    assert "the mean of these; expected one place; give it with --guided, a number for each state in " in said
     assert re.search(r"in the units of the data \(the mean of their ends is --guided 1\d\d[\d.]*,1\d\d[\d.]*\)", said)
     run(*how)
     run("export", tmp_path / "p.npz", "--ros2", tmp_path / "node")
