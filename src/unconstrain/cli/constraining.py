@@ -17,7 +17,7 @@ import unconstrain as uc
 from ..base.display import bare, listed, unit_of
 from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
-from .informing import HELD_BY, NAMED, OF, SHOWN, WHERE, WOUND, provenance, verdict_of
+from .informing import HELD_BY, NAMED, OF, PASSING, SHOWN, WHERE, WOUND, provenance, verdict_of
 from .printing import of_option, option_for_json, print_table, refuse_warnings, say_verdict, say_written
 from .progress import shown
 from .reading import loaded, numbers, of_words, options_for_reading, prepared, said_recipe, with_options
@@ -33,8 +33,8 @@ LENGTHS = ("", "m", "mm", "cm", "um", "km", "in", "ft")
 """Units of positions, and none."""
 
 FOLLOWED = "rollout --constraint and score --constraint hold to that mechanism, in parallel through the start."
-NOT_FOLLOWED = "That names the positions; rollout --constraint follows the directions that were learnt, as said first."
-MAY_LEAVE = "holds to the directions that were learnt, not to {}, which was named: a movement may leave that."
+NOT_FOLLOWED = "rollout --constraint and score --constraint hold to the directions learnt of velocities, not to that."
+MAY_LEAVE = "holds to the directions learnt of velocities, and a movement may leave {} that positions may keep to."
 
 FEATURES = ("auto", "constant", "affine", "quadratic", "rbf")
 
@@ -101,19 +101,20 @@ def constraint(
         demonstrations, recipe, (first, *_) = prepared(paths, reading)
         named = mechanism_of(demonstrations, recipe, first) if jacobian is None else None
         learnt = _agreeing(asked, named, demonstrations, surface)
+        passing = 0.0 if named is None else named.passing(learnt, demonstrations)
     refuse_warnings(reading["strict"])
     if recipe.angles:
         click.echo(f"Note: {', '.join(recipe.angles)} as unwrapped: a turn more is another state to it.", err=True)
     outputs = {name: _of_demonstration(output, name) for name in learnt}
     check_outputs([place for name, place in outputs.items() if name], (*paths, jacobian), force)
     wound = uc.constraints.mechanisms.winding(one.actions for one in demonstrations)
-    verdict = _judged(learnt, named, wound)
+    verdict = _judged(learnt, named, wound, passing)
     if not as_json:
         say_verdict(verdict)
         alone = f"{', '.join(recipe.labels(first.units)[0])} alone, as positions on a surface"
         click.echo(f"Learnt from {alone if surface else said_recipe(recipe, first)}.")
         _say(learnt, surface, recipe.labels(first.units), named)
-    notes = provenance(paths, recipe, first, **reading) | {WOUND: wound}
+    notes = provenance(paths, recipe, first, **reading) | {WOUND: wound, PASSING: passing}
     for name, place in outputs.items():
         uc.save(learnt[name], place, notes | _of(name, learnt[name], named, demonstrations))
     written = {f"constraint of {name}" if name else "constraint": place for name, place in outputs.items()}
@@ -141,7 +142,7 @@ def _of(
 
 
 def _judged(
-    learnt: Mapping[str, uc.LearntConstraint], named: Named | None, wound: bool
+    learnt: Mapping[str, uc.LearntConstraint], named: Named | None, wound: bool, passing: float
 ) -> uc.evaluation.verdicts.Verdict:
     """What was learnt, and what it is by name where that holds more."""
     shown, rank = None if named is None else named.shown(learnt), max(one.rank_ for one in learnt.values())
@@ -163,7 +164,7 @@ def _judged(
     if named is not None and named.found.kind == "free" and named.found.decided:
         found = found._replace(said=found.said.replace("do not decide it", "keep to nothing that would hold them"))
     judged = uc.evaluation.verdicts.of_mechanism
-    return found if named is None else judged(found, rank, named.found.mechanism, named.is_followed(learnt))
+    return found if named is None else judged(found, rank, named.found.mechanism, named.is_followed(learnt), passing)
 
 
 def _report(
@@ -201,17 +202,25 @@ def _learnt(
     return {demonstrations[int(str(number))].name: one for number, one in each.items()} or {"": constraint}
 
 
-def _agreeing(asked: uc.LearntConstraint, named: Named | None, *samples: Any) -> dict[str, uc.LearntConstraint]:
-    """By other features if these hold more than positions show: one path always moves little along what bends."""
-    learnt, every = _learnt(asked, *samples), [] if named is None else named.found.candidates
+def _agreeing(
+    asked: uc.LearntConstraint, named: Named | None, demonstrations: Sequence[uc.Demonstration], surface: bool
+) -> dict[str, uc.LearntConstraint]:
+    """By other features if these let pass what positions show to be held, or hold more: one path always does."""
+    learnt = _learnt(asked, demonstrations, surface)
+    if named is None or asked.features != "auto" or asked.task:
+        return learnt
+    every = named.found.candidates
     likely = [one for one in every if every[0].against(one) < uc.constraints.mechanisms.LIKELY]
     ranks = {max(each.rank for each in one.mechanisms) for one in likely}
-    forms = FEATURES[1:] if len(ranks - {0}) == len(ranks) == 1 and asked.features == "auto" and not asked.task else ()
-    for name in forms if max(one.rank_ for one in learnt.values()) > max(ranks, default=0) else ():
+    most = max(ranks) if len(ranks - {0}) == len(ranks) == 1 else math.inf
+
+    def wrong(one: Mapping[str, uc.LearntConstraint]) -> tuple[bool, bool]:
+        passing = named.passing(one, demonstrations) > uc.evaluation.verdicts.CONTRARY
+        return passing, max(each.rank_ for each in one.values()) > most
+
+    for name in FEATURES[1 + surface :] if any(wrong(learnt)) else ():
         with contextlib.suppress(InvalidDataError):
-            other = _learnt(uc.LearntConstraint(name), *samples)
-            if max(one.rank_ for one in other.values()) <= max(ranks):
-                return other
+            learnt = min(learnt, _learnt(uc.LearntConstraint(name), demonstrations, surface), key=wrong)
     return learnt
 
 
@@ -337,7 +346,7 @@ class Named(NamedTuple):
     def shown(self, learnt: Mapping[str, uc.LearntConstraint]) -> bool | None:
         """Whether positions show what held them, and a movement can be held by it; None where it may be a habit."""
         decided = self.found.decided and self.found.kind != "free" and not ("" in learnt and self.differs(learnt))
-        return False if not decided else None if self.found.doubt else True
+        return False if not decided else None if self.found.habit else True
 
     def differs(self, learnt: Mapping[str, uc.LearntConstraint]) -> bool:
         """Whether kinds of mechanisms differ, or one constraint for all holds less than those of each."""
@@ -348,6 +357,22 @@ class Named(NamedTuple):
         """Whether each of what was learnt, by name, is held by the mechanism, not by the directions learnt."""
         one = len(self.held) == 1
         return bool(self.shown(learnt)) and all((one or name) and not each.task for name, each in learnt.items())
+
+    def passing(self, learnt: Mapping[str, uc.LearntConstraint], demonstrations: Sequence[uc.Demonstration]) -> float:
+        """How much of a direction that a mechanism holds what was learnt lets pass, typically, or else of its own.
+
+        Where one holds fewer directions these are judged. It is nothing if no mechanism is decided, or of a task.
+        """
+        import numpy as np
+
+        if self.shown(learnt) is False or any(one.task for one in learnt.values()):
+            return 0.0
+        own, found = dict(zip(self.names, self.held, strict=False)) if len(self.held) > 1 else {}, [0.0]
+        for one in demonstrations:
+            held, rows = own.get(one.name, self.held[0]), (learnt.get("") or learnt[one.name])(one.states)
+            alike = np.linalg.svd(held.rows(one.states) @ rows.swapaxes(1, 2), compute_uv=False)
+            found.append(float(np.median(1.0 - np.minimum(alike.min(axis=1, initial=1.0), 1.0) ** 2) ** 0.5))
+        return max(found)
 
     def notes(self, name: str, learnt: uc.LearntConstraint) -> dict[str, Any]:
         """What goes into the file of one demonstration, or of all together: words, and numbers where it is sure."""

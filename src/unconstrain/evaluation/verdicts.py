@@ -338,16 +338,30 @@ def of_constraint(
     return Verdict(mark, said, "What was held, near recorded states.", f"{doubt}. {still}" if doubt else still, then)
 
 
-def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool) -> Verdict:
-    """Say of a constraint of some rank that positions keep to a mechanism, where that holds more; first if sure."""
-    if named.rank <= rank:
-        return found
+CONTRARY = 0.5
+"""What lets pass more than this of a direction that a mechanism holds is no constraint of that mechanism."""
+
+
+def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool, passing: float = 0.0) -> Verdict:
+    """Say of a constraint of some rank that positions keep to a mechanism that holds others; first if sure.
+
+    ``passing`` is how much of a direction that the mechanism holds the constraint lets pass.
+    """
     more = f"{named.rank} of {len(named.centre)}"
+    then = "Use it with --constraint of 'rollout' or 'score', which follow the mechanism."
+    if passing > CONTRARY:
+        said = f"Positions {'may ' * (not sure)}keep to {named.title}, and what was learnt of velocities lets pass "
+        doubt = f"What was learnt of velocities, by these features. {found.doubt}"
+        other = f"Learn it by other --features, as auto does. {then * sure}".rstrip()
+        said, trust = f"{said}{percent(passing)} of what that holds. {found.said}", "The mechanism." * sure
+        return Verdict(no_better(found.mark), said, trust, doubt, other)
+    if named.rank == rank or (named.rank < rank and not (sure and found.said.startswith(f"{rank} of "))):
+        return found
     if not sure:
         keep = f"Positions may keep to {named.title}, which holds {more}; as it turns, velocities show less of it."
         return found._replace(said=f"{found.said} {keep}")
-    said = f"{more} directions were held, by {named.title}. It turns on the way, so velocities alone show {rank}"
-    then = "Use it with --constraint of 'rollout' or 'score', which follow the mechanism."
+    why = "It turns on the way" if named.rank > rank else "It was passed one way only"
+    said = f"{more} directions were held, by {named.title}. {why}, so velocities alone show {rank}"
     return found._replace(said=said + found.said.partition(" directions were held")[2], next=then)
 
 

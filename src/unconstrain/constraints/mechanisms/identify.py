@@ -41,6 +41,8 @@ BEYOND = 4.0
 FLAT = 10.0
 """A surface whose radius is more than so many times the extent of what was recorded is a plane to a robot."""
 
+APART = "strokes from other starts would tell whether it is held"
+
 NEAR = 0.15
 """A path is near a circle that it leaves by less than this share of the radius."""
 
@@ -181,21 +183,27 @@ class Identification(Shown):
     @property
     def doubt(self) -> str:
         """What a stroke by itself does not tell of its mechanism, in words; empty if there is nothing."""
-        best, apart = self.candidates[0], "strokes from other starts would tell whether it is held"
+        best = self.candidates[0]
+        circle = next((one for one in self.candidates if one.kind == "circle"), best)
+        near = circle.free == 1 and circle.noise < NEAR * circle.mechanisms[0].radius
+        if self.habit or self.witnesses or self.demonstrations > 1 or best.free != 2 or not near:
+            return self.habit
+        lengths = circle.mechanisms[0].radius, circle.noise
+        radius, strays = (small_length(one, self.mechanism.unit) for one in lengths)
+        path = f"within the {best.kind} the path is near a circle of radius {radius}"
+        return f"{path}, which it leaves by {strays}; {APART}"
+
+    @property
+    def habit(self) -> str:
+        """Why free strokes may keep to the likeliest as well, in words; empty if they do not."""
+        best = self.candidates[0]
         alone = self.demonstrations == len(best.mechanisms)
         if not alone or self.witnesses or best.free not in (1, len(self.mechanism.centre) - 1):
             return ""
         if best.free == 1:
-            return f"a policy that keeps to this path within a surface looks the same in one stroke; {apart}"
-        if not self.winding:
-            return f"free strokes keep to a {best.kind} of their own, too, where they turn as little as here; {apart}"
-        circle = next((one for one in self.candidates if one.kind == "circle"), best)
-        if self.demonstrations > 1 or not circle.noise < NEAR * circle.mechanisms[0].radius or circle.free != 1:
-            return ""
-        lengths = circle.mechanisms[0].radius, circle.noise
-        radius, strays = (small_length(one, self.mechanism.unit) for one in lengths)
-        near = f"within the {best.kind} the path is near a circle of radius {radius}"
-        return f"{near}, which it leaves by {strays}; {apart}"
+            return f"a policy that keeps to this path within a surface looks the same in one stroke; {APART}"
+        free = f"free strokes keep to a {best.kind} of their own, too, where they turn as little as here; {APART}"
+        return "" if self.winding else free
 
     def _judged(self, best: str) -> str:
         first = self.candidates[0]
