@@ -415,7 +415,7 @@ def test_free_hands_among_rails_are_named_and_what_comes_next_leaves_them_out(tm
         "constraint", *sorted(tmp_path.glob("*.csv")), "--leave-out", ",".join(names[:5]), "-o", tmp_path / "r.npz"
     )
     assert "Demonstrations differ" not in left
-    assert "Mechanism: a line for each of 3 demonstrations" in left
+    assert "Shape of the path, held or not: a line for each of 3 demonstrations" in left
 
 
 def wiped_once(path, seed):

@@ -36,14 +36,8 @@ GUIDE = "can be guided to"
 MARK = "verdict"
 """Note of how ``fit`` judged it."""
 
-OF, HELD_BY, SHOWN, WHERE, WOUND = "of", "held by", "shown by positions", "least and largest states", "winding"
-"""Notes of a constraint: of which demonstrations; mechanism; if that is sure; where; if they turn more than free."""
-
-NAMED = "positions may keep to"
-"""Note of the mechanism that they may, where the directions that were learnt are followed all the same."""
-
-PASSING = "let pass of what the mechanism holds"
-"""Note of how much of a direction that the mechanism holds, typically, the constraint that was learnt does not hold."""
+OF, HELD_BY, SHOWN, WHERE, PASSING = "of", "held by", "shown by positions", "least and largest states", "let pass"
+"""Notes of a constraint: of which demonstrations; mechanism; if that is sure; where; how much of it does not hold."""
 
 CONTENTS, ENDS = "contents", 2**16
 """Note of what each demonstration is known again by, and bytes at either end of a file by which that is."""
@@ -97,7 +91,7 @@ def info(file: str, as_json: bool) -> None:
     A policy, guided or not, or a constraint.
     """
     held, notes = loaded(file, uc.Policy | uc.LearntConstraint | uc.Guided), uc.storage.load_notes(file)
-    inner = ("recipe", "units", "digests", CONTENTS, GUIDE, MARK, NOISE, MOVES, HELD_BY, SHOWN, WHERE, WOUND, PASSING)
+    inner = ("recipe", "units", "digests", CONTENTS, GUIDE, MARK, NOISE, MOVES, HELD_BY, SHOWN, WHERE, PASSING)
     rest = {name: value for name, value in notes.items() if name not in inner}
     verdict = to_copy(verdict_of(held, notes), file, notes)
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held, notes), **rest}
@@ -154,7 +148,7 @@ def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
 def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:
     """Judge a policy, constraint or guided policy by what it explained where held out, and what ``fit`` wrote down."""
     if isinstance(held, uc.LearntConstraint):
-        found = uc.evaluation.verdicts.of_constraint(held, shown=notes.get(SHOWN), wound=notes.get(WOUND))
+        found = uc.evaluation.verdicts.of_constraint(held, shown=notes.get(SHOWN))
         named = notes.get(HELD_BY) and uc.constraints.mechanisms.restored(notes[HELD_BY])
         judged, passing = uc.evaluation.verdicts.of_mechanism, notes.get(PASSING) or 0.0
         return judged(found, held.rank_, named, sure=True, passing=passing) if named else found

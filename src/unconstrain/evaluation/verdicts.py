@@ -291,13 +291,8 @@ def of_diagnosis(found: Diagnosis, first: str = "") -> Verdict:
     return Verdict(mark, said, trust, doubt, then if share < 1 or open_spread else "Demonstrate where nobody was.")
 
 
-def of_constraint(
-    learnt: LearntConstraint, *others: LearntConstraint, shown: bool | None = None, wound: bool | None = None
-) -> Verdict:
-    """Judge a constraint, or one for each demonstration, by what it missed.
-
-    ``shown`` is whether positions show it, and ``wound`` whether demonstrations turn more than free ones, if known.
-    """
+def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bool | None = None) -> Verdict:
+    """Judge a constraint, or one for each demonstration, by what it missed; ``shown`` is whether positions show it."""
     every = (learnt, *others)
     choice = max((one.choice_ for one in every), key=lambda each: each.held_out)
     missed, ranks = sum(one.choice_.held_out for one in every) / len(every), {one.rank_ for one in every}
@@ -305,14 +300,14 @@ def of_constraint(
         said = "No direction was held: nothing constrained these movements, or each direction was seen."
         return Verdict(Mark.DOUBTFUL, said, next="Look whether the demonstrations were held in different ways.")
     one_way, alone = all(one.choice_.one_way for one in every), others or not choice.several
-    if not shown and (one_way or (alone and wound is False)):
+    straight = sum(one.choice_.wound is False for one in every) > len(every) / 2
+    if not shown and (one_way or (alone and straight)):
         little = "free strokes that turn as little keep to a surface of their own, too"
         why = "each state was passed one way only, as by a free policy" if one_way else little
         then = "Record movements that cross each other, and learn it again; or name the --features."
         single = not others and not choice.several
-        then += (
-            f" '{'diagnose' * single or 'fit'}' compares several with one policy, which may tell that they were held."
-        )
+        by = "diagnose" if single else "fit"
+        then += f" '{by}' compares several with one policy, which may tell that they were held."
         said = f"Whether anything was held cannot be told{' by one demonstration alone' * single}: {why}."
         return Verdict(Mark.DOUBTFUL, said, doubt=f"That {min(ranks)} of {choice.actions} are held.", next=then)
     mark, word = graded(1.0 - missed)
@@ -350,11 +345,11 @@ def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool, passing: flo
     more = f"{named.rank} of {len(named.centre)}"
     then = "Use it with --constraint of 'rollout' or 'score', which follow the mechanism."
     if passing > CONTRARY:
-        said = f"Positions {'may ' * (not sure)}keep to {named.title}, and what was learnt of velocities lets pass "
-        doubt = f"What was learnt of velocities, by these features. {found.doubt}"
-        other = f"Learn it by other --features, as auto does. {then * sure}".rstrip()
-        said, trust = f"{said}{percent(passing)} of what that holds. {found.said}", "The mechanism." * sure
-        return Verdict(no_better(found.mark), said, trust, doubt, other)
+        contrary = (
+            f"positions keep to {named.title}, and what was learnt lets pass {percent(passing)} of what that holds"
+        )
+        next_ = f"Learn it by other --features, as auto does. {then * sure}".rstrip()
+        return doubted(found, contrary)._replace(trust="The mechanism." * sure, next=next_)
     if named.rank == rank or (named.rank < rank and not (sure and found.said.startswith(f"{rank} of "))):
         return found
     if not sure:

@@ -35,8 +35,9 @@ SMALLEST_MOVEMENT = 1e-12
 LIKELY = 20.0
 """Odds from which one kind is called decided."""
 
-BEYOND = 4.0
-"""Who spreads by so many times the usual noise in each direction moves there: noise that lasts looks free, too."""
+BEYOND, LASTING = 4.0, 10.0
+"""Who spreads by so many times the usual noise in each direction moves there: noise that lasts looks free, too. What
+lasts so many times longer than usual is a movement that no kind fits."""
 
 FLAT = 10.0
 """A surface whose radius is more than so many times the extent of what was recorded is a plane to a robot."""
@@ -202,7 +203,8 @@ class Identification(Shown):
             return ""
         if best.free == 1:
             return f"a policy that keeps to this path within a surface looks the same in one stroke; {APART}"
-        free = f"free strokes keep to a {best.kind} of their own, too, where they turn as little as here; {APART}"
+        own = "surface" if best.odds else best.kind
+        free = f"free strokes keep to a {own} of their own, too, where they turn as little as here; {APART}"
         return "" if self.winding else free
 
     def _judged(self, best: str) -> str:
@@ -264,7 +266,8 @@ def identify(
     every = _fits(track)
     apart = _strays(every[1:])
     times = [min(max(fit.time for fit in fits) for fits in one.values() if fits[0].mechanism.count) for one in every]
-    usual = [time for k, time in enumerate(times[1:]) if k not in apart]
+    longest = LASTING * float(np.median(times[1:] or times))
+    usual = [time for k, time in enumerate(times[1:]) if k not in apart and time <= longest]
     time, white = min(times[0], max(usual or times)), noise_by_differences(track.positions, track.groups)
     twice = zip([*every, *every[1:]], [*len(every) * [time], *times[1:]], strict=True)
     found = [(fits, log_evidences(fits, each, white)) for fits, each in twice]
