@@ -12,7 +12,7 @@ import click
 
 import unconstrain as uc
 
-from ..base.display import listed
+from ..base.display import has_no_column, listed
 from ..base.errors import NOTHING_LEFT, ReadError, UnconstrainError
 from ..base.files import write
 from ..paper import experiments
@@ -149,7 +149,7 @@ def _used(recipe: uc.Recipe, first: uc.Recording, surveys: Sequence[Any]) -> tup
         return "", as_typed(str(error)), []
     wanted = [*(decided.states or ()), *(decided.actions or ())]
     lacking = [(one, sorted({*wanted} - {*one.columns}, key=wanted.index)) for one in surveys]
-    said = {one.name: one.lacks(names) for one, names in lacking if names}
+    said = {one.name: has_no_column(one.name, names, one.columns, one.words) for one, names in lacking if names}
     needed, left_out = as_typed(next(iter(said.values()), "")), list(said)
     if recipe.states is None and 2 * len(said) >= len(surveys):
         other = next(one for one in surveys if one.name in said)

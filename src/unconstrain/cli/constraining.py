@@ -131,9 +131,8 @@ def _of(
     states = uc.stack([one for one in demonstrations if name in ("", one.name)]).states
     told = {WHERE: [states.min(axis=0).tolist(), states.max(axis=0).tolist()]}
     told[OF] = [name] if name else [one.name for one in demonstrations]
-    if named is None:
-        return told
-    return told | named.notes(name, learnt) | {PASSING: named.passing({name: learnt}, demonstrations)}
+    found = {} if named is None else {PASSING: named.passing({name: learnt}, demonstrations)}
+    return told | found | ({} if named is None else named.notes(name, learnt))
 
 
 def _judged(
@@ -357,10 +356,7 @@ class Named(NamedTuple):
         return bool(self.shown(learnt)) and all((one or name) and not each.task for name, each in learnt.items())
 
     def passing(self, learnt: Mapping[str, uc.LearntConstraint], demonstrations: Sequence[uc.Demonstration]) -> float:
-        """How much of a direction that a mechanism holds what was learnt lets pass, typically, or else of its own.
-
-        Where one holds fewer directions these are judged. It is nothing if no mechanism is decided, or of a task.
-        """
+        """How much of what a mechanism that is sure holds, or of its own if that is less, what was learnt lets pass."""
         import numpy as np
 
         if self.shown(learnt) is False or any(one.task for one in learnt.values()):

@@ -103,8 +103,8 @@ class LearntConstraint(Parameters, Shown):
         self.fit_parts([[(table, moves, sample_weight, groups)]], _here, surface=actions is None)
         steps = np.diff(on_host(table), axis=0, append=0.0)[:-1] if actions is None else on_host(moves)
         names = np.zeros(len(steps)) if groups is None else as_groups(groups, len(on_host(table)))[: len(steps)]
-        wound = winding(np.asarray(steps)[names == name] for name in dict.fromkeys(names.tolist()))
-        self.choice_ = replace(self.choice_, wound=wound)
+        each = (np.asarray(steps)[names == name] for name in dict.fromkeys(names.tolist()))
+        self.choice_ = replace(self.choice_, wound=winding(each))
         return self
 
     def fit_each(

@@ -345,11 +345,9 @@ def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool, passing: flo
     more = f"{named.rank} of {len(named.centre)}"
     then = "Use it with --constraint of 'rollout' or 'score', which follow the mechanism."
     if passing > CONTRARY:
-        contrary = (
-            f"positions keep to {named.title}, and what was learnt lets pass {percent(passing)} of what that holds"
-        )
-        next_ = f"Learn it by other --features, as auto does. {then * sure}".rstrip()
-        return doubted(found, contrary)._replace(trust="The mechanism." * sure, next=next_)
+        said = f"positions keep to {named.title}, and what was learnt lets pass {percent(passing)} of what that holds"
+        other = f"Learn it by other --features, as auto does. {then * sure}".rstrip()
+        return doubted(found, said)._replace(trust="The mechanism." * sure, next=other)
     if named.rank == rank or (named.rank < rank and not (sure and found.said.startswith(f"{rank} of "))):
         return found
     if not sure:

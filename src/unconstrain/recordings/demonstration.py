@@ -104,19 +104,11 @@ class Recording(Shown):
         """
         missing = [name for name in names if name not in self._places]
         if missing:
-            said = self.lacks(missing)
+            said = has_no_column(self.name, missing, self.columns, self.words)
             others = len(missing) == len(names) <= len(self.columns) and not said.endswith(("?", "convert it."))
             cure = " Name those of this file with states= and actions=, or all of its columns with columns=."
             raise LackingError(said + cure * others)
         return self.values[:, [self._places[name] for name in names]]
-
-    def lacks(self, names: Sequence[str]) -> str:
-        """Say that it has no columns of these names, and which it has."""
-        from .readers.clocks import TIME_NAME
-
-        clock = next(filter(TIME_NAME.fullmatch, names), None) if self.times is not None else None
-        read = f" {clock!r} was read as its time, which is no state: leave it out." if clock else ""
-        return has_no_column(self.name, names, self.columns, self.words) + read
 
     def content(self, recipe: Any, begun: blake2b | None = None) -> blake2b:
         """A digest of the states and actions of a recipe, to be known by; it goes on with ``begun``, of rows before."""
