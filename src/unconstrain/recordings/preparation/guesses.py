@@ -48,8 +48,8 @@ JOINTS = re.compile(r"(^|[._/ ])(actual_)?(q|j|qpos|joints?|joint_?(pos|position
 _NUMBERED = re.compile(r"(.*?)[_. \[]?(\d+)\]?")
 _OF_AXIS = re.compile(r"(.*?)(?:[_. /]|(?<=[a-z])(?=[XYZ]))?([xyzXYZ])")
 
-_UNIT = re.compile(r"[_ ]?[\[(](?=\D)[^\[\]()]{0,12}[\])]$|_(mm|cm|m|deg|rad)$")
-"""A unit at the end of a name, in brackets or after a line."""
+_UNIT = re.compile(r"[_ ]?[\[(](?=\D)[^\[\]()]{0,12}[\])]$|_(mm|cm|m)$")
+"""A unit at the end of a name, in brackets, or of length after an underscore."""
 
 Guess = Callable[..., tuple[str, ...] | None]
 
