@@ -58,9 +58,9 @@ class TestMarks:
         assert "--plane" not in found.doubt
 
     def test_how_many_directions_were_held_is_a_bound_where_demonstrations_disagree(self):
-        def held(rank):
-            choice = SimpleNamespace(held_out=0.01, actions=4, doubts=(), lacking=(), several=True, one_way=False)
-            return SimpleNamespace(rank_=rank, choice_=choice)
+        def held(rank, wound=None):
+            known = {"doubts": (), "lacking": (), "several": True, "one_way": False, "wound": wound}
+            return SimpleNamespace(rank_=rank, choice_=SimpleNamespace(held_out=0.01, actions=4, **known))
 
         sure, unsure = verdicts.of_constraint(held(1), held(1)), verdicts.of_constraint(held(3), held(1), held(2))
         assert sure.said.startswith("1 of 4 directions were held, others in each of 2 demonstrations; ")
@@ -74,10 +74,10 @@ class TestMarks:
         alike, known = verdicts.of_constraint(alone), verdicts.of_constraint(alone, shown=True)
         assert (alike.mark, alike.said[:40]) == (Mark.DOUBTFUL, "Whether anything was held cannot be told")
         assert known.said.startswith("1 of 4 directions were held")
-        little = verdicts.of_constraint(held(1), held(1), wound=False)
+        little = verdicts.of_constraint(held(1, False), held(1, False))
         assert (little.mark, little.said[:40]) == (Mark.DOUBTFUL, "Whether anything was held cannot be told")
-        assert verdicts.of_constraint(held(1), held(1), wound=True) == sure
-        assert verdicts.of_constraint(held(1), wound=False).mark is Mark.GOOD  # several tell it together
+        assert verdicts.of_constraint(held(1, True), held(1, True)) == sure
+        assert verdicts.of_constraint(held(1, False)).mark is Mark.GOOD  # several tell it together
         assert "'diagnose' compares several with one policy, which may tell that they were held." in alike.next
         assert "by one demonstration alone" in alike.said
         assert "alone" not in little.said + little.next
@@ -86,7 +86,8 @@ class TestMarks:
 
     def test_one_constraint_for_all_is_supposed_where_much_moves_along_it(self):
         for missed, much in ((0.12, True), (0.02, False)):
-            choice = SimpleNamespace(held_out=missed, actions=2, doubts=(), lacking=(), several=True, one_way=False)
+            known = {"doubts": (), "lacking": (), "several": True, "one_way": False, "wound": None}
+            choice = SimpleNamespace(held_out=missed, actions=2, **known)
             found = verdicts.of_constraint(SimpleNamespace(rank_=1, choice_=choice))
             assert found.said.startswith("If one constraint held all: 1 of 2 directions were held;") == much
             assert found.next.startswith("Learn it of each alone" if much else "Use it with --constraint")

@@ -12,8 +12,9 @@ from ..learners import robust
 from ..recordings import Demonstration, Recipe, readers, stack
 from .marks import ENOUGH, Mark, Verdict
 
-FLAT, ONE = 0.1, 0.03
-"""Held are directions of less spread than the first share of the longest, and all on one plane below the second."""
+FLAT, ONE, UNLIKE = 0.1, 0.03, 100.0
+"""Held are directions of less spread than the first share of the longest, and all on one plane below the second; not
+in one unit are demonstrations that are larger than others by the third factor."""
 
 WITHIN = 3.0
 """Who keeps to a plane moves across it by no more than so many times the noise."""
@@ -38,10 +39,11 @@ def flat(states: Array, share: float = FLAT) -> tuple[Array, Array]:
 def planes_of(demonstrations: Sequence[Demonstration]) -> Array:
     """Normals (K, 3) of the planes that demonstrations in space keep to: one, if it or parallel ones are all.
 
-    There are none where some keep to no plane or to a line, or where their planes differ as their places do.
+    There are none where some keep to no plane or to a line, or in another unit, or planes differ as their places do.
     """
     whole, states = np.vstack([one.states for one in demonstrations]), [one.states for one in demonstrations]
-    if whole.shape[1] != 3 or demonstrations[0].actions.shape[1] != 3:
+    sizes = [float(np.ptp(one, axis=0).max()) for one in states]
+    if whole.shape[1] != 3 or demonstrations[0].actions.shape[1] != 3 or max(sizes) > UNLIKE * min(sizes):
         return whole[:0]
     centred, each = np.vstack([one - one.mean(axis=0) for one in states]), np.array([flat(one)[0] for one in states])
     common, together = flat(centred, ONE)[0], whole.var(axis=0).sum() < 2.0 * centred.var(axis=0).sum()

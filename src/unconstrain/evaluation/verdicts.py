@@ -286,13 +286,8 @@ def of_diagnosis(found: Diagnosis, first: str = "") -> Verdict:
     return Verdict(mark, said, trust, doubt, then if share < 1 or open_spread else "Demonstrate where nobody was.")
 
 
-def of_constraint(
-    learnt: LearntConstraint, *others: LearntConstraint, shown: bool | None = None, wound: bool | None = None
-) -> Verdict:
-    """Judge a constraint, or one for each demonstration, by what it missed.
-
-    ``shown`` is whether positions show it, and ``wound`` whether demonstrations turn more than free ones, if known.
-    """
+def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bool | None = None) -> Verdict:
+    """Judge a constraint, or one for each demonstration, by what it missed; ``shown`` is whether positions show it."""
     every = (learnt, *others)
     choice = max((one.choice_ for one in every), key=lambda each: each.held_out)
     missed, ranks = sum(one.choice_.held_out for one in every) / len(every), {one.rank_ for one in every}
@@ -300,14 +295,14 @@ def of_constraint(
         said = "No direction was held: nothing constrained these movements, or each direction was seen."
         return Verdict(Mark.DOUBTFUL, said, next="Look whether the demonstrations were held in different ways.")
     one_way, alone = all(one.choice_.one_way for one in every), others or not choice.several
-    if not shown and (one_way or (alone and wound is False)):
+    straight = sum(one.choice_.wound is False for one in every) > len(every) / 2
+    if not shown and (one_way or (alone and straight)):
         little = "free strokes that turn as little keep to a surface of their own, too"
         why = "each state was passed one way only, as by a free policy" if one_way else little
         then = "Record movements that cross each other, and learn it again; or name the --features."
         single = not others and not choice.several
-        then += (
-            f" '{'diagnose' * single or 'fit'}' compares several with one policy, which may tell that they were held."
-        )
+        by = "diagnose" if single else "fit"
+        then += f" '{by}' compares several with one policy, which may tell that they were held."
         said = f"Whether anything was held cannot be told{' by one demonstration alone' * single}: {why}."
         return Verdict(Mark.DOUBTFUL, said, doubt=f"That {min(ranks)} of {choice.actions} are held.", next=then)
     mark, word = graded(1.0 - missed)
@@ -333,16 +328,28 @@ def of_constraint(
     return Verdict(mark, said, "What was held, near recorded states.", f"{doubt}. {still}" if doubt else still, then)
 
 
-def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool) -> Verdict:
-    """Say of a constraint of some rank that positions keep to a mechanism, where that holds more; first if sure."""
-    if named.rank <= rank:
-        return found
+CONTRARY = 0.5
+"""What lets pass more than this of a direction that a mechanism holds is no constraint of that mechanism."""
+
+
+def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool, passing: float = 0.0) -> Verdict:
+    """Say of a constraint of some rank that positions keep to a mechanism that holds others; first if sure.
+
+    ``passing`` is how much of a direction that the mechanism holds the constraint lets pass.
+    """
     more = f"{named.rank} of {len(named.centre)}"
+    then = "Use it with --constraint of 'rollout' or 'score', which follow the mechanism."
+    if passing > CONTRARY:
+        said = f"positions keep to {named.title}, and what was learnt lets pass {percent(passing)} of what that holds"
+        other = f"Learn it by other --features, as auto does. {then * sure}".rstrip()
+        return doubted(found, said)._replace(trust="The mechanism." * sure, next=other)
+    if named.rank == rank or (named.rank < rank and not (sure and found.said.startswith(f"{rank} of "))):
+        return found
     if not sure:
         keep = f"Positions may keep to {named.title}, which holds {more}; as it turns, velocities show less of it."
         return found._replace(said=f"{found.said} {keep}")
-    said = f"{more} directions were held, by {named.title}. It turns on the way, so velocities alone show {rank}"
-    then = "Use it with --constraint of 'rollout' or 'score', which follow the mechanism."
+    why = "It turns on the way" if named.rank > rank else "It was passed one way only"
+    said = f"{more} directions were held, by {named.title}. {why}, so velocities alone show {rank}"
     return found._replace(said=said + found.said.partition(" directions were held")[2], next=then)
 
 
