@@ -415,7 +415,7 @@ def test_free_hands_among_rails_are_named_and_what_comes_next_leaves_them_out(tm
         "constraint", *sorted(tmp_path.glob("*.csv")), "--leave-out", ",".join(names[:5]), "-o", tmp_path / "r.npz"
     )
     assert "Demonstrations differ" not in left
-    assert "Mechanism: a line for each of 3 demonstrations" in left
+    assert "Shape of the path, held or not: a line for each of 3 demonstrations" in left
 
 
 def wiped_once(path, seed):
@@ -491,3 +491,93 @@ def test_a_plane_is_decided_where_only_a_sphere_too_large_to_matter_does_as_well
     assert ("a plane through" in said) == ("or a sphere so large that it looks flat (" in said) == flat
     assert "undecided" not in said
     assert "Positions do not decide it" not in said
+
+
+def pot(path, radius=0.06, seed=0):
+    """Round a pot and down along its wall, nearly in circles at one height in the end."""
+    rng, time = np.random.default_rng(seed), np.linspace(0, 5, 400)
+    angle, height = 3.0 * time, -0.05 * np.exp(-time)
+    states = np.column_stack([0.45 + radius * np.cos(angle), 0.05 + radius * np.sin(angle), 0.2 + height])
+    write(path, "t,x,y,z", [time, states + 5e-4 * rng.standard_normal((400, 3))])
+    return path
+
+
+COLUMNS = ("--state", "x,y,z", "--differentiate")
+
+
+def off_the_wall(path):
+    """The share of the radial direction that a stored constraint lets pass about the pot."""
+    angle = np.linspace(0, 6, 50)
+    out = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    held = uc.load(path, uc.LearntConstraint).projection([0.45, 0.05, 0.2] + 0.06 * out)
+    return np.median(np.linalg.norm((held @ out[:, :, None])[:, :, 0], axis=1))
+
+
+def test_what_is_learnt_on_the_wall_of_a_pot_holds_it_and_a_roll_out_stays_there(tmp_path):
+    pot(tmp_path / "pot.csv")
+    said = " ".join(run("constraint", tmp_path / "pot.csv", *COLUMNS, "-o", tmp_path / "c.npz").split())
+    assert said.startswith("! 1 of 3 directions were held, by a cylinder. It was passed one way only, so velocities")
+    assert "hold to that mechanism" in said
+    assert off_the_wall(tmp_path / "c.npz") < 0.1
+    assert json.loads(run("info", tmp_path / "c.npz", "--json"))["held"] == "1 of 3 directions"
+    run("fit", pot(tmp_path / "wide.csv", 0.07, 1), pot(tmp_path / "mid.csv", 0.06, 2), *COLUMNS, "--learner",
+        "direct", "-o", tmp_path / "p.npz")  # fmt: skip
+    way = ("--start", "0.51,0.05,0.2", "--steps", 200, "--least-support", 0, "-o", tmp_path / "path.csv")
+    run("rollout", tmp_path / "p.npz", *way, "--constraint", tmp_path / "c.npz")
+    path = np.loadtxt(tmp_path / "path.csv", delimiter=",", skiprows=1)
+    assert_allclose(np.hypot(path[:, 1] - 0.45, path[:, 2] - 0.05), 0.06, atol=2e-3)
+
+
+def test_features_that_contradict_the_mechanism_make_no_good_constraint(tmp_path, tilted):
+    order = ("constraint", pot(tmp_path / "pot.csv"), *COLUMNS, "--features", "constant", "-o", tmp_path / "c.npz")
+    run(*order)
+    assert off_the_wall(tmp_path / "c.npz") > 0.9
+    for said in (run(*order, "--force"), run("info", tmp_path / "c.npz")):
+        assert said.startswith("!")
+        assert "positions keep to a cylinder, and what was learnt lets pass" in " ".join(said.split())
+    flat = run("constraint", tilted / "plate_1.csv", "--features", "constant", "-o", tmp_path / "p.npz")
+    assert "lets pass" not in flat
+
+
+def test_a_surface_is_learnt_by_features_that_vary_without_being_told(tmp_path):
+    order = ("constraint", pot(tmp_path / "pot.csv"), *COLUMNS, "--surface", "-o", tmp_path / "s.npz")
+    run(*order)
+    assert off_the_wall(tmp_path / "s.npz") < 0.1
+    assert "got 'constant', and the height above a surface varies" in refused(
+        *order, "--features", "constant", "--force"
+    )
+
+
+def test_what_free_strokes_may_do_is_a_doubt_of_the_constraint_in_python_too(falling, tilted):
+    def doubts(place):
+        [demo] = uc.prepare(uc.read(place), uc.Recipe(states=uc.read(place)[0].columns[:3], differentiate="savgol"))
+        return " ".join(uc.LearntConstraint("constant").fit(demo.states, demo.actions).choice_.doubts)
+
+    assert "Free strokes that turn as little keep to a surface of their own, too" in doubts(falling / "fall_1.csv")
+    assert "Free strokes" not in doubts(tilted / "plate_1.csv")
+
+
+def test_a_table_claims_nothing_that_the_verdict_does_not(falling, tilted, tmp_path):
+    said = run("constraint", falling, *COLUMNS, "-o", tmp_path / "c.npz")
+    assert "looks held" in said
+    assert "Shape of the path, held or not" in said
+    assert "Mechanism" not in said
+    assert "nothing held" not in said
+    sure = run("constraint", tilted / "plate_1.csv", "-o", tmp_path / "p.npz")
+    assert "Mechanism: a plane" in sure
+
+
+def test_one_that_keeps_to_nothing_exactly_leaves_the_others_their_mechanism(tmp_path):
+    time = np.linspace(0, 5, 400)
+    pot(tmp_path / "pot_0.csv", 0.1 + 0.01 * (time / 5))
+    pot(tmp_path / "pot_1.csv", 0.06, 1)
+    for number, tilt in enumerate((0.2, 0.4, -0.3, 0.6, -0.5)):
+        flat = np.column_stack([0.1 * np.cos(3 * time), 0.07 * np.sin(3 * time) * (1 + time / 9)])
+        states = [0.45, 0.05, 0.2] + flat @ [[1, 0, 0], [0, np.cos(tilt), np.sin(tilt)]]
+        states += 5e-4 * np.random.default_rng(number).standard_normal((400, 3))
+        write(tmp_path / f"plane_{number}.csv", "t,x,y,z", [time, states])
+    said = run("constraint", tmp_path, *COLUMNS, "-o", tmp_path / "c.npz")
+    rows = {line.split()[0]: line for line in said.splitlines() if line.startswith(("pot_", "plane_"))}
+    assert sum("1 of 3" in line and " plane " in line for line in rows.values()) == 5
+    assert "2 of 3, affine" in rows["pot_1"]
+    assert "cylinder" in rows["pot_1"]

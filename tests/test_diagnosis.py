@@ -182,8 +182,10 @@ class TestWhatIsFound:
         found = diagnose(*fitted)
         open_ = replace(found, regions=(replace(found.regions[0], determined=0.0, shown_by=shown),))
         said = " ".join(sentences(open_, ["x", "y"], ["vx", "vy"]))
-        assert re.search(rf"Nobody moved along \(vx .* by more than noise.*: record {more} more there\.", said)
-        assert ("but for 'd3'" in said) == bool(shown) == ("if only with a part of the motion" in said)
+        assert re.search(
+            rf"Near \(x .*\) nobody moved along \(vx .* by more than noise.*: record {more} more there\.", said
+        )
+        assert ("noise but 'd3'" in said) == bool(shown) == ("with a part of the motion" in said)
 
     def test_each_state_says_how_many_tell_it(self, fitted):
         found = diagnose(*fitted)

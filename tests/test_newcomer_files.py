@@ -1052,3 +1052,48 @@ def test_jitter_is_said_where_it_matters_by_inspect_and_fit_alike(tmp_path, jitt
         np.savetxt(tmp_path / f"w{k}.csv", stroke(k, jitter=jitter), delimiter=",", header="t,x,y", comments="")
     for ran in (call("inspect", tmp_path), call("fit", tmp_path, *READ, "-o", tmp_path / "p.npz", "--force")):
         assert ("irregular" in text(ran)) == told
+
+
+def turns(number, tilt, unit=1.0):
+    """Time, and rounds on a plane of some tilt, in metres or another unit."""
+    time = np.linspace(0, 4, 200)
+    flat = np.column_stack([0.1 * np.cos(3 * time), (0.06 + 0.01 * number) * np.sin(3 * time)])
+    states = [0.4, 0.1, 0.2] + flat @ [[1, 0, 0], [0, np.cos(tilt), np.sin(tilt)]]
+    return np.column_stack([time, unit * (states + 2e-4 * np.random.default_rng(number).standard_normal((200, 3)))])
+
+
+def test_a_clock_that_is_named_as_a_state_is_said_to_be_one(tmp_path):
+    write(tmp_path / "a.csv", "stamp,px,py,pz", turns(0, 0.1))
+    said = refused("fit", tmp_path / "a.csv", "--state", "stamp,px,py", "--differentiate", "-o", tmp_path / "p.npz")
+    assert "A clock such as 'stamp' is read as the time and is no state: leave it out." in said
+    other = refused("fit", tmp_path / "a.csv", "--state", "qx,px,py", "--differentiate", "-o", tmp_path / "p.npz")
+    assert "A clock such as" not in other
+
+
+@pytest.mark.parametrize(("names", "known"), [("x_mm,y_mm,z_mm", True), ("pos_x,pos_y,pos_z", True), ("a,b,c", False)])
+def test_positions_are_guessed_with_a_unit_at_the_end_of_their_names(tmp_path, names, known):
+    write(tmp_path / "a.csv", f"t,{names}", turns(0, 0.1))
+    order = ("constraint", tmp_path / "a.csv", "-o", tmp_path / "c.npz")
+    if not known:
+        assert "cannot tell states and actions" in refused(*order)
+    else:
+        assert f"Learnt from {names.replace(',', ', ')} as states and their velocity" in run(*order)
+
+
+def test_a_column_that_is_asked_for_without_its_unit_is_named_with_it(tmp_path):
+    write(tmp_path / "a.csv", "t,x_mm,y_mm,z_mm", turns(0, 0.1))
+    for asked, said in ((("x", "y", "z"), True), (("force", "y_mm"), False)):
+        with pytest.raises(uc.UnconstrainError) as caught:
+            uc.prepare(uc.read(tmp_path / "a.csv"), uc.Recipe(states=asked, differentiate="savgol"))
+        assert ("Did you mean 'x_mm' or 'y_mm' or 'z_mm'?" in str(caught.value)) == said
+
+
+@pytest.mark.parametrize("unit", [1.0, 1000.0])
+def test_millimetres_among_metres_are_said_to_be_and_make_no_common_plane(tmp_path, unit):
+    for number in range(4):
+        rows = turns(number, 0.2 * number * (unit > 1), unit if number == 3 else 1.0)
+        write(tmp_path / f"w{number}.csv", "t,x,y,z", rows)
+    said = text(call("fit", tmp_path, "--state", "x,y,z", "--differentiate", "--learner", "direct", "-o",
+                     tmp_path / "p.npz"))  # fmt: skip
+    assert ("is about 1000 (metres and millimetres) times larger than" in said) == (unit > 1)
+    assert ("All demonstrations lie on one plane" in said) == (unit == 1)

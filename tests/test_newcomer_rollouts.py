@@ -3,6 +3,7 @@
 import json
 import re
 from html import unescape
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ import pytest
 import unconstrain as uc
 from seen import opened
 from test_cli import call, refused, run, write
+from unconstrain.base.display import percent
+from unconstrain.cli import informing
 from unconstrain.cli.informing import TOLD
 from unconstrain.evaluation.verdicts import Mark, Verdict, moves, of_replays, size_and_pace
 from unconstrain.pages.fit import policy_page
@@ -158,7 +161,7 @@ def test_what_a_score_would_look_at_are_the_files_that_were_scored(folder):
 
 def test_runs_that_stray_either_way_are_counted_each():
     sizes, nowhere = np.array([1.5, 1.6, 0.5, 1.0]), np.full(4, np.nan)
-    assert moves(sizes, nowhere)[0] == "3 of 4 turn out too large (2) or too small (1)"
+    assert moves(sizes, nowhere)[0] == "2 of 4 turn out too large and 1 too small"
     assert moves(np.array([1.5, 1.6, 1.7, 1.0]), nowhere)[0] == "3 of 4 turn out too large"
 
 
@@ -194,7 +197,7 @@ def test_a_cycle_that_shrinks_is_told_by_its_last_round(folder):
     for policy, shrinks in ((Ovals(), False), (Shrinking(), True)):
         verdict, found = replayed(Verdict(Mark.GOOD, "Good."), policy, demos, recipe, None, MM)[:2]
         assert (found["last_round"] < 0.8) == shrinks
-        assert ("too small in the last round." in verdict.said) == shrinks
+        assert ("; in the last round 3 of 3 too small." in verdict.said) == shrinks
         assert ("Its size over time." in verdict.doubt) == shrinks
         assert (verdict.mark is Mark.DOUBTFUL) == shrinks
 
@@ -212,7 +215,7 @@ def test_a_look_at_a_policy_that_moves_otherwise_begins_with_that(folder, tmp_pa
     assert run("look", *held, "-o", tmp_path / "a.html").startswith("✔ 3 demonstrations, nothing odd")
     said = run("look", *held, folder / "slow.npz", "-o", tmp_path / "b.html")
     assert said.startswith("! 3 demonstrations, nothing odd")
-    assert "But run from the same starts, 2 of 3 go round too small and 3 of 3 too slow." in " ".join(said.split())
+    assert "But run from the same starts, 2 of 3 go round too small; 3 of 3 too slow." in " ".join(said.split())
 
 
 def test_a_wrong_plane_is_named_as_the_likely_cause_of_a_bad_score(folder):
@@ -306,7 +309,7 @@ def test_an_export_says_what_support_is_called(folder, tmp_path):
     said = " ".join(run("export", folder / "same.npz", "-o", tmp_path / "wipe.c").split())
     assert "wipe_support()" in said
     assert re.search(
-        r"[Rr]un from the same starts, (it keeps size|\d of \d go round too )", said
+        r"[Rr]un from the same starts, (it keeps size|(in the last round )?\d of \d go round too )", said
     )  # the last word before a robot moves
     assert " times" not in said
     assert "in metres" not in said
@@ -347,7 +350,7 @@ def added(sizes, paces=np.nan):
 def test_strokes_that_are_too_large_are_not_outweighed_by_others_that_are_too_small():
     found, figures = added([0.6, 0.7, 1.0, 1.5, 1.7])
     assert found.mark is Mark.DOUBTFUL
-    assert found.said == "Good. But run from the same starts, 4 of 5 turn out too large (2) or too small (2)."
+    assert found.said == "Good. But run from the same starts, 2 of 5 turn out too large and 2 too small."
     assert figures == (
         "size 1.00 times (0.60 to 1.70) the demonstrated (in brackets, least to most of 5 runs), typically 3 mm "
         "from the recorded path; beyond 0.83 to 1.20 times: size of 4 of 5"
@@ -433,29 +436,25 @@ def test_one_swing_may_be_a_habit_and_then_the_directions_learnt_are_followed(do
     assert "Positions may keep to a circle (hinge), which holds 2 of 3" in " ".join(said.split())
     assert "Whether anything was held cannot be told" in said
     assert "Learn it from several" not in door[1]
-    assert "rollout --constraint follows the directions that were learnt" in said
+    assert "hold to the directions learnt of velocities, not to that." in said
     assert "held by" not in uc.storage.load_notes(tmp_path / "c.npz")
     start = ("rollout", place / "p.npz", "--start", ",".join(map(str, swing(0)[0, 1:])), "--steps", 3)
     for ran in (start, ("score", place / "p.npz", place / "1.csv")):
         told = " ".join(call(*ran, "--constraint", tmp_path / "c.npz").err.split())
         assert told.count("c.npz: Whether anything was held cannot be told") == 1
         assert "Do not trust: That 1 of 3 are held." in told
-        assert told.count("c.npz: holds to the directions that were learnt, not to a circle (hinge), which") == 1
-        assert "Whether anything was held" not in (sure := call(*ran, "--constraint", place / "c.npz").err)
-        assert "holds to the directions" not in sure
+        assert "Whether anything was held" not in call(*ran, "--constraint", place / "c.npz").err
 
 
 def test_a_task_that_was_learnt_is_followed_in_place_of_the_mechanism_and_that_is_said(door, tmp_path):
-    place, files = door[0], [door[0] / f"{k}.csv" for k in range(3)]
+    files = [door[0] / f"{k}.csv" for k in range(3)]
     order = ("constraint", *files, "--state", "x,y,z", "--differentiate", "--with-task", "-o", tmp_path / "c.npz")
     said = " ".join(run(*order).split())
     assert "Positions may keep to a circle (hinge), which holds 2 of 3" in said
     assert "follows the mechanism" not in said
-    assert "rollout --constraint follows the directions that were learnt" in said
+    assert "hold to the directions learnt of velocities, not to that." in said
     assert "follows the mechanism" not in run("info", tmp_path / "c.npz")
-    start = ("rollout", place / "p.npz", "--start", ",".join(map(str, swing(0)[0, 1:])), "--steps", 3)
-    told = call(*start, "--constraint", tmp_path / "c.npz").err
-    assert "c.npz: holds to the directions that were learnt, not to a circle (hinge), which was named" in told
+    assert "held by" not in uc.storage.load_notes(tmp_path / "c.npz")
 
 
 @pytest.mark.parametrize(("by", "said"), [(0.3, False), (30.0, True)])
@@ -672,10 +671,10 @@ def test_what_keeps_to_a_plane_that_others_cross_is_not_called_free(tmp_path):
     found, said = json.loads(run(*asked, "--json", "-o", tmp_path / "a.html")), words(run(*asked))
     assert {one["looks"] for one in found["movements"]} == {"flat"}
     assert sum(one["free"] > 0.5 for one in found["movements"]) >= 5  # as estimated from what the plates leave
+    assert "How 6 demonstrations look: 6 on a plane that others cross (held to it, or short free strokes)." in said
     assert (
-        "How 6 demonstrations look: 6 on a plane that others cross (as what is held, or a short free stroke)." in said
+        "No sample is said to be free: each demonstration looks held, by a plane or line of its own all along" in said
     )
-    assert "No sample is said to be free: each demonstration looks held, by a plane of its own all along" in said
     assert "Of the samples" not in said
     assert "Mean probability that a sample was free" not in said
     page = (tmp_path / "a.html").read_text("utf-8")
@@ -714,8 +713,139 @@ def test_of_copies_of_one_recording_no_free_or_constrained_ones_are_counted(tmp_
         files = [write(tmp_path / f"a{k}.csv", "t,x [mm],y [mm]", table) for k in range(5)]
     asked = ("diagnose", *files, "--state", "x,y", "--differentiate", "--model", "affine")
     said, told = words(run(*asked)), json.loads(run(*asked, "--json"))["movements"]
-    assert ("How 5 demonstrations look: 5 not to be told as a whole (" in said) == copies
+    assert ("How 5 demonstrations look: 5 undecided (" in said) == copies
     assert ("at 0% of their states three demonstrations or more tell the policy" in said) == copies
     assert ("How 4 demonstrations look: 4 free." in said) == (not copies)
     assert ({one["looks"] for one in told} == {"untold"}) == copies
     assert ("Mean probability that a sample was free" in said) == (not copies)
+
+
+def to_a_goal(folder, held):
+    """Files of strokes to a goal in space, along a bend, each ``held`` to a plane of its own, or free."""
+    rng, files = np.random.default_rng(3), []
+    for k in range(8):
+        normal, start = rng.normal(size=3), rng.uniform(-200, 200, 3)
+        swirl = np.array([[-1.0, -0.8, 0.0], [0.8, -1.0, 0.3], [0.0, -0.3, -1.0]])
+        along = uc.constraints.Plane(normal) if held else None
+        one = uc.rollout(lambda x, to=swirl: x @ to.T, start, 200, 0.02, along)
+        rows = np.column_stack([one.times, one.states + 0.1 * rng.standard_normal((200, 3))])
+        files.append(write(folder / f"s{k}.csv", "t [s],x [mm],y [mm],z [mm]", rows))
+    return files
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_runs_that_are_held_where_a_stroke_lies_are_compared_free_too(tmp_path, held):
+    files, policy = to_a_goal(tmp_path, held), tmp_path / "p.npz"
+    said = words(run("fit", *files, "--state", "x,y,z", "--model", "affine", "-o", policy))
+    assert "un from the same starts, it keeps size" in said
+    for told in (said, words(run("info", policy)), words(run("export", policy, "-o", tmp_path / "p.c"))):
+        assert bool(re.search(r"each held to the plane \(\d\).*; run free, (\d) of \1 go elsewhere, 's", told)) == held
+        assert ("farthest, which is wrong if they were free strokes" in told) == held
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_a_diagnosis_says_of_freedom_what_its_json_says(tmp_path, held):
+    how = "diagnose", *to_a_goal(tmp_path, held)[:5], "--state", "x,y,z", "--model", "cubic"
+    said, found = words(run(*how)), json.loads(run(*how, "--json"))
+    free, unsure = found["free_share"], found["undecided_share"]
+    flat = [one["samples"] * one["free"] for one in found["movements"] if one["looks"] == "flat"]
+    assert bool(flat) == held
+    seem = sum(one["samples"] * one["free"] for one in found["movements"])
+    assert free <= (seem - sum(flat)) / sum(one["samples"] for one in found["movements"]) + 1e-9
+    assert sum(flat) == 0.0 or unsure > 0.0
+    assert free + unsure <= 1.0 + 1e-9
+    told = re.search(r"Of the samples (\d+|<1|>99)% look free", said)
+    assert ("No sample is said to be free" in said) if told is None else percent(free) == f"{told[1]}%"
+    open_ = re.search(r"of (\d+|<1|>99)% recordings cannot tell", said)
+    assert unsure < 0.01 if open_ is None else percent(unsure) == f"{open_[1]}%"
+
+
+def test_held_strokes_that_end_apart_are_guided_to_where_their_policy_rests(tmp_path):
+    how = *to_a_goal(tmp_path, True), "--state", "x,y,z", "--model", "affine"
+    said = words(run("fit", *how, "--guided", "auto", "-o", tmp_path / "guided.npz"))
+    goal = re.search(r"movements arrive: free at \((.*?)\), and", said)[1]
+    assert np.abs([*map(float, goal.split(", "))]).max() < 3.0
+    run("fit", *how, "-o", tmp_path / "p.npz")
+    assert uc.storage.load_notes(tmp_path / "p.npz")["can be guided to"] == "auto"
+    certified = words(run("certify", tmp_path / "guided.npz"))
+    assert re.match(r"[✔!] \S+guided.npz: guaranteed is where movements end up, not how they move\.", certified)
+    assert ("But run from the starts of demonstrations" in certified) == certified.startswith("!")
+
+
+def test_strokes_to_goals_of_their_own_are_not_guided_and_it_is_said_how_to_give_one(tmp_path):
+    rng, files = np.random.default_rng(1), []
+    for k, end in enumerate(np.array([[0.0, 0.0], [300.0, 10.0], [20.0, 300.0], [280.0, 310.0]])):
+        one = uc.rollout(lambda x, to=end: to - x, end + rng.uniform(100, 200, 2), 200, 0.02)
+        rows = np.column_stack([one.times, one.states + 0.05 * rng.standard_normal((200, 2))])
+        files.append(write(tmp_path / f"s{k}.csv", "t [s],x [mm],y [mm]", rows))
+    how = "fit", *files, "--state", "x,y", "-o", tmp_path / "p.npz"
+    said = words(refused(*how, "--guided", "auto"))
+    assert "the mean of these; expected one place; give it with --guided, a number for each state in " in said
+    assert re.search(r"in the units of the data \(the mean of their ends is --guided 1\d\d[\d.]*,1\d\d[\d.]*\)", said)
+    run(*how)
+    run("export", tmp_path / "p.npz", "--ros2", tmp_path / "node")
+    assert uc.storage.load_notes(tmp_path / "p.npz")["can be guided to"] == "goal"
+    assert "can be guided to" not in (tmp_path / "node/README.md").read_text()
+
+
+@pytest.mark.parametrize(
+    ("moves", "mark"), [("it strays up to 157 mm from the recorded paths", "!"), ("it keeps size", "✔")]
+)
+def test_a_certificate_says_beside_what_is_guaranteed_that_runs_stray(tmp_path, moves, mark):
+    shown = uc.rollout(lambda x: -x, np.array([[90.0, 20.0], [-80.0, 50.0], [10.0, -70.0]]), 200, 0.03)
+    policy = uc.ParametricPolicy(uc.Affine(), "direct").fit_demonstrations(shown)
+    guided, notes = (
+        uc.Guided(policy, demonstrations=shown),
+        {informing.MOVES: f"{moves}; unguided it goes round too small"},
+    )
+    uc.save(guided, tmp_path / "guided.npz", notes)
+    said = words(run("certify", tmp_path / "guided.npz"))
+    assert said.startswith(f"{mark} ")
+    assert (f"But run from the starts of demonstrations, {moves}. Trust:" in said) == (mark == "!")
+    assert "unguided" not in said
+
+
+def test_rails_are_named_as_lines_and_free_strokes_are_not(tmp_path):
+    rng = np.random.default_rng(5)
+    for k, free in enumerate([False] * 4 + [True] * 3):
+        way = rng.normal(size=3)
+        rail = lambda x, _, way=way: np.broadcast_to(np.linalg.svd(way[None])[2][1:], (len(x), 2, 3))  # noqa: E731
+        one = uc.rollout(
+            lambda x: -x + 0.5 * x[:, [1, 2, 0]], rng.uniform(-99, 99, 3), 200, 0.02, None if free else rail
+        )
+        rows = np.column_stack([one.times, one.states + 0.05 * rng.standard_normal((200, 3))])
+        write(tmp_path / f"s{k}.csv", "t [s],x [mm],y [mm],z [mm]", rows)
+    how = "diagnose", tmp_path / "*.csv", "--state", "x,y,z", "--model", "affine"
+    looks = {one["name"]: one["looks"] for one in json.loads(run(*how, "--json"))["movements"]}
+    lines = [name for name, how in looks.items() if how == "line"]
+    assert set(lines) <= {"s0", "s1", "s2", "s3"}
+    assert (f"{len(lines)} on a line that others leave (held to it, as by a rail" in words(run(*how))) == bool(lines)
+    alone = "diagnose", *[tmp_path / f"s{k}.csv" for k in range(4)], *how[2:]
+    assert "on a line that others leave (held to it, as by a rail" in words(run(*alone))
+
+
+def test_rest_at_one_end_is_not_said_to_be_the_same_as_at_both(tmp_path):
+    def still(k, before, after):
+        rows = oval(k)[:, 1:]
+        rows = np.vstack([np.repeat(rows[:1], before, axis=0), rows, np.repeat(rows[-1:], after, axis=0)])
+        rows = rows + 0.02 * np.random.default_rng(k).standard_normal(rows.shape)
+        return write(tmp_path / f"r{k}.csv", HEAD, np.column_stack([0.01 * np.arange(len(rows)), rows]))
+
+    files = [still(k, 90, 80 * (k != 2)) for k in range(4)]
+    for ran in (call("fit", *files, "--state", "x,y,z", "-o", tmp_path / "p.npz"), call("inspect", *files)):
+        said = words(ran.out + ran.err)
+        assert len(re.findall(r"'?r0'?: stands still for [^()]*\([^()]*\) before it starts and ", said)) == 1, said
+        assert len(re.findall(r"'?r2'?: stands still for [^()]*\([^()]*\) before it starts, left out", said)) == 1, said
+        assert re.search("the same of '?r1'?, '?r3'?, 3 in all", said), said
+
+
+@pytest.mark.parametrize(("free", "size", "named"), [(1, 1.4, True), (0, 1.4, False), (2, 1.4, False), (1, 1.0, False)])
+def test_a_policy_that_strays_names_the_few_that_look_free_as_on_a_curved_wall(folder, free, size, named):
+    recipe = uc.Recipe(states=("x", "y", "z"), differentiate="savgol")
+    demos, policy = uc.prepare(uc.read(str(folder / "held_*.csv")), recipe), Ovals(size=size)
+    each = np.repeat([0.9 if k < free else 0.1 for k in range(len(demos))], [len(one) for one in demos])
+    policy.solution_ = SimpleNamespace(belief=SimpleNamespace(free=each))
+    then = replayed(Verdict(Mark.GOOD, "Good."), policy, demos, recipe, None, MM).verdict.next
+    said = "'held_3' look free, as do some that curved walls held, which spoil it: compare without them (--leave-out "
+    assert (f"{said}held_3)" in then) == named
+    assert ("look free" in then) == named

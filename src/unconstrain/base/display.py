@@ -13,6 +13,8 @@ Listener = Callable[[str, int, int], None]
 
 Item = TypeVar("Item")
 
+_UNIT = r"_(mm|cm|deg|rad)$"
+
 _listener: ContextVar[Listener | None] = ContextVar("listener", default=None)
 
 
@@ -82,7 +84,7 @@ def with_unit(name: str, unit: str | None) -> str:
 
 def unit_of(names: Iterable[str]) -> str:
     """The unit that all names of columns say, ``"mm"`` of ``"x [mm]"`` and ``"x_mm"``; empty where they say none."""
-    units = {"".join(re.findall(r"_(mm|cm|deg|rad)$", one)) or one[len(bare(one)) :].strip(" ()[]") for one in names}
+    units = {"".join(re.findall(_UNIT, one)) or one[len(bare(one)) :].strip(" ()[]") for one in names}
     return units.pop() if len(units) == 1 else ""
 
 
@@ -104,7 +106,7 @@ def listed(names: Sequence[str], most: int = 30) -> str:
 
 def meant(asked: Sequence[str], known: Iterable[str]) -> str:
     """A question after what somebody may have meant by names that are none of the known; empty where none is near."""
-    plain = {form.casefold(): name for name in reversed(list(known)) for form in (bare(name), name)}
+    plain = {form.casefold(): one for one in [*known][::-1] for form in (re.sub(_UNIT, "", one), bare(one), one)}
     forms = (form.casefold() for name in asked for form in (name, re.split(r"[._/ ]", bare(name))[-1]))
     close = [get_close_matches(form, plain, n=2, cutoff=0.7) for form in forms]
     for mark, apart in (("..", r"\s*[-–:]\s*"), (",", r"[\s;]+")):
@@ -122,7 +124,9 @@ def has_no_column(name: str, missing: Sequence[str], columns: Sequence[str], wor
         return f"{other}: another unit; convert it."
     of_words = f", and of words, for group=, {listed(words)}" if words else ""
     has = f"it has {listed(columns)}{of_words}.{meant(missing, columns)}"
-    return f"'{name}' has no column {listed([*map(repr, missing)])}; {has}"
+    clocks = [one for one in missing if re.fullmatch(r"t|time|(time_?)?stamps?", one.casefold())]
+    read = f" A clock such as {clocks[0]!r} is read as the time and is no state: leave it out." if clocks else ""
+    return f"'{name}' has no column {listed([*map(repr, missing)])}; {has}{read}"
 
 
 @contextmanager

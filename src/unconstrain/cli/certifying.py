@@ -12,7 +12,7 @@ import unconstrain as uc
 from ..base.display import percent, unit_of
 from ..base.errors import ModelFileError
 from .endings import NOT_GUARANTEED
-from .informing import GUIDE, LOST, explained_by
+from .informing import GUIDE, LOST, MOVES, explained_by
 from .printing import option_for_json, say_judged
 from .reading import loaded, to_copy
 
@@ -64,8 +64,15 @@ def _judged(policy: str, stored: Any, found: uc.motion.certificate.Certificate) 
     far = f"That it moves as demonstrated is not guaranteed: {far[0].lower()}{far[1:]}"
     doubt = f"{away}{checked.partition(' Checked at')[0]} {far}".lstrip()
     then = f"unconstrain export {shlex.quote(policy)} -o policy.c"
-    judged = verdicts.Verdict(verdicts.Mark.GOOD, f"{policy}: guaranteed. {unit}", promise.strip(), doubt, then)
-    whole = getattr(getattr(stored, "aim_", None), "whole", 1.0)
+    said, aim = (
+        f"{policy}: guaranteed is where movements end up, not how they move. {unit}",
+        getattr(stored, "aim_", None),
+    )
+    judged = verdicts.Verdict(verdicts.Mark.GOOD, said, promise.strip(), doubt, then)
+    guided = (notes.get(MOVES) or "it keeps").partition("; unguided ")[0]
+    if aim and not guided.startswith(("it keeps", "it nearly keeps")):
+        judged = verdicts.doubted(judged, f"run from the starts of demonstrations, {guided}")
+    whole = getattr(aim, "whole", 1.0)
     said = f"only {percent(whole)} of the demonstrations that its cycle was drawn from go all the way round"
     return judged if whole > 0.5 else verdicts.doubted(judged, said)
 

@@ -17,7 +17,7 @@ import unconstrain as uc
 from ..base.display import bare, listed, unit_of
 from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
-from .informing import HELD_BY, NAMED, OF, SHOWN, WHERE, WOUND, provenance, verdict_of
+from .informing import HELD_BY, OF, PASSING, SHOWN, WHERE, provenance, verdict_of
 from .printing import of_option, option_for_json, print_table, refuse_warnings, say_verdict, say_written
 from .progress import shown
 from .reading import loaded, numbers, of_words, options_for_reading, prepared, said_recipe, with_options
@@ -33,8 +33,7 @@ LENGTHS = ("", "m", "mm", "cm", "um", "km", "in", "ft")
 """Units of positions, and none."""
 
 FOLLOWED = "rollout --constraint and score --constraint hold to that mechanism, in parallel through the start."
-NOT_FOLLOWED = "That names the positions; rollout --constraint follows the directions that were learnt, as said first."
-MAY_LEAVE = "holds to the directions that were learnt, not to {}, which was named: a movement may leave that."
+NOT_FOLLOWED = "rollout --constraint and score --constraint hold to the directions learnt of velocities, not to that."
 
 FEATURES = ("auto", "constant", "affine", "quadratic", "rbf")
 
@@ -61,11 +60,7 @@ def jacobian_of(urdf: str | None, tip: str | None) -> Any:
 @click.command(epilog="\b\nExample:\n  unconstrain constraint wipe_*.csv --state x,y,z --differentiate -o plate.npz")
 @options_for_reading
 @click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=click.Path(dir_okay=False),
-    help="File for the constraint (.npz); where each demonstration has its own, the stem of theirs.",
+    "-o", "--output", required=True, type=click.Path(dir_okay=False), help="File (.npz), or the stem of one for each."
 )
 @of_words("--features", " ".join(FEATURES), "How the held directions may vary with the state.", "auto")
 @options_for_arm
@@ -106,14 +101,13 @@ def constraint(
         click.echo(f"Note: {', '.join(recipe.angles)} as unwrapped: a turn more is another state to it.", err=True)
     outputs = {name: _of_demonstration(output, name) for name in learnt}
     check_outputs([place for name, place in outputs.items() if name], (*paths, jacobian), force)
-    wound = uc.constraints.mechanisms.winding(one.actions for one in demonstrations)
-    verdict = _judged(learnt, named, wound)
+    verdict = _judged(learnt, named, demonstrations)
     if not as_json:
         say_verdict(verdict)
         alone = f"{', '.join(recipe.labels(first.units)[0])} alone, as positions on a surface"
         click.echo(f"Learnt from {alone if surface else said_recipe(recipe, first)}.")
         _say(learnt, surface, recipe.labels(first.units), named)
-    notes = provenance(paths, recipe, first, **reading) | {WOUND: wound}
+    notes = provenance(paths, recipe, first, **reading)
     for name, place in outputs.items():
         uc.save(learnt[name], place, notes | _of(name, learnt[name], named, demonstrations))
     written = {f"constraint of {name}" if name else "constraint": place for name, place in outputs.items()}
@@ -137,33 +131,35 @@ def _of(
     states = uc.stack([one for one in demonstrations if name in ("", one.name)]).states
     told = {WHERE: [states.min(axis=0).tolist(), states.max(axis=0).tolist()]}
     told[OF] = [name] if name else [one.name for one in demonstrations]
-    return told if named is None else told | named.notes(name, learnt)
+    found = {} if named is None else {PASSING: named.passing({name: learnt}, demonstrations)}
+    return told | found | ({} if named is None else named.notes(name, learnt))
 
 
 def _judged(
-    learnt: Mapping[str, uc.LearntConstraint], named: Named | None, wound: bool
+    learnt: Mapping[str, uc.LearntConstraint], named: Named | None, demonstrations: Sequence[uc.Demonstration]
 ) -> uc.evaluation.verdicts.Verdict:
     """What was learnt, and what it is by name where that holds more."""
-    shown, rank = None if named is None else named.shown(learnt), max(one.rank_ for one in learnt.values())
-    found = uc.evaluation.verdicts.of_constraint(*learnt.values(), shown=shown, wound=wound)
-    kinds = {} if named is None else dict(zip(named.names, named.found.candidates[0].kinds, strict=False))
-    if named is not None and "free" in kinds.values() and {*kinds.values()} - {"free", "undecided"}:
+    if named is None:
+        return uc.evaluation.verdicts.of_constraint(*learnt.values())
+    found = uc.evaluation.verdicts.of_constraint(*learnt.values(), shown=named.shown(learnt))
+    kinds = dict(zip(named.names, named.found.candidates[0].kinds, strict=False))
+    if "free" in kinds.values() and {*kinds.values()} - {"free", "undecided"}:
         names = [name for name, kind in kinds.items() if kind in ("free", "undecided")]
         left = shlex.quote(",".join([*click.get_current_context().params["leave_out"], *names]))
         said = f"Demonstrations differ: {named.found.summary}. No one constraint holds all of them."
         then = f"Learn it of those that look held, with --leave-out {left}."
         doubt = "What is learnt of all together." if "" in learnt else f"What is learnt of {listed(names)}."
         return uc.evaluation.verdicts.Verdict(uc.evaluation.verdicts.Mark.DOUBTFUL, said, doubt=doubt, next=then)
-    if named is not None and named.found.kind == "mixture" and {*kinds.values()} <= {"held", "undecided"}:
+    if named.found.kind == "mixture" and {*kinds.values()} <= {"held", "undecided"}:
         sure = f"{[*kinds.values()].count('held')} of {len(kinds)} demonstrations that they were held"
         return found._replace(said=f"{found.said} Positions tell of {sure}, though not by what; not of the others.")
-    if named is not None and named.differs(learnt):
+    if named.differs(learnt):
         said = f"Demonstrations differ: {named.found.summary}. {found.said.replace('held;', 'held in all;')}"
         return found._replace(said=said, next="Learn those of one mechanism alone, with --episodes or --leave-out.")
-    if named is not None and named.found.kind == "free" and named.found.decided:
+    if named.found.kind == "free" and named.found.decided:
         found = found._replace(said=found.said.replace("do not decide it", "keep to nothing that would hold them"))
-    judged = uc.evaluation.verdicts.of_mechanism
-    return found if named is None else judged(found, rank, named.found.mechanism, named.is_followed(learnt))
+    rank, more = max(one.rank_ for one in learnt.values()), named.passing(learnt, demonstrations)
+    return uc.evaluation.verdicts.of_mechanism(found, rank, named.found.mechanism, named.is_followed(learnt), more)
 
 
 def _report(
@@ -201,17 +197,29 @@ def _learnt(
     return {demonstrations[int(str(number))].name: one for number, one in each.items()} or {"": constraint}
 
 
-def _agreeing(asked: uc.LearntConstraint, named: Named | None, *samples: Any) -> dict[str, uc.LearntConstraint]:
-    """By other features if these hold more than positions show: one path always moves little along what bends."""
-    learnt, every = _learnt(asked, *samples), [] if named is None else named.found.candidates
+def _agreeing(
+    asked: uc.LearntConstraint, named: Named | None, demonstrations: Sequence[uc.Demonstration], surface: bool
+) -> dict[str, uc.LearntConstraint]:
+    """By other features if these let pass what positions show to be held, or hold more: one path always does."""
+    learnt = _learnt(asked, demonstrations, surface)
+    if named is None or asked.features != "auto" or asked.task:
+        return learnt
+    every = named.found.candidates
     likely = [one for one in every if every[0].against(one) < uc.constraints.mechanisms.LIKELY]
     ranks = {max(each.rank for each in one.mechanisms) for one in likely}
-    forms = FEATURES[1:] if len(ranks - {0}) == len(ranks) == 1 and asked.features == "auto" and not asked.task else ()
-    for name in forms if max(one.rank_ for one in learnt.values()) > max(ranks, default=0) else ():
-        with contextlib.suppress(InvalidDataError):
-            other = _learnt(uc.LearntConstraint(name), *samples)
-            if max(one.rank_ for one in other.values()) <= max(ranks):
-                return other
+    most = max(ranks) if len(ranks - {0}) == len(ranks) == 1 else math.inf
+
+    def wrong(one: Mapping[str, uc.LearntConstraint]) -> tuple[bool, bool]:
+        contrary = named.passing(one, demonstrations) > uc.evaluation.verdicts.CONTRARY
+        return contrary, max(each.rank_ for each in one.values()) > most
+
+    for part in [demonstrations] if (shared := "" in learnt) else [[one] for one in demonstrations]:
+        best = learnt if shared else {part[0].name: learnt[part[0].name]}
+        for features in FEATURES[1 + surface :] if any(wrong(best)) else ():
+            with contextlib.suppress(InvalidDataError):
+                other = _learnt(uc.LearntConstraint(features), part, surface)
+                best = min(best, other if shared else {part[0].name: other[""]}, key=wrong)
+        learnt = best if shared else learnt | best
     return learnt
 
 
@@ -284,8 +292,6 @@ def held_of(
         click.echo(f"Note: {path}: {said}", err=True)
     if (judged := verdict_of(learnt, notes)).mark is not uc.evaluation.verdicts.Mark.GOOD:
         click.echo(f"Note: {path}: {judged.said} {f'Do not trust: {judged.doubt}' * bool(judged.doubt)}", err=True)
-    if notes.get(NAMED):
-        click.echo(f"Note: {path}: {MAY_LEAVE.format(notes[NAMED])}", err=True)
     return learnt if learnt.task or HELD_BY not in notes else uc.constraints.mechanisms.restored(notes[HELD_BY])
 
 
@@ -337,7 +343,7 @@ class Named(NamedTuple):
     def shown(self, learnt: Mapping[str, uc.LearntConstraint]) -> bool | None:
         """Whether positions show what held them, and a movement can be held by it; None where it may be a habit."""
         decided = self.found.decided and self.found.kind != "free" and not ("" in learnt and self.differs(learnt))
-        return False if not decided else None if self.found.doubt else True
+        return False if not decided else None if self.found.habit else True
 
     def differs(self, learnt: Mapping[str, uc.LearntConstraint]) -> bool:
         """Whether kinds of mechanisms differ, or one constraint for all holds less than those of each."""
@@ -349,14 +355,24 @@ class Named(NamedTuple):
         one = len(self.held) == 1
         return bool(self.shown(learnt)) and all((one or name) and not each.task for name, each in learnt.items())
 
+    def passing(self, learnt: Mapping[str, uc.LearntConstraint], demonstrations: Sequence[uc.Demonstration]) -> float:
+        """How much of what a mechanism that is sure holds, or of its own if that is less, what was learnt lets pass."""
+        import numpy as np
+
+        if self.shown(learnt) is False or any(one.task for one in learnt.values()):
+            return 0.0
+        own, found = dict(zip(self.names, self.held, strict=False)) if len(self.held) > 1 else {}, [0.0]
+        for one in demonstrations if "" in learnt else [one for one in demonstrations if one.name in learnt]:
+            held, rows = own.get(one.name, self.held[0]), (learnt.get("") or learnt[one.name])(one.states)
+            alike = np.linalg.svd(held.rows(one.states) @ rows.swapaxes(1, 2), compute_uv=False)
+            found.append(float(np.median(1.0 - np.minimum(alike.min(axis=1, initial=1.0), 1.0) ** 2) ** 0.5))
+        return max(found)
+
     def notes(self, name: str, learnt: uc.LearntConstraint) -> dict[str, Any]:
         """What goes into the file of one demonstration, or of all together: words, and numbers where it is sure."""
         own = self.held[self.names.index(name)] if name and len(self.held) > 1 else self.held[0]
         told = {"mechanism": dict(self.each).get(name, self.found.summary), SHOWN: self.shown({name: learnt})}
-        if self.is_followed({name: learnt}):
-            return told | {HELD_BY: own.numbers()}
-        more = self.shown({name: learnt}) is not False and (own.rank > learnt.rank_ or own.form.straight is not None)
-        return told | ({NAMED: own.title} if more else {})
+        return told | ({HELD_BY: own.numbers()} if self.is_followed({name: learnt}) else {})
 
     @property
     def each(self) -> list[tuple[str, str]]:
@@ -368,7 +384,8 @@ class Named(NamedTuple):
     @property
     def sentences(self) -> list[str]:
         """The verdict, and what it leaves open."""
-        known, doubt = f"Mechanism{', if these are positions' * (not self.found.mechanism.unit)}", self.found.doubt
+        known, doubt = "Shape of the path, held or not" if self.found.habit else "Mechanism", self.found.doubt
+        known += ", if these are positions" * (not self.found.mechanism.unit)
         meant = f" ({'± is half of a 95 % interval, ' * ('±' in self.found.summary)}10:1 are odds)"
         meant *= ":1" in self.found.summary
         apart = [
@@ -377,6 +394,7 @@ class Named(NamedTuple):
         apart = [] if self.found.candidates[0].over_free else apart  # of each its kind says that
         free = f"Maybe free, as no other has an axis of that direction: {listed(apart)}."
         said = [f"{known}: {self.found.summary}{meant}.", *([f"{doubt[0].upper()}{doubt[1:]}."] if doubt else [])]
+        said[0] = said[0].replace("nothing held", "none") if self.found.habit else said[0]
         return [*said, free] if doubt and 0 < len(apart) < len(self.held) else said
 
 
@@ -448,7 +466,7 @@ def table_of(
     """What held each demonstration, where that differs: head and rows; the whole of it is wide."""
     own = {name: one for name, one in learnt.items() if name}
     columns = {
-        "held": [f"{one.rank_} of {one.choice_.actions}, {one.choice_.name}" for one in own.values()],
+        "looks held": [f"{one.rank_} of {one.choice_.actions}, {one.choice_.name}" for one in own.values()],
         "missed where held out": [f"{one.choice_.held_out:.3g}" for one in own.values()],
     }
     names = list(own)
@@ -457,7 +475,8 @@ def table_of(
         columns["kind"] = kinds if named.found.kind == "mixture" else []
         what = f"angle of {'normal' if {*kinds} == {'plane'} else 'axis'} to {bare(named.up)} axis"
         angles = [f"{math.degrees(math.acos(min(abs(one.axis[-1]), 1.0))):.1f}°" for one in held]
-        columns[what] = [each * ("tilt" in one.margins) for each, one in zip(angles, held, strict=True)]
+        sure = ["tilt" in one.margins and kind != "undecided" for one, kind in zip(held, kinds, strict=True)]
+        columns[what] = [each * told for each, told in zip(angles, sure, strict=True)]
         columns["radius"] = ["" if one.vague or not one.radius else f"{one.radius:.3g} {one.unit}" for one in held]
         at = [", ".join(f"{each + 0.0:.3f}" for each in one.centre.round(3)) for one in held]
         columns["centre"] = [each * bool(radius) for each, radius in zip(at, columns["radius"], strict=True)]

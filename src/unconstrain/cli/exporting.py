@@ -11,7 +11,7 @@ import click
 import unconstrain as uc
 
 from ..base.errors import SettingError
-from .informing import MARK, MOVES, RAN, verdict_of
+from .informing import GUIDE, MARK, MOVES, RAN, verdict_of
 from .printing import option_for_json, say_judged
 from .reading import fitted_policy, of_words
 from .writing import check_outputs, option_for_force
@@ -77,7 +77,8 @@ def export(
     notes["units"] = uc.Recipe.from_dict(notes.get("recipe", {})).units(notes.get("units", {}))  # as recorded, if old
     found, limits = verdict_of(learnt, notes), _limits(notes, ros2)
     judged = found._replace(doubt=f"{limits} {found.doubt}".rstrip())
-    notes |= {MARK: f"{judged.mark.name.lower()}. {judged.said} Do not trust: {judged.doubt}", RAN: None, MOVES: None}
+    notes |= {MARK: f"{judged.mark.name.lower()}. {judged.said} Do not trust: {judged.doubt}"}
+    notes |= dict.fromkeys((RAN, MOVES, GUIDE))
     written, then = dict[str, str](), _NEXT_ROS2
     if ros2 is not None:
         taken = learnt.export_ros2(ros2, name, messages=messages, notes=notes)

@@ -36,11 +36,8 @@ GUIDE = "can be guided to"
 MARK = "verdict"
 """Note of how ``fit`` judged it."""
 
-OF, HELD_BY, SHOWN, WHERE, WOUND = "of", "held by", "shown by positions", "least and largest states", "winding"
-"""Notes of a constraint: of which demonstrations; mechanism; if that is sure; where; if they turn more than free."""
-
-NAMED = "named, but not held to"
-"""Note of the mechanism that positions may keep to, where the directions that were learnt are followed all the same."""
+OF, HELD_BY, SHOWN, WHERE, PASSING = "of", "held by", "shown by positions", "least and largest states", "let pass"
+"""Notes of a constraint: of which demonstrations; mechanism; if that is sure; where; how much of it does not hold."""
 
 CONTENTS, ENDS = "contents", 2**16
 """Note of what each demonstration is known again by, and bytes at either end of a file by which that is."""
@@ -94,7 +91,7 @@ def info(file: str, as_json: bool) -> None:
     A policy, guided or not, or a constraint.
     """
     held, notes = loaded(file, uc.Policy | uc.LearntConstraint | uc.Guided), uc.storage.load_notes(file)
-    inner = ("recipe", "units", "digests", CONTENTS, GUIDE, MARK, NOISE, MOVES, HELD_BY, SHOWN, WHERE, WOUND)
+    inner = ("recipe", "units", "digests", CONTENTS, GUIDE, MARK, NOISE, MOVES, HELD_BY, SHOWN, WHERE, PASSING)
     rest = {name: value for name, value in notes.items() if name not in inner}
     verdict = to_copy(verdict_of(held, notes), file, notes)
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held, notes), **rest}
@@ -128,7 +125,7 @@ def _columns(notes: Mapping[str, Any]) -> dict[str, Any]:
 def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
     """What was learnt, and how; a guided policy is told by the one in it, less what guiding takes."""
     if isinstance(held, uc.LearntConstraint):
-        count = max(held.rank_, uc.constraints.mechanisms.restored(notes[HELD_BY]).rank if notes.get(HELD_BY) else 0)
+        count = uc.constraints.mechanisms.restored(notes[HELD_BY]).rank if notes.get(HELD_BY) else held.rank_
         told = f"{count} of {held.choice_.actions} directions"
         return {"held": told, "features": held.choice_.name, "noise": held.noise_}
     policy, lost = innermost(held), notes.get(LOST) or 0.0
@@ -151,9 +148,10 @@ def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
 def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:
     """Judge a policy, constraint or guided policy by what it explained where held out, and what ``fit`` wrote down."""
     if isinstance(held, uc.LearntConstraint):
-        found = uc.evaluation.verdicts.of_constraint(held, shown=notes.get(SHOWN), wound=notes.get(WOUND))
+        found = uc.evaluation.verdicts.of_constraint(held, shown=notes.get(SHOWN))
         named = notes.get(HELD_BY) and uc.constraints.mechanisms.restored(notes[HELD_BY])
-        return uc.evaluation.verdicts.of_mechanism(found, held.rank_, named, sure=True) if named else found
+        judged, passing = uc.evaluation.verdicts.of_mechanism, notes.get(PASSING) or 0.0
+        return judged(found, held.rank_, named, sure=True, passing=passing) if named else found
     if not hasattr(innermost(held), "solution_"):
         mark = uc.evaluation.verdicts.Mark.BAD
         return uc.evaluation.verdicts.Verdict(mark, "Not fitted: it cannot predict.", next="'unconstrain fit'")

@@ -137,8 +137,8 @@ def say_surveys(surveys: Sequence[Any]) -> None:
     several = {title for title, remark in each if remark.code == "several-in-one"}
     same = uc.evaluation.verdicts.SAME_CAUSE
     each = [(title, one) for title, one in each if title not in several or one.code not in same]
-    for code in dict.fromkeys(remark.code for _, remark in sorted(each, key=lambda one: not one[1].warns)):
-        titles = {title: remark for title, remark in reversed(each) if remark.code == code}
+    for kind in dict.fromkeys(_kind(remark) for _, remark in sorted(each, key=lambda one: not one[1].warns)):
+        titles = {title: remark for title, remark in reversed(each) if _kind(remark) == kind}
         *others, first = titles
         click.echo(as_typed(titles[first].about(first)))
         if others:
@@ -366,11 +366,16 @@ def show_warning(message: Warning | str, *_: Any) -> None:
     keep_codes([getattr(message, "code", "")])
     remark, context = getattr(message, "remark", None), click.get_current_context(silent=True)
     if remark is not None and context is not None:
-        titles = context.meta.setdefault(TITLES, {}).setdefault(remark.code, {})
+        titles = context.meta.setdefault(TITLES, {}).setdefault(_kind(remark), {})
         titles[message.title] = remark  # type: ignore[union-attr]
         if len(titles) > 1:
             return
     click.echo(f"Note: {as_typed(str(message))}", err=True)
+
+
+def _kind(remark: Any) -> str:
+    """Its code, and of what is at ends, at which."""
+    return f"{remark.code} {' and '.join(re.findall('before it starts|at its end', remark.message))}".rstrip()
 
 
 def doubt_degrees(option: str, states: Sequence[float], recipe: uc.Recipe) -> None:
@@ -383,9 +388,9 @@ def doubt_degrees(option: str, states: Sequence[float], recipe: uc.Recipe) -> No
 
 def say_others() -> None:
     """Say of which other recordings the notes hold too."""
-    for code, (_, *others) in click.get_current_context().meta.pop(TITLES, {}).items():
+    for kind, (_, *others) in click.get_current_context().meta.pop(TITLES, {}).items():
         if others:
-            click.echo(f"Note: {code}: the same of {listed(others, 8)}, {len(others) + 1} in all.", err=True)
+            click.echo(f"Note: {kind}: the same of {listed(others, 8)}, {len(others) + 1} in all.", err=True)
 
 
 def say(remarks: Iterable[Any]) -> None:

@@ -27,7 +27,7 @@ OBJECTS = {
     "goal=, or orbit='shown' for a cycle": "--guided its place, a number for each state, or --guided cycle",
     "fit each by itself": "fit each by itself (its file alone, or --episodes with its name)",
     "guide the policy (uc.Guided)": "fit with --guided auto",
-    "give it with goal=": "give it with --guided, a number for each state",
+    "give it with goal=": "give it with --guided, a number for each state in the units of the data",
     "Take Hybrid()": "Take --learner hybrid",
     "the warnings of a survey": "what 'unconstrain inspect' warns of",
 }

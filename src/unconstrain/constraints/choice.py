@@ -68,6 +68,8 @@ class Choice:
         Of the actions.
     several : bool
         Whether it is of several demonstrations.
+    wound : bool, optional
+        Whether they turn more on their way than free ones do, if that is known.
     """
 
     name: str
@@ -83,6 +85,7 @@ class Choice:
     actions: int
     unit: float
     several: bool = False
+    wound: bool | None = None
 
     def missed(self, states: Array, actions: Array) -> float:
         """Mean square along held directions, as a share of that of all actions, of others than were learnt from."""
@@ -121,6 +124,8 @@ class Choice:
     def doubts(self) -> tuple[str, ...]:
         """What the data does not tell, in sentences."""
         said = []
+        if self.wound is False and not self.several:
+            said.append("Free strokes that turn as little keep to a surface of their own, too: record ways that cross.")
         if self.one_way:
             said.append(
                 "At each state only one direction was seen: a free policy that is a function of the state looks the "
@@ -166,17 +171,9 @@ def chosen(evidence: Evidence) -> Choice:
     noise = evidence.unit * float(np.sqrt(motion * np.sqrt(best.fitted.share * best.held_out.share)))
     shares = {name: min(one.held_out.share for one in tried if one.name == name) for name in evidence.forms}
     sizes = kept.states.shape[1], kept.actions.shape[1]
+    form, several = evidence.forms[best.name], evidence.split is not None
     told = noise, best.held_out.share, best.held_out.rate, explained, shares
-    return Choice(
-        best.name,
-        evidence.forms[best.name],
-        best.strength,
-        best.fields,
-        *told,
-        *sizes,
-        evidence.unit,
-        evidence.split is not None,
-    )
+    return Choice(best.name, form, best.strength, best.fields, *told, *sizes, evidence.unit, several)
 
 
 def simplest(losses: Array, margin: float = 0.0) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from copy import copy
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from typing import Any, Self
@@ -11,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import Array, Groups, as_groups, as_matrix
+from ..base.arrays import Array, Groups, as_groups, as_matrix, on_host
 from ..base.display import Shown, counted
 from ..base.errors import InvalidDataError, SettingError
 from ..base.parameters import Parameters
@@ -21,6 +22,7 @@ from ..training import Batch, FirstLook
 from .choice import EXACT, Choice, chosen, simplest
 from .evidence import FOLDS, Evidence
 from .forms import NAMED, Jacobian, Lifted, Surface, Velocities, forms_of
+from .mechanisms import winding
 
 
 class LearntConstraint(Parameters, Shown):
@@ -97,9 +99,13 @@ class LearntConstraint(Parameters, Shown):
             If the features or the Jacobian are not what they should be.
         """
         table: Any = as_matrix(states, "states", convert=False)
-        if actions is None:
-            return self.fit_parts([[(table, table - table.mean(axis=0), sample_weight, groups)]], _here, surface=True)
-        return self.fit_parts([[(table, actions, sample_weight, groups)]], _here)
+        moves = table - table.mean(axis=0) if actions is None else actions
+        self.fit_parts([[(table, moves, sample_weight, groups)]], _here, surface=actions is None)
+        steps = np.diff(on_host(table), axis=0, append=0.0)[:-1] if actions is None else on_host(moves)
+        names = np.zeros(len(steps)) if groups is None else as_groups(groups, len(on_host(table)))[: len(steps)]
+        each = (np.asarray(steps)[names == name] for name in dict.fromkeys(names.tolist()))
+        self.choice_ = replace(self.choice_, wound=winding(each))
+        return self
 
     def fit_each(
         self, states: ArrayLike, actions: ArrayLike | None, groups: Groups

@@ -125,7 +125,7 @@ class Region:
 class Movement:
     """One demonstration: its name, samples, mean probability of a free sample (None if unknown), and as in Region.
 
-    It ``looks`` free, constrained, unsure, flat if it keeps to a plane that others cross, or untold; None if unknown.
+    It ``looks`` free, constrained, unsure, flat or line if it keeps to such a one that others leave, untold; or None.
     """
 
     name: str
@@ -165,9 +165,9 @@ class Diagnosis:
     told_together : float
         That, or if more the share at which all demonstrations together determine it, and one or two may be needed.
     free_share : float
-        Estimated share of samples that nothing constrained.
+        Estimated share of samples that nothing constrained; none on a plane that others cross.
     undecided_share : float
-        Estimated share of samples that were free or always held in the same way: the data cannot tell.
+        Estimated share of samples that were free or always held in the same way: the data cannot tell, nor there.
     regions : tuple of Region
         First those that all demonstrations leave open; of these, and of others, by decreasing spread ``along``.
     movements : tuple of Movement
@@ -280,6 +280,10 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
     known &= free is None or len({one.states.tobytes() for one in demos}) >= ENOUGH  # a copy tells nothing more
     together = belief.together if free is not None and len(belief.together) == len(states) else known
     jitter = float(np.sqrt(robust.noise_by_differences(actions, groups)))
+    movements = _movements(demos, undetermined, known, free, max(jitter, 0.1 * SMALL * typical))
+    others = [one for one in movements if one.looks not in ("flat", "line")]
+    seem = sum(one.samples * (one.free or 0.0) for one in others) / len(states) if others != [*movements] else 1.0
+    free_share = min(solution.free_share, seem)  # what is on a plane or line that others leave is not told
     return Diagnosis(
         method=solution.method,
         candidates={name: one.risk for name, one in belief.candidates.items()},
@@ -291,10 +295,10 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
         directions_determined=solution.determined_share,
         states_determined=float(known.mean()),
         told_together=max(float(known.mean()), 0.0 if free is None else belief.told_together),
-        free_share=solution.free_share,
-        undecided_share=belief.undecided_share,
+        free_share=free_share,
+        undecided_share=solution.free_share + belief.undecided_share - free_share,
         regions=_regions(policy, demos, undetermined, known, typical, known | together),
-        movements=_movements(demos, undetermined, known, free, max(jitter, 0.1 * SMALL * typical)),
+        movements=movements,
         suspects=() if free is None else tuple(places_of(belief.suspects, zip(names_of(demos), demos, strict=True))),
         planes=len(planes_of(demos)),
         told=known.astype(int) + (known | together),
@@ -428,10 +432,10 @@ def _movements(
     demos: list[Demonstration], undetermined: Array, known: NDArray[np.bool_], free: Array | None, noise: float
 ) -> tuple[Movement, ...]:
     groups, found = stack(demos).groups, list[Movement]()
-    for index, (name, plane) in enumerate(zip(names_of(demos), crossed(demos, noise), strict=True)):
+    for index, (name, kept) in enumerate(zip(names_of(demos), crossed(demos, noise), strict=True)):
         part = groups == index
         mean, told = None if free is None else float(free[part].mean()), float(known[part].mean())
-        how = None if mean is None else looks(mean, told, plane)
+        how = None if mean is None else looks(mean, told, kept)
         spread = float(np.sqrt((undetermined[part] ** 2).mean()))
         found.append(Movement(name, int(part.sum()), mean, told, spread, how))
     return tuple(found)

@@ -27,8 +27,9 @@ FREE, CONSTRAINED = 0.5, 0.1
 
 NOWHERE = "No place needs another demonstration: three or more tell the policy at each."
 COUNTED = {"free": "free", "constrained": "constrained", "unsure": "either"}
-LOOKS = COUNTED | {"flat": "on a plane that others cross (as what is held, or a short free stroke)"}
-LOOKS["untold"] = "not to be told as a whole (too little else was seen there, or all was held the same way)"
+LOOKS = COUNTED | {"flat": "on a plane that others cross (held to it, or short free strokes)"}
+LOOKS["line"] = "on a line that others leave (held to it, as by a rail, or straight free strokes)"
+LOOKS["untold"] = "undecided (too little else was seen there, or all was held the same way)"
 """How demonstrations look, and how that is said; those of the first three are compared by probability."""
 
 MOST_NAMED = 8
@@ -114,12 +115,12 @@ def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[st
         off = f", though {percent(worst)} of a typical action may be off there" * bool(worst > SMALL)
         return f"Every recorded state is determined, as far as noise lets it be told{off}."
     region = found.regions[0]
-    where = f"along {named(region.direction, actions)} near {named(region.state, states)}"
+    where, along = f"Near {named(region.state, states)}", f"along {named(region.direction, actions)}"
     if len(region.shown_by) >= ENOUGH:
-        return f"What was seen {where} is too little, or does not agree."
-    said = f"Nobody moved {where} by more than noise"
-    but = f", but for {' and '.join(map(repr, region.shown_by))}, if only with a part of the motion"
-    return f"{said}{but * bool(region.shown_by)}: record {('three', 'two', 'one')[len(region.shown_by)]} more there."
+        return f"{where} what was seen {along} is too little, or does not agree."
+    but = f" but {' and '.join(map(repr, region.shown_by))}, with a part of the motion" * bool(region.shown_by)
+    more = ("three", "two", "one")[len(region.shown_by)]
+    return f"{where} nobody moved {along} by more than noise{but}: record {more} more there."
 
 
 def needs_more(found: Diagnosis) -> bool:
@@ -134,28 +135,23 @@ def to_record(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -
     return f"{advice}left free: tilt what holds it, such as the plate, another way, or take another."
 
 
-def looks(free: float, told: float, flat: bool) -> str:
-    """How one looks by its mean probability of a free sample, the share of its samples that three tell, and a plane."""
-    if told < PARTLY or flat:
-        return "constrained" if told >= PARTLY and free < CONSTRAINED else "flat" if flat else "untold"
+def looks(free: float, told: float, kept: str) -> str:
+    """How one looks by its mean probability of a free sample, the share that three tell, and what it ``kept`` to."""
+    if told < PARTLY or kept:
+        return "constrained" if told >= PARTLY and free < CONSTRAINED else kept or "untold"
     return "constrained" if free < CONSTRAINED else "free" if free > FREE else "unsure"
 
 
 def about_freedom(found: Diagnosis) -> str:
     """What looks free, and how demonstrations look."""
     many = Counter(one.looks for one in found.movements)
-    others = [one for one in found.movements if one.looks != "flat"]
     look = ", ".join(f"{many[how]} {words}" for how, words in LOOKS.items() if many[how])
     look = f"How {counted(len(found.movements), 'demonstration')} look: {look}."
-    if not others:
-        said = "No sample is said to be free: each demonstration looks held, by a plane of its own all along"
+    if many["flat"] + many["line"] == len(found.movements):
+        said = "No sample is said to be free: each demonstration looks held, by a plane or line of its own all along"
         return f"{said}; a short free stroke may, too. {look}"
-    every = sum(one.samples for one in found.movements)
-    free, all_ = (sum(one.samples * (one.free or 0.0) for one in some) / every for some in (others, found.movements))
-    share = free if len(others) < len(found.movements) else found.free_share
-    unsure = found.undecided_share + all_ - free  # of those on a plane that others cross
-    unsure *= unsure >= LITTLE
-    much, held, open_ = percents((share, 1.0 - share - unsure, unsure))
+    unsure = found.undecided_share * (found.undecided_share >= LITTLE)
+    much, held, open_ = percents((found.free_share, 1.0 - found.free_share - unsure, unsure))
     said = f"Of the samples {much} look free (nothing that shows above the noise held them), {held} held"
     if unsure:
         said += f", and of {open_} recordings cannot tell: they were free or always held in the same way, which "

@@ -12,8 +12,9 @@ from ..learners import robust
 from ..recordings import Demonstration, Recipe, readers, stack
 from .marks import ENOUGH, Mark, Verdict
 
-FLAT, ONE = 0.1, 0.03
-"""Held are directions of less spread than the first share of the longest, and all on one plane below the second."""
+FLAT, ONE, UNLIKE = 0.1, 0.03, 100.0
+"""Held are directions of less spread than the first share of the longest, and all on one plane below the second; not
+in one unit are demonstrations that are larger than others by the third factor."""
 
 WITHIN = 3.0
 """Who keeps to a plane moves across it by no more than so many times the noise."""
@@ -38,10 +39,11 @@ def flat(states: Array, share: float = FLAT) -> tuple[Array, Array]:
 def planes_of(demonstrations: Sequence[Demonstration]) -> Array:
     """Normals (K, 3) of the planes that demonstrations in space keep to: one, if it or parallel ones are all.
 
-    There are none where some keep to no plane or to a line, or where their planes differ as their places do.
+    There are none where some keep to no plane or to a line, or in another unit, or planes differ as their places do.
     """
     whole, states = np.vstack([one.states for one in demonstrations]), [one.states for one in demonstrations]
-    if whole.shape[1] != 3 or demonstrations[0].actions.shape[1] != 3:
+    sizes = [float(np.ptp(one, axis=0).max()) for one in states]
+    if whole.shape[1] != 3 or demonstrations[0].actions.shape[1] != 3 or max(sizes) > UNLIKE * min(sizes):
         return whole[:0]
     centred, each = np.vstack([one - one.mean(axis=0) for one in states]), np.array([flat(one)[0] for one in states])
     common, together = flat(centred, ONE)[0], whole.var(axis=0).sum() < 2.0 * centred.var(axis=0).sum()
@@ -50,19 +52,19 @@ def planes_of(demonstrations: Sequence[Demonstration]) -> Array:
     return each[:, 2] if together and each[:, 2].any(axis=1).all() and not each[:, 1].any() else whole[:0]
 
 
-def crossed(demonstrations: Sequence[Demonstration], noise: float) -> list[bool]:
-    """Whether each demonstration in space keeps to a plane that others move across, as what is held does.
+def crossed(demonstrations: Sequence[Demonstration], noise: float) -> list[str]:
+    """Whether each demonstration in space keeps to a plane ("flat") or "line" that others leave, as if held, else "".
 
-    It keeps to it if it moves across it by no more than :data:`WITHIN` times the noise, a standard deviation of each
+    They keep to it if they move across it by no more than :data:`WITHIN` times the noise, a standard deviation of each
     action.
     """
     states, actions, groups = stack(list(demonstrations))
-    found = [False] * len(demonstrations)
+    found = [""] * len(demonstrations)
     for index in range(len(found) if (states.shape[1], actions.shape[1]) == (3, 3) else 0):
         held, (own, others) = flat(states[groups == index])[0], (actions[groups == index], actions[groups != index])
-        across = ((others @ held[2]) ** 2).sum() > FLAT**2 * (others**2).sum()
-        kept = np.sqrt(((own @ held[2]) ** 2).mean()) <= WITHIN * noise
-        found[index] = bool(held[2].any() and not held[1].any() and across and kept)
+        across = ((others @ held.T) ** 2).sum() > FLAT**2 * (others**2).sum()
+        if across and held[2].any() and (np.sqrt(((own @ held.T) ** 2).mean(axis=0)) <= WITHIN * noise).all():
+            found[index] = "line" if held[1].any() else "flat"
     return found
 
 

@@ -80,12 +80,6 @@ def of_untold(share: float) -> str:
     return f"at {said} of the recorded states no recording tells the policy in some direction"
 
 
-def _of_left_out(share: float) -> str:
-    much = percent(share) if share < 1.0 else "more than all"
-    alike = "where demonstrations that were held alike are left out together"
-    return f" But {alike}, it misses {much} of their motion: the others tell little of them."
-
-
 def of_explained(
     share: float,
     demonstrations: int,
@@ -129,10 +123,11 @@ def of_explained(
     if little:
         advice = there or "'unconstrain diagnose' says what to record."
     trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
+    if left_out > 1.0 - FAIR:
+        much = percent(1.0 - left_out) if left_out < 1.0 else "nothing"
+        what += f", but {much} of demonstrations that were held alike if these are left out"
+        mark, word = no_better(mark), f"{word.partition(' ')[0]} along recorded motion, and no further"
     said = f"{little}{who} {_explains(share, what)}: {word}.{retold}"
-    if left_out:
-        said += _of_left_out(left_out)
-        mark = no_better(mark) if left_out > 1.0 - FAIR else mark
     return Verdict(mark, said, trust, across, advice)
 
 
@@ -291,13 +286,8 @@ def of_diagnosis(found: Diagnosis, first: str = "") -> Verdict:
     return Verdict(mark, said, trust, doubt, then if share < 1 or open_spread else "Demonstrate where nobody was.")
 
 
-def of_constraint(
-    learnt: LearntConstraint, *others: LearntConstraint, shown: bool | None = None, wound: bool | None = None
-) -> Verdict:
-    """Judge a constraint, or one for each demonstration, by what it missed.
-
-    ``shown`` is whether positions show it, and ``wound`` whether demonstrations turn more than free ones, if known.
-    """
+def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bool | None = None) -> Verdict:
+    """Judge a constraint, or one for each demonstration, by what it missed; ``shown`` is whether positions show it."""
     every = (learnt, *others)
     choice = max((one.choice_ for one in every), key=lambda each: each.held_out)
     missed, ranks = sum(one.choice_.held_out for one in every) / len(every), {one.rank_ for one in every}
@@ -305,14 +295,14 @@ def of_constraint(
         said = "No direction was held: nothing constrained these movements, or each direction was seen."
         return Verdict(Mark.DOUBTFUL, said, next="Look whether the demonstrations were held in different ways.")
     one_way, alone = all(one.choice_.one_way for one in every), others or not choice.several
-    if not shown and (one_way or (alone and wound is False)):
+    straight = sum(one.choice_.wound is False for one in every) > len(every) / 2
+    if not shown and (one_way or (alone and straight)):
         little = "free strokes that turn as little keep to a surface of their own, too"
         why = "each state was passed one way only, as by a free policy" if one_way else little
         then = "Record movements that cross each other, and learn it again; or name the --features."
         single = not others and not choice.several
-        then += (
-            f" '{'diagnose' * single or 'fit'}' compares several with one policy, which may tell that they were held."
-        )
+        by = "diagnose" if single else "fit"
+        then += f" '{by}' compares several with one policy, which may tell that they were held."
         said = f"Whether anything was held cannot be told{' by one demonstration alone' * single}: {why}."
         return Verdict(Mark.DOUBTFUL, said, doubt=f"That {min(ranks)} of {choice.actions} are held.", next=then)
     mark, word = graded(1.0 - missed)
@@ -338,16 +328,28 @@ def of_constraint(
     return Verdict(mark, said, "What was held, near recorded states.", f"{doubt}. {still}" if doubt else still, then)
 
 
-def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool) -> Verdict:
-    """Say of a constraint of some rank that positions keep to a mechanism, where that holds more; first if sure."""
-    if named.rank <= rank:
-        return found
+CONTRARY = 0.5
+"""What lets pass more than this of a direction that a mechanism holds is no constraint of that mechanism."""
+
+
+def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool, passing: float = 0.0) -> Verdict:
+    """Say of a constraint of some rank that positions keep to a mechanism that holds others; first if sure.
+
+    ``passing`` is how much of a direction that the mechanism holds the constraint lets pass.
+    """
     more = f"{named.rank} of {len(named.centre)}"
+    then = "Use it with --constraint of 'rollout' or 'score', which follow the mechanism."
+    if passing > CONTRARY:
+        said = f"positions keep to {named.title}, and what was learnt lets pass {percent(passing)} of what that holds"
+        other = f"Learn it by other --features, as auto does. {then * sure}".rstrip()
+        return doubted(found, said)._replace(trust="The mechanism." * sure, next=other)
+    if named.rank == rank or (named.rank < rank and not (sure and found.said.startswith(f"{rank} of "))):
+        return found
     if not sure:
         keep = f"Positions may keep to {named.title}, which holds {more}; as it turns, velocities show less of it."
         return found._replace(said=f"{found.said} {keep}")
-    said = f"{more} directions were held, by {named.title}. It turns on the way, so velocities alone show {rank}"
-    then = "Use it with --constraint of 'rollout' or 'score', which follow the mechanism."
+    why = "It turns on the way" if named.rank > rank else "It was passed one way only"
+    said = f"{more} directions were held, by {named.title}. {why}, so velocities alone show {rank}"
     return found._replace(said=said + found.said.partition(" directions were held")[2], next=then)
 
 
@@ -361,7 +363,7 @@ def of_support(support: Array, times: Array | None, unknown: Array | None = None
     open_ = np.zeros_like(away) if unknown is None else (unknown > SMALL) & ~away
     if not (off := away | open_).any():
         return Verdict(Mark.GOOD, f"Near demonstrations for all {seconds[-1]:.2f} s: supported.")
-    trust = f"The first {seconds[int(off.argmax())]:.2f} s." if off.argmax() else ""
+    trust = f"The first {seconds[int(off.argmax())]:.2f} s." if off.argmax() and unknown is not None else ""
     mark = Mark.BAD if (support < SUPPORTED).mean() > 0.5 else Mark.DOUBTFUL
     none = f"No demonstration passes near for {_part(away, seconds)}: extrapolated."
     if unknown is None or not open_.any():
@@ -370,7 +372,8 @@ def of_support(support: Array, times: Array | None, unknown: Array | None = None
     said = f"{none} Near some" if away.any() else "Near demonstrations"
     said += f", but {_part(open_, seconds)}, fewer than {ENOUGH} tell the policy in every direction: "
     much = f"about {percent(middle)} of" if middle < 1 else "as much as"
-    said += f"there it may be off by {much} its typical action, most at {worst:.2f} s."
+    said += f"there its action, all coordinates together, may be off by {much} its typical one on this way, a standard "
+    said += f"deviation, and a coordinate that moves little by far more of its own; most at {worst:.2f} s."
     doubt = f"Directions that fewer than {ENOUGH} demonstrations tell there."
     return Verdict(mark, said, trust, doubt, "'unconstrain diagnose' says what to record.")
 
@@ -384,7 +387,7 @@ LAST = "last round over first"
 
 _WRONG = {"size": ("too large", "too small", ""), "pace": ("too fast", "too slow", "the other way")}
 _OFF = np.log(OTHERWISE) + 0.005  # the bounds as they are printed are not beyond
-_WRONG[LAST] = "too large in the last round", "too small in the last round", ""
+_WRONG[LAST] = "too large", "too small", ""
 
 
 def of_replays(found: Verdict, said: str, strays: Sequence[str], starts: str = "the same starts") -> Verdict:
@@ -412,14 +415,17 @@ def moves(extents: Array, paces: Array, lasts: Any = ()) -> tuple[str, list[str]
         if (off > _OFF).mean() > (FEW if many >= ENOUGH else 0.5) or off.max() > np.log(FAR_OFF):
             wrong = ratios[off > _OFF]
             ways = zip((wrong > 1, (wrong >= 0) & (wrong <= 1), wrong < 0), _WRONG[name], strict=True)
-            who = f"{len(wrong)} of {many} " if many > 1 else "it " * (not said)
-            given = [(int(rows.sum()), way) for rows, way in ways if rows.any()]
-            those = " or ".join(way + f" ({count})" * (len(given) > 1) for count, way in given)
-            said.append(who + f"{goes} " * (not said) + those)
+            given = sorted(((int(rows.sum()), way) for rows, way in ways if rows.any()), key=lambda one: -one[0])
+            (first, way), *rest = given
+            who = f"{first} of {many} " if many > 1 else "it " * (not said)
+            those = " and ".join([f"{who}{f'{goes} ' * (not said)}{way}", *(f"{count} {way}" for count, way in rest)])
+            said.append("in the last round " * (name == LAST) + those)
             strays.append(name.replace(LAST, "size"))
     nearly = "nearly " * any((by > _OFF).any() for _, by in measured.values())
     kept = " and ".join(name for name in measured if name != LAST)
-    return (" and ".join(said) if said else f"it {nearly}keeps {kept}" * bool(kept)), [*dict.fromkeys(strays)]
+    return (("; " if many > 1 else " and ").join(said) if said else f"it {nearly}keeps {kept}" * bool(kept)), [
+        *dict.fromkeys(strays)
+    ]
 
 
 def size_and_pace(extents: Array, paces: Array, lasts: Any = (), of: str = "", apart: str = "") -> str:

@@ -47,7 +47,11 @@ _ROUND, _HALF = 0.9, 0.5
 by less than half is none."""
 
 _SEVERAL = 3
-"""So many that end at rest in as many places show no goal, whichever of them a policy rests at."""
+"""So many that end at rest in as many places show no goal but one to which a policy leads from them."""
+
+_MOST, _TOLD = 0.75, 0.2
+"""From the first share of the ends a policy comes to its rest, told to the second share of the extent: of 18 sets of
+movements to a goal that plates held off it, it rested at most 3.3 cm from there in the eight so told, else 2 to 13."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +110,8 @@ class Guided(Exportable, Shown):
     goal : array_like, shape (n,), optional
         By default where the demonstrations come to rest, if most do or they do not go round: those that end where the
         policy rests, too, if there are any, as constraints stopped the others. If the ends of those that come to rest
-        scatter about the place where the policy rests, by more than its standard error, it is that place.
+        scatter about the place where the policy rests, by more than its standard error, or are in no one place but the
+        policy leads from most to one, told to a fifth of the extent, it is that place.
     orbit : array_like, shape (T, n), or "shown", optional
         States on the cycle, all around it; "shown" are those of the demonstrations, from which it is found by default
         where they go round and most do not come to rest; if they stop at once on the cycle, they do not.
@@ -184,10 +189,6 @@ class Guided(Exportable, Shown):
                 "goal nor a full round was shown. Record movements to their end, or all around; or pass goal=, or "
                 "orbit='shown' for a cycle."
             )
-        ends = np.array([demo.states[-1] for demo, still in zip(demos, rests, strict=True) if still])
-        apart = np.linalg.norm(ends[:, None] - ends, axis=2)[np.triu_indices(len(ends), 1)]
-        if len(ends) >= _SEVERAL and apart.min() > _TOGETHER * np.linalg.norm(np.ptp(stack(demos).states, axis=0)):
-            raise SettingError(f"goal: demonstrations end at rest, no two of them in one place; {_given(demos)}.")
         if policy is not None:
             _found(demos, policy, _velocities(policy, stack(demos).states))
         return False
@@ -398,16 +399,26 @@ def _found(demos: Sequence[Demonstration], policy: Any, wanted: Array) -> Array:
     rests = _resting(demos)
     slow = rests & (left <= max(_STILL, 2.0 * float(left[rests].min(initial=1.0)))) & (left <= _AT_REST)
     all_ends, ends = (stack(demos).states[last[some]] for some in (rests, slow if slow.any() else rests))
-    apart, rest = _apart(demos, ends), _rest_of(policy, ends, demos, wanted)
-    if apart > _TOGETHER:
-        raise InvalidDataError(
-            f"goal: demonstrations end at rest in places up to {apart:.0%} of their extent from the mean of these; "
-            f"expected one place; {_given(demos)}.{_proposed(rest, demos)}"
+    extent = float(np.linalg.norm(np.ptp(stack(demos).states, axis=0)))
+    gaps = np.linalg.norm(all_ends[:, None] - all_ends, axis=2)[np.triu_indices(len(all_ends), 1)]
+    if _apart(demos, ends) > _TOGETHER or (len(all_ends) >= _SEVERAL and gaps.min() > _TOGETHER * extent):
+        rest = _rest_of(policy, all_ends, demos, wanted)
+        if rest is not None and rest[1] < _TOLD * extent:
+            return rest[0]  # constraints held them off it, each elsewhere
+        told = (
+            f" The policy's own rest is told to within {rest[1]:.2g} only: record more, held in other ways."
+            if rest
+            else ""
         )
-    place = ends.mean(axis=0)
+        mean = ", ".join(f"{value:.4g}" for value in all_ends.mean(axis=0))
+        raise InvalidDataError(
+            f"goal: demonstrations end at rest in places up to {_apart(demos, all_ends):.0%} of their extent from the "
+            f"mean of these; expected one place; {_given(demos)} (the mean of their ends is goal=({mean})).{told}"
+        )
+    place, rest = ends.mean(axis=0), _rest_of(policy, ends, demos, wanted)
     scatter = np.linalg.norm(all_ends - place, axis=1).max()
     if rest is not None and max(rest[1], np.linalg.norm(rest[0] - place)) < scatter:
-        place = rest[0]  # constraints held them off it, each elsewhere
+        place = rest[0]
     _doubt_goal(demos, place)
     if not slow.any():
         warnings.warn(
@@ -447,30 +458,16 @@ def _rest_of(policy: Any, ends: Array, demos: Sequence[Demonstration], wanted: A
     low, high = states.min(axis=0), states.max(axis=0)
     if not hasattr(policy, "covariances") or usual == 0.0 or (low == high).any():
         return None
-    found = [least_squares(lambda x: policy(x[None])[0] / usual, end, bounds=(low, high)) for end in ends]
+    every = [least_squares(lambda x: policy(x[None])[0] / usual, end, bounds=(low, high)) for end in ends]
+    # elsewhere it does not rest, or nothing comes there
+    found = [one for one in every if one.cost <= _STILL**2 / 2.0 and np.linalg.eigvals(one.jac).real.max() < 0.0]
+    if not found or len(found) < _MOST * len(ends) or _apart(demos, np.array([one.x for one in found])) > _STILL:
+        return None
     places, slope = np.array([one.x for one in found]), usual * found[0].jac
-    if max(one.cost for one in found) > _STILL**2 / 2.0 or _apart(demos, places) > _STILL:
-        return None
-    if np.linalg.eigvals(slope).real.max() >= 0.0:  # it rests there, but nothing comes there
-        return None
     with suppress(SettingError, np.linalg.LinAlgError):
         back = np.linalg.inv(slope)
         return places[0], float(np.sqrt(np.trace(back @ policy.covariances(places[:1])[0] @ back.T)))
     return None
-
-
-def _proposed(rest: tuple[Array, float] | None, demos: Sequence[Demonstration]) -> str:
-    """Where the policy rests, as a goal to give, as far as told.
-
-    Of 18 sets of movements to a goal that plates held off it, it rested at most 3.3 cm from there in the eight where
-    what demonstrations leave open of it moves that place by less than a fifth of the extent; in the others, 2 to 13 cm.
-    """
-    if rest is None:
-        return ""
-    if rest[1] >= 2.0 * _TOGETHER * np.linalg.norm(np.ptp(stack(demos).states, axis=0)):
-        return f" Where the policy rests is told to within {rest[1]:.2g} only: record more, held in other ways."
-    place = ", ".join(f"{value:.4g}" for value in rest[0])
-    return f" If surfaces held them off it: the policy rests, to within about {rest[1]:.2g}, at goal=({place})."
 
 
 STORED = (Descent, Guided, Moved, Orbit, Potential)

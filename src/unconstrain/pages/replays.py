@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
@@ -129,8 +130,28 @@ def replayed(
         some = f"{len(known)} of {len(demos)} demonstrations"
         why = "; what held the others, if anything, they do not tell well enough" * (held is None and len(runs) < MOST)
         words, of = f"{words}, as far as compared ({some}{why})", f"for {some}{alike}, {of}"
+    on = _held_on(policy, known, demos, recipe) if held is None else ""
+    words, figures = (one and one + on for one in (words, verdicts.size_and_pace(extents, paces, lasts, of, said)))
     judged = _advised(verdicts.of_replays(found, words, strays, starts), found, policy, demos)
-    return Replayed(judged, told | {"away": gone}, runs, verdicts.size_and_pace(extents, paces, lasts, of, said), words)
+    return Replayed(judged, told | {"away": gone}, runs, figures, words)
+
+
+def _held_on(policy: Any, runs: Sequence[Replay], demos: Sequence[Demonstration], recipe: Recipe) -> str:
+    """Where runs were held that go round in no plane, so may have been free; empty if free ones do the same."""
+    n, far = demos[0].states.shape[1], STRAYS * float(np.linalg.norm(np.ptp(stack(demos).states, axis=0)))
+    short = [(one.done, diagnosis.flat(one.done.states)[0].any(axis=1).sum()) for one in runs if one.pace != one.pace]
+    held = [one for one, tied in short if tied]
+    free = replays(policy, held, recipe, partial(_same, np.zeros((n, n)))) if held else []
+    if not (off := sorted((away, one.done.name) for one in free if (away := _farthest(one)) > far)):
+        return ""
+    named = Counter({1: "line", 2: "plane"}.get(n - tied, "flat") for _, tied in short if tied)
+    to = " or ".join(f"{name} ({count})" for name, count in named.most_common())
+    said = f"run free, {len(off)} of {len(free)} go elsewhere, '{off[-1][1]}' farthest, which is wrong if they were"
+    return f"; each held to the {to} that it lies in; {said} free strokes"
+
+
+def _farthest(one: Replay) -> float:
+    return float(cKDTree(one.done.states).query(one.run.states)[0].max())
 
 
 def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Replayed:
@@ -139,6 +160,7 @@ def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Repl
     if alone is policy:
         return guided
     plain = replayed(found, alone, *of)
+    plain = plain._replace(**{name: getattr(plain, name).partition("; each held")[0] for name in plain._fields[3:]})
     order = [*verdicts.Mark].index
     judged = max(guided.verdict, plain.verdict, key=lambda one: order(one.mark))  # the first, where both are as good
     if judged is plain.verdict and guided.in_words:
@@ -160,7 +182,7 @@ def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Repl
 def _strays(guided: Any, plain: Any, demos: Any, recipe: Recipe, _: Any, units: Mapping[str, str], *__: Any) -> str:
     """How far guided runs go from recorded paths, the rest of a sentence; empty where unguided ones do nearly so."""
     most, least = (
-        max((cKDTree(one.done.states).query(one.run.states)[0].max() for one in runs if one.held), default=none)
+        max((_farthest(one) for one in runs if one.held), default=none)
         for runs, none in ((guided, 0.0), (plain, np.inf))
     )
     if most <= max(FARTHER * least, STRAYS * float(np.linalg.norm(np.ptp(stack(demos).states, axis=0)))):
@@ -175,8 +197,20 @@ def _advised(judged: verdicts.Verdict, before: verdicts.Verdict, policy: Any, de
         return judged
     features = getattr(innermost(policy), "features", None)
     model = MODELS.get(features if isinstance(features, str) else type(features).__name__, ANOTHER)
-    more = model, GUIDES[guides(policy, demos)] if innermost(policy) is policy else ""
-    return judged._replace(next=" ".join(filter(None, (judged.next, *more))))
+    to = GUIDES[guides(policy, demos)] if innermost(policy) is policy else ""
+    more = judged.next, model, _seem_free(innermost(policy), demos), to
+    return judged._replace(next=" ".join(filter(None, more)))
+
+
+def _seem_free(policy: Any, demos: Sequence[Demonstration]) -> str:
+    """What to try where a few demonstrations look free among others that were held: a curved wall looks so, too."""
+    belief, ends = getattr(getattr(policy, "solution_", None), "belief", None), np.cumsum([len(one) for one in demos])
+    parts = np.split(belief.free, ends[:-1]) if belief is not None and len(belief.free) == ends[-1] else []
+    names = [one.name for one, free in zip(demos, parts, strict=False) if free.mean() > diagnosis.FREE]
+    if not 0 < 2 * len(names) < len(demos):
+        return ""
+    looks = f"{listed([*map(repr, names)], 4)} look free, as do some that curved walls held, which spoil it"
+    return f"{looks}: compare without them (--leave-out {','.join(names)})."
 
 
 def guides(policy: Policy | Guided, demos: Sequence[Demonstration]) -> str:
@@ -186,7 +220,7 @@ def guides(policy: Policy | Guided, demos: Sequence[Demonstration]) -> str:
         return ""
     with warnings.catch_warnings(action="always", record=True) as doubts:
         try:
-            Guided.goes_round(demos, policy=lambda states: np.asarray(policy(states)))  # without proposing a goal
+            Guided.goes_round(demos, policy=policy)
         except (SettingError, InvalidDataError) as error:
             with suppress(SettingError, InvalidDataError):
                 if "orbit=" in str(error):

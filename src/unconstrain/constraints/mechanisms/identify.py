@@ -35,11 +35,14 @@ SMALLEST_MOVEMENT = 1e-12
 LIKELY = 20.0
 """Odds from which one kind is called decided."""
 
-BEYOND = 4.0
-"""Who spreads by so many times the usual noise in each direction moves there: noise that lasts looks free, too."""
+BEYOND, LASTING = 4.0, 10.0
+"""Who spreads by so many times the usual noise in each direction moves there: noise that lasts looks free, too. What
+lasts so many times longer than usual is a movement that no kind fits."""
 
 FLAT = 10.0
 """A surface whose radius is more than so many times the extent of what was recorded is a plane to a robot."""
+
+APART = "strokes from other starts would tell whether it is held"
 
 NEAR = 0.15
 """A path is near a circle that it leaves by less than this share of the radius."""
@@ -181,21 +184,28 @@ class Identification(Shown):
     @property
     def doubt(self) -> str:
         """What a stroke by itself does not tell of its mechanism, in words; empty if there is nothing."""
-        best, apart = self.candidates[0], "strokes from other starts would tell whether it is held"
+        best = self.candidates[0]
+        circle = next((one for one in self.candidates if one.kind == "circle"), best)
+        near = circle.free == 1 and circle.noise < NEAR * circle.mechanisms[0].radius
+        if self.habit or self.witnesses or self.demonstrations > 1 or best.free != 2 or not near:
+            return self.habit
+        lengths = circle.mechanisms[0].radius, circle.noise
+        radius, strays = (small_length(one, self.mechanism.unit) for one in lengths)
+        path = f"within the {best.kind} the path is near a circle of radius {radius}"
+        return f"{path}, which it leaves by {strays}; {APART}"
+
+    @property
+    def habit(self) -> str:
+        """Why free strokes may keep to the likeliest as well, in words; empty if they do not."""
+        best = self.candidates[0]
         alone = self.demonstrations == len(best.mechanisms)
         if not alone or self.witnesses or best.free not in (1, len(self.mechanism.centre) - 1):
             return ""
         if best.free == 1:
-            return f"a policy that keeps to this path within a surface looks the same in one stroke; {apart}"
-        if not self.winding:
-            return f"free strokes keep to a {best.kind} of their own, too, where they turn as little as here; {apart}"
-        circle = next((one for one in self.candidates if one.kind == "circle"), best)
-        if self.demonstrations > 1 or not circle.noise < NEAR * circle.mechanisms[0].radius or circle.free != 1:
-            return ""
-        lengths = circle.mechanisms[0].radius, circle.noise
-        radius, strays = (small_length(one, self.mechanism.unit) for one in lengths)
-        near = f"within the {best.kind} the path is near a circle of radius {radius}"
-        return f"{near}, which it leaves by {strays}; {apart}"
+            return f"a policy that keeps to this path within a surface looks the same in one stroke; {APART}"
+        own = "surface" if best.odds else best.kind
+        free = f"free strokes keep to a {own} of their own, too, where they turn as little as here; {APART}"
+        return "" if self.winding else free
 
     def _judged(self, best: str) -> str:
         first = self.candidates[0]
@@ -256,7 +266,8 @@ def identify(
     every = _fits(track)
     apart = _strays(every[1:])
     times = [min(max(fit.time for fit in fits) for fits in one.values() if fits[0].mechanism.count) for one in every]
-    usual = [time for k, time in enumerate(times[1:]) if k not in apart]
+    longest = LASTING * float(np.median(times[1:] or times))
+    usual = [time for k, time in enumerate(times[1:]) if k not in apart and time <= longest]
     time, white = min(times[0], max(usual or times)), noise_by_differences(track.positions, track.groups)
     twice = zip([*every, *every[1:]], [*len(every) * [time], *times[1:]], strict=True)
     found = [(fits, log_evidences(fits, each, white)) for fits, each in twice]

@@ -48,14 +48,14 @@ JOINTS = re.compile(r"(^|[._/ ])(actual_)?(q|j|qpos|joints?|joint_?(pos|position
 _NUMBERED = re.compile(r"(.*?)[_. \[]?(\d+)\]?")
 _OF_AXIS = re.compile(r"(.*?)(?:[_. /]|(?<=[a-z])(?=[XYZ]))?([xyzXYZ])")
 
-_UNIT = re.compile(r"[_ ]?[\[(](?=\D)[^\[\]()]{0,12}[\])]$")
-"""A unit in brackets at the end of a name."""
+_UNIT = re.compile(r"[_ ]?[\[(](?=\D)[^\[\]()]{0,12}[\])]$|_(mm|cm|m)$")
+"""A unit at the end of a name, in brackets, or of length after an underscore."""
 
 Guess = Callable[..., tuple[str, ...] | None]
 
 
 def _without_units(guess: Guess) -> Guess:
-    """A guess by names without units in brackets, unless two would be the same then."""
+    """A guess by names without units, unless two would be the same then."""
 
     @lru_cache(8)  # of many demonstrations of the same columns
     @wraps(guess)

@@ -221,7 +221,8 @@ def unit_differs(outlines: Sequence[Outline]) -> list[tuple[int, Remark]]:
         if not _are_of_a_unit(nearest[None], TENFOLD / 2, TENFOLD / 2):
             return []
     named = [listed([outlines[place].title for place in places], MOST_NAMED) for places in (few, most)]
-    than = f"{factor:.3g} times {size} than {named[1]}, as in another unit"
+    many = "about 1000 (metres and millimetres)" if abs(np.log(factor / 1e3)) < np.log(ABOUT) else f"{factor:.3g}"
+    than = f"{many} times {size} than {named[1]}, as in another unit"
     if len(few) == len(most):
         said = f"{named[0]} {'are' if few[1:] else 'is'} {than}, and as many: convert those that are wrong."
         places = sorted([*few, *most])
