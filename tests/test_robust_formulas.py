@@ -30,6 +30,7 @@ from unconstrain.learners.robust.noise import (
 from unconstrain.learners.robust.posterior import Posterior
 from unconstrain.learners.robust.segments import (
     change_points,
+    curved_projections,
     found_segments,
     held_throughout,
     projection_of,
@@ -374,6 +375,54 @@ def test_who_was_always_held_shows_the_policy_along_all_other_directions(faint):
         plane, own = axes[group][:, :2] @ axes[group][:, :2].T, np.outer(action, action) / (action @ action)
         assert_allclose(projection, plane if is_held else own, atol=0.02)
     assert not held_throughout(actions[:200], groups[:200], np.full(200, 0.01**2))[0].any()  # none moved along more
+
+
+def _over(surface: str, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """States of a winding movement, its actions under a constraint of a kind, and the projections of that."""
+    rng, angle = np.random.default_rng(seed), np.linspace(0.0, 9.0, 240)[:, None]
+    states = np.sin(angle * rng.uniform(0.7, 1.3, 3) + rng.uniform(0.0, 6.0, 3))
+    wished = np.column_stack([-states[:, 1], states[:, 0], 0.5 - states[:, 2]]) + rng.uniform(0.2, 0.6, 3)
+    middle = np.array([0.5, -2.0, 0.3])
+    normals = {
+        "sphere": states - middle,
+        "cylinder": (states - middle) * [1.0, 1.0, 0.0],
+        "saddle": states * [0.6, -0.4, 0.0] + [0.0, 0.0, 1.0],
+        "plane": np.tile([1.0, 2.0, 2.0], (240, 1)),
+        "none": np.zeros((240, 3)),
+        "wave": np.column_stack([np.sin(4.0 * states[:, 0]), np.cos(5.0 * states[:, 1]), np.sin(6.0 * states[:, 2])]),
+    }[surface]
+    N = uc.null_space_projection(normals[:, None])
+    return states, uc.project(N, wished) + 0.003 * rng.standard_normal((240, 3)), N
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("surface", ["sphere", "cylinder", "saddle", "plane", "none", "wave"])
+def test_a_direction_that_turns_with_the_state_is_found_where_it_is_affine_and_else_none(surface, seed):
+    states, actions, N = _over(surface, seed)
+    noise, groups = np.full(240, 0.006**2), np.zeros(240, dtype=int)
+    flat = projections_of(actions, groups, noise)
+    found = curved_projections(states, actions, groups, flat, noise)
+    if surface in ("sphere", "cylinder", "saddle"):
+        assert_allclose(flat[0], np.eye(3), atol=1e-12)
+        assert_allclose(found, N, atol=0.1)
+    else:
+        assert_allclose(found, flat, atol=1e-12)
+        assert_allclose(np.trace(flat[0]), 2.0 if surface == "plane" else 3.0)
+
+
+def test_what_turns_with_the_state_does_not_depend_on_order_units_or_place():
+    states, actions, _ = _over("sphere", 0)
+    noise, groups = np.full(240, 0.006**2), np.zeros(240, dtype=int)
+    order, turn = np.random.default_rng(1).permutation(240), rotation(3, 3)
+    known = curved_projections(states, actions, groups, np.tile(np.eye(3), (240, 1, 1)), noise)
+    for there, moved, sizes, back in (
+        (states[order], actions[order], noise, known[order]),
+        (100.0 * states + 7.0, 20.0 * actions, 400.0 * noise, known),
+        (states @ turn.T, actions @ turn.T, noise, turn @ known @ turn.T),
+    ):
+        assert_allclose(
+            curved_projections(there, moved, groups, np.tile(np.eye(3), (240, 1, 1)), sizes), back, atol=1e-7
+        )
 
 
 def test_noise_that_smoothing_hid_is_at_least_the_misfit():

@@ -132,6 +132,7 @@ def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
     solution = getattr(policy, "solution_", None)
     if solution is None:
         return {"fitted": False}
+    share, alone = policy.held_out_score() - lost, 1.0 - solution.left_out if solution.left_out else None
     return {
         "demonstrations": len(policy.training_.split.fold_of) or None,  # None where nobody told them apart
         "learnt from": sorted(str(name).partition("/")[2] or str(name) for name in policy.training_.split.fold_of),
@@ -139,7 +140,8 @@ def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
         "learnt as": solution.method,
         "learnt as, in words": uc.evaluation.diagnosis.in_words(solution.method) or None,
         "model": uc.evaluation.diagnosis.models_of(policy),
-        "explained held out": None if (share := policy.held_out_score() - lost) != share else round(share, 4),
+        "explained held out": None if share != share else round(share if alone is None else alone, 4),
+        "explained if one model holds for all": None if alone is None else round(share, 4),
         "noise": None if solution.belief is None else solution.noise,
         "guided": held.aim_.promise if isinstance(held, uc.Guided) else None,
     }

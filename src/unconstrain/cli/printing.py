@@ -75,7 +75,7 @@ class Group(click.Group):
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("default", UserWarning)
-                warnings.filterwarnings("ignore", "The policy explains next to nothing")  # its verdict says so
+                warnings.filterwarnings("ignore", "The policy explains next to nothing|One model fits")  # verdicts do
                 warnings.showwarning = show_warning  # type: ignore[assignment]
                 try:
                     return super().invoke(ctx)

@@ -74,6 +74,7 @@ _WAYS = {
     "noise-corrected": "consistent with the actions, with the noise taken out",
     "hard noise-corrected": "consistent with the actions, with the noise taken out, and little else supposed",
     "segments": "with one constraint for each demonstration",
+    "curved segments": "with one constraint for each demonstration, which turns with the state",
     "likelihood": "samples look free, or constrained at random",
     "hybrid": "consistent with the actions, and as near to them as that allows",
     "rows of the Jacobian": "with so many directions of the task held, in each kind of demonstration",

@@ -280,6 +280,8 @@ class Policy(Parameters, ShownWithSolution, Deployable, RegressorMixin, BaseEsti
 
         By samples where the learner looks at them, less of those below ten standard deviations of their noise; of other
         learners from the moments alone, slow samples like all, each local model by itself in its own field.
+        Where ``solution_.left_out`` is not zero, others tell too little of what is held out: then it is what to expect
+        if the policy has the form of its model, from how well all demonstrations agree.
         """
         check_is_fitted(self, "solution_")
         belief = self.solution_.belief

@@ -92,6 +92,8 @@ class SampleLearner(Learner):
             more["left_out"] = chosen.alone if chosen.alone > AGREED else 0.0
             by = BY_AGREEMENT.format(percent(chosen.alone) if chosen.alone < 1.0 else "more than all")
             agreed = *more.pop("notes", ()), *([by] if more["left_out"] else [])
+            if more["left_out"] > 1.0 - LEAST_EXPLAINED:
+                warnings.warn(by, UserWarning, stacklevel=9)
             more["held_out_score"] = _explained(samples, chosen)
             second = None if self.secondary is None else on(self.secondary, training)(training.folds.whole)
             found = solution(chosen, samples, everything, training.model, second, **more)
@@ -262,8 +264,9 @@ class Robust(_Maximising):
     Learns several policies and takes the one of least estimated error; see
     :mod:`unconstrain.learners.robust.choice`. Candidates are direct
     regression, softened hybrids (eqs 4 to 6), :class:`NoiseCorrected`,
-    :class:`Segments` by demonstration, and :class:`Likelihood` unless noise
-    hides the sphere or nearly all samples are in its uniform component.
+    :class:`Segments` by demonstration, also such as are curved, and
+    :class:`Likelihood` unless noise hides the sphere or nearly all samples are
+    in its uniform component.
 
     Keeps the samples, up to 50,000 of them, and uses them; of more it keeps
     every second, fourth, ... of each demonstration, and ``solution_.free`` is
@@ -340,7 +343,7 @@ class Robust(_Maximising):
         likely, mixture = self._maximised(samples, training, corrected)
         if 1.0 - mixture[-1] > LEAST_INFORMATIVE and not hides_sphere(likely.variance, samples):
             free = samples.counts * free_probability(samples, samples.predict(likely.weights), likely.variance, mixture)
-            unshown = 2.0 * float(free @ held_throughout(*each, samples.states)[0]) > free.sum()
+            unshown = 2.0 * float(free @ held_throughout(*each)[0]) > free.sum()
             learnt.append(replace(likely, softness=np.inf) if unshown else likely)
         least = min(most, corrected.variance)
         found = Comparison(learnt, np.minimum(noise, least), samples)

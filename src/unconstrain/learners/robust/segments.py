@@ -12,7 +12,9 @@ and all other surfaces of second order, whose gradient it is. Along a
 demonstration ``b(x)ᵀu = 0``, so that vec B is an eigenvector of
 ``Σ (u ⊗ [1; x]) (u ⊗ [1; x])ᵀ`` with an eigenvalue within the noise. Short,
 smooth movements have such eigenvectors by chance: those count that, learnt
-without a stretch of the demonstration, hold there too.
+without a stretch of the demonstration, hold there too. And actions that are
+themselves affine in the state have them free or held, ``b = S u`` with any
+skew-symmetric S: they show nothing.
 """
 
 from typing import Any
@@ -158,6 +160,9 @@ def _curved(states: Array, actions: Array, axes: Array, variance: float) -> Arra
         return null_space_projection(turned, 1e-3)
 
     most = VARIANCES_OF_CURVED * variance
+    rest = moved - regressors @ np.linalg.lstsq(regressors, moved)[0]
+    if (np.linalg.eigvalsh(rest.T @ rest / count) < most).sum() > 1:
+        return flat
     for held in range(min(int((values < most).sum()), rank - 1), 0, -1):
         N = np.empty((count, rank, rank))
         for part, by in enumerate(others):
@@ -175,9 +180,7 @@ def _affine(states: Array) -> Array:
     return np.column_stack([np.ones(len(states)), centred @ axes[:, kept] / np.sqrt(values[kept])])
 
 
-def held_throughout(
-    actions: Array, labels: NDArray[np.intp], noise: Array, states: Array | None = None
-) -> tuple[NDArray[np.bool_], Array]:
+def held_throughout(actions: Array, labels: NDArray[np.intp], noise: Array) -> tuple[NDArray[np.bool_], Array]:
     """Which samples are of segments that were clearly held in the same directions all the time, and where they moved.
 
     That is where noise explains the motion along some directions, there was much along all others, and other segments
@@ -190,8 +193,6 @@ def held_throughout(
         Segment of each sample.
     noise : ndarray, shape (N,)
         Variance of the noise on each action coordinate.
-    states : ndarray, shape (N, n), optional
-        If given, directions that turned with the state count, too.
 
     Returns
     -------
@@ -209,8 +210,4 @@ def held_throughout(
         much = squares > SHARE_ALONG_HELD * squares.sum()
         if much.sum() < whole.sum() and (still != much).all():
             held[rows], moved[rows] = True, axes[:, much] @ axes[:, much].T
-        elif states is not None:
-            onto = _curved(states[rows], actions[rows], axes[:, ~still], float(noise[rows].mean()))
-            if np.trace(onto[0]) < (~still).sum() - 0.5:
-                held[rows], moved[rows] = True, onto
     return held, moved
