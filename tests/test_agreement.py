@@ -1,5 +1,7 @@
 """Few demonstrations that agree on one policy, each of them needed; and those that do not, or tell too little."""
 
+import json
+import warnings
 from dataclasses import replace
 from functools import cache
 
@@ -8,6 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import unconstrain as uc
+from test_cli import run
 from unconstrain.learners.robust.agreement import where_agreed
 from unconstrain.learners.robust.consistent import least_error
 from unconstrain.learners.robust.segments import projections_of
@@ -143,3 +146,18 @@ def test_a_policy_that_explains_next_to_nothing_of_what_is_held_out_knows_nothin
             known.append(policy.solution_.determined_share)
     assert 0 < len(known) < 12
     assert max(known) > 0.3
+
+
+@pytest.mark.parametrize(("name", "warned"), [("cubic #1", False), ("cubic #3", True)])
+def test_python_warns_where_demonstrations_that_are_left_out_are_missed_altogether(name, warned, tmp_path):
+    """Held-out motion says nothing then; that the policy has the form of its model is an assumption."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        policy = draw("along rulers", name, 3).fit(uc.Robust())
+    assert (policy.solution_.left_out > 0.8) == warned
+    assert any("which is right if the policy has the form of this model" in str(one.message) for one in said) == warned
+    assert policy.held_out_score() > 0.8
+    uc.save(policy, tmp_path / "p.npz")
+    known = json.loads(run("info", tmp_path / "p.npz", "--json"))
+    assert known["explained if one model holds for all"] == round(policy.held_out_score(), 4)
+    assert known["explained held out"] == round(1.0 - policy.solution_.left_out, 4)
