@@ -418,6 +418,8 @@ def test_what_turns_with_the_state_does_not_depend_on_order_units_or_place():
     for there, moved, sizes, back in (
         (states[order], actions[order], noise, known[order]),
         (100.0 * states + 7.0, 20.0 * actions, 400.0 * noise, known),
+        (states * [1000.0, 1.0, 0.01], actions, noise, known),
+        (np.column_stack([states, np.full(240, 0.1)]), actions, noise, known),
         (states @ turn.T, actions @ turn.T, noise, turn @ known @ turn.T),
     ):
         assert_allclose(

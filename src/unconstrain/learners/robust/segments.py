@@ -173,11 +173,14 @@ def _curved(states: Array, actions: Array, axes: Array, variance: float) -> Arra
 
 
 def _affine(states: Array) -> Array:
-    """A constant and the states' principal components, all of mean square one, (T, 1 + k)."""
+    """A constant and the principal components of the states, each coordinate in its own unit, of mean square one."""
     centred = states - states.mean(axis=0)
-    values, axes = np.linalg.eigh(centred.T @ centred / len(states))
-    kept = values > 1e-6 * values[-1]
-    return np.column_stack([np.ones(len(states)), centred @ axes[:, kept] / np.sqrt(values[kept])])
+    spread, size = np.sqrt((centred**2).mean(axis=0)), np.abs(states).max(axis=0)
+    moved = spread > 1e-9 * size
+    scaled = centred[:, moved] / spread[moved]
+    values, axes = np.linalg.eigh(scaled.T @ scaled / len(states))
+    kept = values > 1e-6
+    return np.column_stack([np.ones(len(states)), scaled @ axes[:, kept] / np.sqrt(values[kept])])
 
 
 def held_throughout(actions: Array, labels: NDArray[np.intp], noise: Array) -> tuple[NDArray[np.bool_], Array]:
