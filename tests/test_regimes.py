@@ -139,7 +139,7 @@ def both(monkeypatch):
 
     def made_up(settings, system, constraint, seed):
         methods = sorted(METHODS) + ([regimes.JACOBIAN] if system == "arm" else [])
-        drawn = np.random.default_rng(seed).uniform(1.0, 2.0, (len(methods), 5)) * [
+        drawn = np.random.default_rng(seed).uniform(1.0, 2.0, (len(methods), 6)) * [
             [0.1 if one == regimes.JACOBIAN else 1.0] for one in methods
         ]
         return [dict(zip(methods, map(tuple, drawn.tolist()), strict=True)) for _ in settings.noise]

@@ -123,8 +123,9 @@ def has_no_column(name: str, missing: Sequence[str], columns: Sequence[str], wor
         other = f"'{name}' has {same[bare(missing[0])]!r}, not {missing[0]!r} as the others or as asked for"
         return f"{other}: another unit; convert it."
     of_words = f", and of words, for group=, {listed(words)}" if words else ""
-    has = f"it has {listed(columns)}{of_words}.{meant(missing, columns)}"
-    clocks = [one for one in missing if re.fullmatch(r"t|time|(time_?)?stamps?", one.casefold())]
+    instead = meant(missing, columns)
+    has = f"it has {listed(columns)}{of_words}.{instead}"
+    clocks = [one for one in missing if not instead and re.fullmatch(r"t|[tT]ime|([tT]ime_?)?[sS]tamps?", one)]
     read = f" A clock such as {clocks[0]!r} is read as the time and is no state: leave it out." if clocks else ""
     return f"'{name}' has no column {listed([*map(repr, missing)])}; {has}{read}"
 

@@ -132,7 +132,7 @@ def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
     solution = getattr(policy, "solution_", None)
     if solution is None:
         return {"fitted": False}
-    share, alone = policy.held_out_score() - lost, 1.0 - solution.left_out if solution.left_out else None
+    share, alone = policy.held_out_score() - lost, 1.0 - solution.left_out - lost if solution.left_out else None
     return {
         "demonstrations": len(policy.training_.split.fold_of) or None,  # None where nobody told them apart
         "learnt from": sorted(str(name).partition("/")[2] or str(name) for name in policy.training_.split.fold_of),
@@ -187,8 +187,7 @@ def doubted(policy: uc.Policy | uc.Guided, notes: Mapping[str, Any]) -> str:
     if notes.get(MARK) not in ("doubtful", "bad"):
         return ""
     if (found := explained_by(policy, notes)).mark is not uc.evaluation.verdicts.Mark.GOOD:
-        *_, said = found.said.rstrip(".").split(". But ")
-        return said[0].lower() + said[1:].partition(". ")[0]
+        return found.said[0].lower() + found.said[1:].rstrip(".").partition(". ")[0]
     return _doubt(notes)
 
 

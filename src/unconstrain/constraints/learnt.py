@@ -101,9 +101,10 @@ class LearntConstraint(Parameters, Shown):
         table: Any = as_matrix(states, "states", convert=False)
         moves = table - table.mean(axis=0) if actions is None else actions
         self.fit_parts([[(table, moves, sample_weight, groups)]], _here, surface=actions is None)
-        steps = np.diff(on_host(table), axis=0, append=0.0)[:-1] if actions is None else on_host(moves)
+        steps = np.diff(on_host(table), axis=0) if actions is None else on_host(moves)
         names = np.zeros(len(steps)) if groups is None else as_groups(groups, len(on_host(table)))[: len(steps)]
-        each = (np.asarray(steps)[names == name] for name in dict.fromkeys(names.tolist()))
+        _, inverse, counts = np.unique(names, return_inverse=True, return_counts=True)
+        each = np.split(np.asarray(steps)[inverse.argsort(kind="stable")], counts.cumsum()[:-1])
         self.choice_ = replace(self.choice_, wound=winding(each))
         return self
 

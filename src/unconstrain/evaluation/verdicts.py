@@ -125,7 +125,7 @@ def of_explained(
     trust = "" if mark is Mark.BAD else f"Directions along recorded motion, near recorded states; {missed}."
     if left_out > 1.0 - FAIR:
         much = percent(1.0 - left_out) if left_out < 1.0 else "nothing"
-        what += f", but {much} of demonstrations that were held alike if these are left out"
+        what += f"; where demonstrations that were held alike are left out together, it explains {much} of them"
         mark, word = no_better(mark), f"{word.partition(' ')[0]} along recorded motion, and no further"
     said = f"{little}{who} {_explains(share, what)}: {word}.{retold}"
     return Verdict(mark, said, trust, across, advice)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -206,11 +207,15 @@ def _seem_free(policy: Any, demos: Sequence[Demonstration]) -> str:
     """What to try where a few demonstrations look free among others that were held: a curved wall looks so, too."""
     belief, ends = getattr(getattr(policy, "solution_", None), "belief", None), np.cumsum([len(one) for one in demos])
     parts = np.split(belief.free, ends[:-1]) if belief is not None and len(belief.free) == ends[-1] else []
+    learnt = {str(one).partition("/")[2] or str(one) for one in policy.training_.split.fold_of}
+    if {one.name for one in demos} != learnt:
+        return ""  # these are others
     names = [one.name for one, free in zip(demos, parts, strict=False) if free.mean() > diagnosis.FREE]
     if not 0 < 2 * len(names) < len(demos):
         return ""
-    looks = f"{listed([*map(repr, names)], 4)} look free, as do some that curved walls held, which spoil it"
-    return f"{looks}: compare without them (--leave-out {','.join(names)})."
+    look, them = ("looks", "it") if len(names) == 1 else ("look", "them")
+    looks = f"{listed([*map(repr, names)], 4)} {look} free, as what a curved wall held may, and then misleads"
+    return f"{looks}: compare without {them} (--leave-out {shlex.quote(','.join(names))})."
 
 
 def guides(policy: Policy | Guided, demos: Sequence[Demonstration]) -> str:
