@@ -175,6 +175,16 @@ def regimes(found: list[Data]) -> Figures:
     return figures
 
 
+def regimes_in_the_plane(found: list[Data]) -> Figures:
+    """The default learner against the paper's hybrid, between what was learnt from and at fresh demonstrations."""
+    mine = [one for one in found[0]["summary"] if one["method"] == "robust"]
+    return {
+        f"robust, {one['noise']:.0%}: / paper's{at}": one[key]
+        for one in mine
+        for at, key in (("", "to_paper"), (", fresh", "to_paper_fresh"))
+    }
+
+
 def _over_regimes(found: Data) -> Figures:
     """What is said of all regimes, and so not of some."""
     figures: Figures = {}
@@ -329,6 +339,11 @@ RUNS = {
         "unconstrain reproduce regimes --only 'limit cycle, half' --trials 100 --out results/cycle",
         "cycle/regimes.json",
         regimes,
+    ),
+    "regimes_plane": Run(
+        "unconstrain reproduce regimes --only 'limit cycle' --only pendulum --trials 4 --out results/plane",
+        "plane/regimes.json",
+        regimes_in_the_plane,
     ),
     "regimes_known": Run(
         "unconstrain reproduce regimes --only 'arm, 1' --only 'arm, 1-2-3' --only 'arm, 1-...-4' --only 'arm, 1-...-5' "
