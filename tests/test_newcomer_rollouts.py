@@ -16,7 +16,7 @@ from unconstrain.cli import informing
 from unconstrain.cli.informing import TOLD
 from unconstrain.evaluation.verdicts import Mark, Verdict, moves, of_replays, size_and_pace
 from unconstrain.pages.fit import policy_page
-from unconstrain.pages.replays import replayed
+from unconstrain.pages.replays import replayed, replays
 
 MM = dict.fromkeys("xyz", "mm")
 HEAD = "t [s],x [mm],y [mm],z [mm]"
@@ -849,3 +849,24 @@ def test_a_policy_that_strays_names_the_few_that_look_free_as_on_a_curved_wall(f
     said = "'held_3' look free, as do some that curved walls held, which spoil it: compare without them (--leave-out "
     assert (f"{said}held_3)" in then) == named
     assert ("look free" in then) == named
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_a_stroke_that_moves_as_the_policy_does_is_run_free_though_nearly_flat_unless_it_is_flat(held):
+    """It leaves its plane by a twentieth of its length, which the policy does, too."""
+    pull = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.25, 0.0, -1.2]])
+    tilts = np.random.default_rng(3).standard_normal((6, 3))[[0, 2, 4, 5]]
+    starts = np.array([[0.4, 0.1, 0.05], [0.1, -0.4, 0.0], [-0.4, 0.0, 0.1], [0.0, 0.0, 0.4]])
+    if not held:
+        starts = np.array([[-0.3, 0.2, -0.1], [0.1, -0.4, 0.0], [-0.4, 0.0, 0.1], [0.1, 0.2, 0.3]])
+    along = [[uc.constraints.Plane(tilt)] if held else None for tilt in tilts]
+    demos = [
+        uc.rollout(lambda at: at @ pull.T, start[None], 300, 0.01, own)[0]
+        for start, own in zip(starts, along, strict=True)
+    ]
+    policy = uc.ParametricPolicy(uc.Affine()).fit_demonstrations(demos)
+    found = replays(policy, demos, uc.Recipe(states=("x", "y", "z"), differentiate="savgol"))
+    spread = [np.linalg.svd(one.states - one.states.mean(axis=0), compute_uv=False) for one in demos]
+    assert all(s[2] < 1e-4 * s[0] for s in spread) if held else all(0.01 < s[2] / s[0] < 0.1 for s in spread[:3])
+    for one in found:
+        assert one.apart < 1e-3 * np.ptp(one.done.states, axis=0).max()

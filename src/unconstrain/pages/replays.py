@@ -248,7 +248,7 @@ def replays(
     clocks = [np.asarray(one.times, np.float64) for one in chosen]
     lasted = [float(times[-1] - times[0]) for times in clocks]
     dt = max(float(np.median(np.diff(clocks[0]))), max(lasted) / STEPS)
-    shapes = [diagnosis.flat(one.states) for one in chosen]
+    shapes = [_shape(policy, one) for one in chosen]
     task = held.target if getattr(held, "task", False) else None
     starts, steps = np.array([one.states[0] for one in chosen]), round(max(lasted) / dt) + 1
     known = [held is not None or not free or _told(policy, one) for one in chosen]  # others were not chosen
@@ -260,6 +260,13 @@ def replays(
         _compared(one, run, along, how, near(run.states))
         for one, run, (_, along), how in zip(chosen, cut, shapes, known, strict=True)
     ]
+
+
+def _shape(policy: Any, demo: Demonstration) -> tuple[Array, Array]:
+    """:func:`diagnosis.flat`, to a hundredth where a demonstration moves as the policy does freely."""
+    off = demo.actions - policy(demo.states)
+    freely = np.vecdot(off, off).sum() < FOLLOWED * np.vecdot(demo.actions, demo.actions).sum()
+    return diagnosis.flat(demo.states, 0.1 * diagnosis.FLAT if freely else diagnosis.FLAT)
 
 
 def _told(policy: Any, demo: Demonstration) -> bool:
