@@ -309,7 +309,7 @@ def test_an_export_says_what_support_is_called(folder, tmp_path):
     said = " ".join(run("export", folder / "same.npz", "-o", tmp_path / "wipe.c").split())
     assert "wipe_support()" in said
     assert re.search(
-        r"[Rr]un from the same starts, (it keeps size|(in the last round )?\d of \d go round too )", said
+        r"[Rr]un from the same starts, (it (nearly )?keeps size|(in the last round )?\d of \d go round too )", said
     )  # the last word before a robot moves
     assert " times" not in said
     assert "in metres" not in said
@@ -768,7 +768,7 @@ def test_held_strokes_that_end_apart_are_guided_to_where_their_policy_rests(tmp_
     run("fit", *how, "-o", tmp_path / "p.npz")
     assert uc.storage.load_notes(tmp_path / "p.npz")["can be guided to"] == "auto"
     certified = words(run("certify", tmp_path / "guided.npz"))
-    assert re.match(r"[✔!] \S+guided.npz: guaranteed is where movements end up, not how they move\.", certified)
+    assert re.match(r"[✔!] .*: guaranteed is where movements end up, not how they move\.", certified)
     assert ("But run from the starts of demonstrations" in certified) == certified.startswith("!")
 
 
@@ -846,9 +846,9 @@ def test_a_policy_that_strays_names_the_few_that_look_free_as_on_a_curved_wall(f
     each = np.repeat([0.9 if k < free else 0.1 for k in range(len(demos))], [len(one) for one in demos])
     policy.solution_ = SimpleNamespace(belief=SimpleNamespace(free=each))
     then = replayed(Verdict(Mark.GOOD, "Good."), policy, demos, recipe, None, MM).verdict.next
-    said = "'held_3' look free, as do some that curved walls held, which spoil it: compare without them (--leave-out "
+    said = "'held_3' looks free, as what a curved wall held may, and then misleads: compare without it (--leave-out "
     assert (f"{said}held_3)" in then) == named
-    assert ("look free" in then) == named
+    assert ("compare without" in then) == named
 
 
 @pytest.mark.parametrize("held", [False, True])

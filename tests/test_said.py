@@ -700,11 +700,12 @@ def test_a_score_says_that_recordings_leave_where_the_policy_was_learnt_if_it_mi
 
 def test_what_is_missed_of_whole_demonstrations_is_in_the_headline():
     found, little, plain = (verdicts.of_explained(0.995, 8, left_out=share) for share in (0.66, 0.05, 0.0))
-    much = "if one model holds for all, but 34% of demonstrations that were held alike if these are left out"
+    alike = "if one model holds for all; where demonstrations that were held alike are left out together, it explains"
+    much = f"{alike} 34% of them"
     assert found.said.endswith(f"{much}: good along recorded motion, and no further.")
     none = verdicts.of_explained(0.995, 8, 0.36, left_out=1.2).said
     assert none.startswith("Recordings tell too little: ")
-    assert "but nothing of demonstrations that were held alike if these are left out: good along recorded" in none
+    assert f"{alike} nothing of them: good along recorded" in none
     assert none.count("too little") == 1
     assert little.said.endswith("if one model holds for all: good.")
     assert [one.mark.name for one in (found, little)] == ["DOUBTFUL", "GOOD"]

@@ -207,8 +207,8 @@ def _seem_free(policy: Any, demos: Sequence[Demonstration]) -> str:
     """What to try where a few demonstrations look free among others that were held: a curved wall looks so, too."""
     belief, ends = getattr(getattr(policy, "solution_", None), "belief", None), np.cumsum([len(one) for one in demos])
     parts = np.split(belief.free, ends[:-1]) if belief is not None and len(belief.free) == ends[-1] else []
-    learnt = {str(one).partition("/")[2] or str(one) for one in policy.training_.split.fold_of}
-    if {one.name for one in demos} != learnt:
+    learnt = getattr(getattr(getattr(policy, "training_", None), "split", None), "fold_of", {})
+    if learnt and {one.name for one in demos} != {str(one).partition("/")[2] or str(one) for one in learnt}:
         return ""  # these are others
     names = [one.name for one, free in zip(demos, parts, strict=False) if free.mean() > diagnosis.FREE]
     if not 0 < 2 * len(names) < len(demos):
