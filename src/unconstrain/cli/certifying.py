@@ -64,10 +64,8 @@ def _judged(policy: str, stored: Any, found: uc.motion.certificate.Certificate) 
     far = f"That it moves as demonstrated is not guaranteed: {far[0].lower()}{far[1:]}"
     doubt = f"{away}{checked.partition(' Checked at')[0]} {far}".lstrip()
     then = f"unconstrain export {shlex.quote(policy)} -o policy.c"
-    said, aim = (
-        f"{policy}: guaranteed is where movements end up, not how they move. {unit}",
-        getattr(stored, "aim_", None),
-    )
+    aim = getattr(stored, "aim_", None)
+    said = f"{policy}: guaranteed is where movements end up, not how they move. {unit}"
     judged = verdicts.Verdict(verdicts.Mark.GOOD, said, promise.strip(), doubt, then)
     guided = (notes.get(MOVES) or "it keeps").partition("; unguided ")[0]
     if aim and not guided.startswith(("it keeps", "it nearly keeps")):

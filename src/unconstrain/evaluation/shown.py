@@ -42,12 +42,8 @@ def planes_of(demonstrations: Sequence[Demonstration]) -> Array:
     There are none where some keep to no plane or to a line, or in another unit, or planes differ as their places do.
     """
     whole, states = np.vstack([one.states for one in demonstrations]), [one.states for one in demonstrations]
-    sizes = [float(np.ptp(one, axis=0).max()) for one in states]
-    if (
-        whole.shape[1] != 3
-        or demonstrations[0].actions.shape[1] != 3
-        or max(sizes) > UNLIKE * min(filter(None, sizes), default=0.0)
-    ):
+    sizes = [size for one in states if (size := float(np.ptp(one, axis=0).max()))] or [0.0]
+    if (whole.shape[1], demonstrations[0].actions.shape[1]) != (3, 3) or max(sizes) > UNLIKE * min(sizes):
         return whole[:0]
     centred, each = np.vstack([one - one.mean(axis=0) for one in states]), np.array([flat(one)[0] for one in states])
     common, together = flat(centred, ONE)[0], whole.var(axis=0).sum() < 2.0 * centred.var(axis=0).sum()

@@ -264,17 +264,21 @@ def replays(
 
 def _shape(policy: Any, demo: Demonstration) -> tuple[Array, Array]:
     """:func:`diagnosis.flat`, to a hundredth where a demonstration moves as the policy does freely."""
-    off = demo.actions - policy(demo.states)
-    freely = np.vecdot(off, off).sum() < FOLLOWED * np.vecdot(demo.actions, demo.actions).sum()
+    freely = _followed(demo, policy(demo.states))
     return diagnosis.flat(demo.states, 0.1 * diagnosis.FLAT if freely else diagnosis.FLAT)
+
+
+def _followed(demo: Demonstration, actions: Array) -> bool:
+    """Whether a demonstration moved as these actions say."""
+    off = demo.actions - actions
+    return bool(np.vecdot(off, off).sum() < FOLLOWED * np.vecdot(demo.actions, demo.actions).sum())
 
 
 def _told(policy: Any, demo: Demonstration) -> bool:
     """Whether a demonstration tells what held it: it is straight, spans a plane, or is as the policy says."""
     rows, across, bent = (diagnosis.flat(demo.states, share)[0] for share in (diagnosis.FLAT, diagnosis.ONE, SPANNED))
     actions = policy(demo.states)
-    off = demo.actions - actions + actions @ rows.T @ rows
-    followed = np.vecdot(off, off).sum() < FOLLOWED * np.vecdot(demo.actions, demo.actions).sum()
+    followed = _followed(demo, actions - actions @ rows.T @ rows)
     return bool(followed or (across.any() and (across == bent).all()))
 
 

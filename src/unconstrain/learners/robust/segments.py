@@ -146,23 +146,24 @@ def curved_projections(states: Array, actions: Array, labels: NDArray[np.intp], 
 def _curved(states: Array, actions: Array, axes: Array, variance: float) -> Array:
     """N̂ (T, d, d) of a demonstration that moved along orthonormal axes (d, r): onto these, or what a surface left."""
     moved, (count, rank) = actions @ axes, (len(actions), axes.shape[1])
-    regressors = _affine(states)
-    stretch = regressors[:, -1].argsort(kind="stable").argsort() * STRETCHES // count
+    regressors, most = _affine(states), VARIANCES_OF_CURVED * variance
     flat, size = np.tile(axes @ axes.T, (count, 1, 1)), regressors.shape[1] * rank
     if count < LEAST_OF_CURVED * size or rank < 2:
         return flat
+    rest = moved - regressors @ np.linalg.lstsq(regressors, moved)[0]
+    if (np.linalg.eigvalsh(rest.T @ rest / count) < most).sum() > 1:
+        return flat
     each = (regressors[:, :, None] * moved[:, None, :]).reshape(count, size)
     values, normals = np.linalg.eigh(each.T @ each / count)
+    if values[0] >= most:
+        return flat
+    stretch = regressors[:, -1].argsort(kind="stable").argsort() * STRETCHES // count
     others = [np.linalg.eigh(each[stretch != part].T @ each[stretch != part])[1] for part in range(STRETCHES)]
 
     def left(by: Array, rows: Any) -> Array:
         turned = np.einsum("np,prk->nkr", regressors[rows], by.reshape(-1, rank, by.shape[1]))
         return null_space_projection(turned, 1e-3)
 
-    most = VARIANCES_OF_CURVED * variance
-    rest = moved - regressors @ np.linalg.lstsq(regressors, moved)[0]
-    if (np.linalg.eigvalsh(rest.T @ rest / count) < most).sum() > 1:
-        return flat
     for held in range(min(int((values < most).sum()), rank - 1), 0, -1):
         N = np.empty((count, rank, rank))
         for part, by in enumerate(others):
