@@ -103,24 +103,32 @@ def _looseness(one: Fit) -> float:
 def _log_evidence(fits: list[Fit], straight: list[Fit] | None, time: float, white: float) -> float:
     """Of one kind, whose noise is common to all fits, and of that which it is where it does not bend."""
     variances = noise(fits)
-    value = _explained(fits, time) - _slack(fits, white) + sum(_parameters(one, variances, time) for one in fits)
+    value = _explained(fits, time, straight) - _slack(fits, white) + sum(_parameters(one, variances, time) for one in fits)
     if straight is None:
         return value
     bends = sum(one.mechanism.count for one in fits) - sum(one.mechanism.count for one in straight)
     strength = sum(len(one.residuals) for one in fits) / len(fits) / time / variances[0]
-    gain = _explained(fits, time) - _explained(straight, time)
+    gain = _explained(fits, time, straight) - _explained(straight, time)
     own = np.mean([one.track.positions.var(axis=0).sum() for one in fits])  # a demonstration is less wide than all
     spread = strength * own * np.geomspace(LEAST_BEND, 1.0, 60) ** 2
     bent = logsumexp(-bends / 2 * np.log1p(spread) - gain / (1 + spread)) - np.log(len(spread))
     return value + float(bends / 2 * np.log(strength) + bent)
 
 
-def _explained(fits: list[Fit], time: float) -> float:
-    """Log likelihood where the kind holds, and log density where the movement is free."""
+def _explained(fits: list[Fit], time: float, straight: list[Fit] | None = None) -> float:
+    """Log likelihood where the kind holds, and log density where the movement is free: no more than on a flat surface.
+
+    A path is no cloud of samples: on a surface that bends as it turns it is straight, and seems to fill less.
+    """
     variances, count = noise(fits), sum(len(one.residuals) for one in fits) / time
-    held = -count / 2 * (1 + np.log(2 * np.pi * variances)).sum()
-    least = UNIT_ENTROPY * np.sqrt(variances.max(initial=RESOLUTION**2))
-    return float(held) + sum(_freedom(one, part, time, least) for one in fits for part in one.track.demonstrations)
+    held = -count / 2 * float((1 + np.log(2 * np.pi * variances)).sum())
+    flat = straight if straight is not None and fits[0].held.shape[1] == 1 else fits
+    return held + float(np.minimum(_freedoms(fits, time), _freedoms(flat, time)).sum())
+
+
+def _freedoms(fits: list[Fit], time: float) -> Array:
+    least = UNIT_ENTROPY * np.sqrt(noise(fits).max(initial=RESOLUTION**2))
+    return np.array([_freedom(one, part, time, least) for one in fits for part in one.track.demonstrations])
 
 
 def _slack(fits: list[Fit], white: float) -> float:
