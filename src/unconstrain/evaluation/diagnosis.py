@@ -24,12 +24,12 @@ from .metrics import along_motion
 from .sentences import CONSTRAINED as CONSTRAINED
 from .sentences import COUNTED as COUNTED
 from .sentences import FREE as FREE
+from .sentences import KEPT, looks
 from .sentences import NOWHERE as NOWHERE
 from .sentences import about_choice as about_choice
 from .sentences import about_freedom as about_freedom
 from .sentences import about_suspects as about_suspects
 from .sentences import in_words as in_words
-from .sentences import looks
 from .sentences import models_of as models_of
 from .sentences import needs_more as needs_more
 from .sentences import sentences as sentences
@@ -125,7 +125,8 @@ class Region:
 class Movement:
     """One demonstration: its name, samples, mean probability of a free sample (None if unknown), and as in Region.
 
-    It ``looks`` free, constrained, unsure, flat or line if it keeps to such a one that others leave, untold; or None.
+    It ``looks`` free, constrained, unsure, flat or line if it keeps to such a one that others leave, round if to such
+    a surface about which it winds, untold; or None.
     """
 
     name: str
@@ -281,9 +282,9 @@ def _diagnosed(policy: Policy, demos: list[Demonstration]) -> Diagnosis:
     together = belief.together if free is not None and len(belief.together) == len(states) else known
     jitter = float(np.sqrt(robust.noise_by_differences(actions, groups)))
     movements = _movements(demos, undetermined, known, free, max(jitter, 0.1 * SMALL * typical))
-    others = [one for one in movements if one.looks not in ("flat", "line")]
+    others = [one for one in movements if one.looks not in KEPT]
     seem = sum(one.samples * (one.free or 0.0) for one in others) / len(states) if others != [*movements] else 1.0
-    free_share = min(solution.free_share, seem)  # what is on a plane or line that others leave is not told
+    free_share = min(solution.free_share, seem)  # what keeps to something is not told
     return Diagnosis(
         method=solution.method,
         candidates={name: one.risk for name, one in belief.candidates.items()},

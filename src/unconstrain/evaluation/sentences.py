@@ -29,8 +29,12 @@ NOWHERE = "No place needs another demonstration: three or more tell the policy a
 COUNTED = {"free": "free", "constrained": "constrained", "unsure": "either"}
 LOOKS = COUNTED | {"flat": "on a plane that others cross (held to it, or short free strokes)"}
 LOOKS["line"] = "on a line that others leave (held to it, as by a rail, or straight free strokes)"
+LOOKS["round"] = "on a surface about which they wind (held to it, as by a pot, or free strokes that circle)"
 LOOKS["untold"] = "undecided (too little else was seen there, or all was held the same way)"
 """How demonstrations look, and how that is said; those of the first three are compared by probability."""
+
+KEPT = ("flat", "line", "round")
+"""How those look that keep to something: whether they wanted to is not told."""
 
 MOST_NAMED = 8
 """So many samples that look wrong are named."""
@@ -148,8 +152,10 @@ def about_freedom(found: Diagnosis) -> str:
     many = Counter(one.looks for one in found.movements)
     look = ", ".join(f"{many[how]} {words}" for how, words in LOOKS.items() if many[how])
     look = f"How {counted(len(found.movements), 'demonstration')} look: {look}."
-    if many["flat"] + many["line"] == len(found.movements):
-        said = "No sample is said to be free: each demonstration looks held, by a plane or line of its own all along"
+    if sum(many[how] for how in KEPT) == len(found.movements):
+        said = (
+            "No sample is said to be free: each demonstration looks held, by a plane, line or other surface of its own"
+        )
         return f"{said}; a short free stroke may, too. {look}"
     unsure = found.undecided_share * (found.undecided_share >= LITTLE)
     much, held, open_ = percents((found.free_share, 1.0 - found.free_share - unsure, unsure))

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array
+from ...constraints import mechanisms
 from ...risks import null_space_projection, project, unit_actions
 from .constants import (
     HELD_VARIANCES,
@@ -135,12 +136,25 @@ def curved_projections(states: Array, actions: Array, labels: NDArray[np.intp], 
     noise : ndarray, shape (N,)
         Variance of the noise on each action coordinate.
     """
-    found = flat.copy()
+    found, positions = flat.copy(), states.shape == actions.shape and states.shape[1] in (2, 3)
     for label in np.unique(labels):
         rows = labels == label
         values, axes = np.linalg.eigh(flat[rows][0])
-        found[rows] = _curved(states[rows], actions[rows], axes[:, values > 0.5], float(noise[rows].mean()))
+        axes, variance = axes[:, values > 0.5], float(noise[rows].mean())
+        found[rows] = _curved(states[rows], actions[rows], axes, variance)
+        if positions and axes.shape[1] > 1 and np.allclose(found[rows], flat[rows]):
+            found[rows] = _kept(states[rows] - states[rows].mean(axis=0), actions[rows], flat[rows], variance)
     return found
+
+
+def _kept(positions: Array, actions: Array, flat: Array, variance: float) -> Array:
+    """N̂ (T, d, d) of a demonstration, of the round mechanism that its positions keep to, if its motion does; or flat."""
+    mechanism = mechanisms.kept(positions)
+    if mechanism is None or mechanism.rank < actions.shape[1] - round(np.trace(flat[0])):
+        return flat
+    N = null_space_projection(mechanism.rows(positions), 1e-3)
+    leak = float(((actions - project(N, actions)) ** 2).sum()) / (mechanism.rank * len(actions))
+    return N if leak < VARIANCES_OF_CURVED * variance else flat
 
 
 def _curved(states: Array, actions: Array, axes: Array, variance: float) -> Array:
