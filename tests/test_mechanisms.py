@@ -484,3 +484,78 @@ def test_sixty_mechanisms():
     assert row["right"] >= 0.90
     assert 0.88 <= row["inside"] <= 0.99
     assert row["confident_and_wrong"] <= 0.02 * row["confident"]
+
+
+def stroke(rng, hold, samples=400, step=0.01, size=6e-4):
+    """A movement to a goal with a swirl, which ``hold`` (states -> rows of A) takes directions from."""
+    swirl, goal = np.array([[-0.7, -0.55, 0.0], [0.55, -0.7, 0.0], [0.0, 0.0, -0.7]]), np.array([0.45, 0.1, 1.05])
+
+    def policy(states):
+        way = (states - goal) @ swirl.T
+        return way / np.sqrt(1.0 + 4.0 * np.vecdot(way, way))[:, None]
+
+    start = goal + rng.uniform(-0.5, 0.5, 3)
+    movement = uc.rollout(policy, start, samples, step, hold(start, rng.standard_normal(3)))
+    return movement.states + size * rng.standard_normal((samples, 3))
+
+
+def on_plane(_, normal):
+    return Plane(centre=np.zeros(3), frame=frame_of(normal / np.linalg.norm(normal)))
+
+
+def on_sphere(start, way):
+    return Sphere(centre=start + 0.4 * way / np.linalg.norm(way), frame=np.eye(3), radius=0.4)
+
+
+def on_cylinder(start, way):
+    frame = frame_of(way / np.linalg.norm(way))
+    return Cylinder(centre=start + 0.3 * frame[1], frame=frame, radius=0.3)
+
+
+@pytest.mark.parametrize(
+    ("hold", "seed"),
+    [(on_plane, 7), *((on_cylinder, seed) for seed in (0, 14, 18)), *((on_sphere, seed) for seed in (8, 14, 16))],
+)
+def test_a_surface_is_not_likelier_for_bending_as_a_stroke_turns(hold, seed):
+    """Unrolled, these strokes are straighter on another surface than on their own."""
+    found = identify(stroke(np.random.default_rng(seed), hold)[::3])
+    other = {"plane", "cylinder", "sphere"} - {hold.__name__.removeprefix("on_")}
+    assert not (found.decided and found.kind in other)
+
+
+def wandering(rng):
+    """A free movement that goes on turning, on no surface."""
+    turns = np.linspace(0.0, 9.0, 400)[:, None] * rng.uniform(0.7, 1.3, 3) + rng.uniform(0.0, 6.0, 3)
+    return 0.2 * np.sin(turns) + noise((400, 3), size=6e-4)
+
+
+@pytest.mark.parametrize("hold", [on_cylinder, on_sphere])
+def test_what_a_stroke_keeps_to_is_told_where_it_is_round(hold):
+    told, right = 0, []
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        positions = stroke(rng, hold)
+        found = uc.constraints.kept(positions)
+        if found is not None:
+            again = np.random.default_rng(seed)
+            start = np.array([0.45, 0.1, 1.05]) + again.uniform(-0.5, 0.5, 3)
+            normal = hold(start, again.standard_normal(3)).rows(positions)[:, 0]
+            right.append(np.linalg.norm(np.einsum("nkd,nd->nk", found.rows(positions), normal), axis=1).mean())
+            told += 1
+    assert told >= 4
+    assert np.median(right) > 0.99
+
+
+def test_what_is_flat_free_or_out_of_order_keeps_to_nothing_round():
+    rngs = [np.random.default_rng(seed) for seed in range(6)]
+    flat = [stroke(rng, on_plane) for rng in rngs]
+    assert sum(uc.constraints.kept(one) is not None for one in flat) <= 2
+    assert [uc.constraints.kept(wandering(rng)) for rng in rngs] == 6 * [None]
+    turn = np.linspace(0.0, 9.0, 300)[:, None]
+    ring = np.hstack([np.cos(turn), np.sin(turn)]) + noise((300, 2))
+    assert uc.constraints.kept(ring).kind == uc.constraints.kept(1000.0 * ring + 5000.0).kind == "circle"
+    assert uc.constraints.kept(ring, wound=True) is None  # it turns 1.4 times
+    assert uc.constraints.kept(np.vstack([ring, ring]), wound=True) is not None
+    assert uc.constraints.kept(1.2 * np.random.default_rng(0).permutation(ring) + noise((300, 2), size=0.1)) is None
+    assert uc.constraints.kept(np.ones((300, 2))) is None
+    assert uc.constraints.kept(ring[:5]) is None

@@ -14,6 +14,7 @@ from test_cli import call, refused, run, write
 from unconstrain.base.display import percent
 from unconstrain.cli import informing
 from unconstrain.cli.informing import TOLD
+from unconstrain.constraints.mechanisms.kinds import Cylinder
 from unconstrain.evaluation.verdicts import Mark, Verdict, moves, of_replays, size_and_pace
 from unconstrain.pages.fit import policy_page
 from unconstrain.pages.replays import replayed, replays
@@ -672,9 +673,7 @@ def test_what_keeps_to_a_plane_that_others_cross_is_not_called_free(tmp_path):
     assert {one["looks"] for one in found["movements"]} == {"flat"}
     assert sum(one["free"] > 0.5 for one in found["movements"]) >= 5  # as estimated from what the plates leave
     assert "How 6 demonstrations look: 6 on a plane that others cross (held to it, or short free strokes)." in said
-    assert (
-        "No sample is said to be free: each demonstration looks held, by a plane or line of its own all along" in said
-    )
+    assert "No sample is said to be free: each demonstration looks held, by a plane, line or surface of its own" in said
     assert "Of the samples" not in said
     assert "Mean probability that a sample was free" not in said
     page = (tmp_path / "a.html").read_text("utf-8")
@@ -718,6 +717,40 @@ def test_of_copies_of_one_recording_no_free_or_constrained_ones_are_counted(tmp_
     assert ("How 4 demonstrations look: 4 free." in said) == (not copies)
     assert ({one["looks"] for one in told} == {"untold"}) == copies
     assert ("Mean probability that a sample was free" in said) == (not copies)
+
+
+def stirred(folder, kind):
+    """Files of a swirl to a place: on tilted plates, and twice in a pot, or free."""
+    rng, files, centre = np.random.default_rng(4), [], np.array([450.0, 50.0, 200.0])
+
+    def policy(states):
+        return (states - centre) @ np.array([[-0.4, -2.0, 0.0], [2.0, -0.4, 0.0], [0.0, 0.0, -0.7]]).T
+
+    frame = np.eye(3)[[2, 0, 1]]
+    for k in range(8):
+        start = centre + rng.uniform(-1, 1, 3) * [70, 70, 40]
+        along = uc.constraints.Plane([*rng.normal(size=2) / 2, 1.0])
+        if k in (3, 6) and kind == "pot":
+            start = centre + np.array([60.0 + 10 * k, 0.0, 60.0])
+            along = Cylinder(centre=centre, frame=frame, radius=60.0 + 10 * k)
+        elif k in (3, 6):
+            start, along = centre + np.array([30.0 * k - 60, 40.0, 60.0 - 15 * k]), None
+        one = uc.rollout(policy, start, 320, 0.02, along)
+        rows = np.column_stack([one.times, one.states + 0.5 * rng.standard_normal((320, 3))])
+        files.append(write(folder / f"s{k}.csv", "t [s],x [mm],y [mm],z [mm]", rows))
+    return files
+
+
+@pytest.mark.parametrize("kind", ["pot", "free"])
+def test_who_winds_about_a_pot_is_not_called_free(tmp_path, kind):
+    how = "diagnose", *stirred(tmp_path, kind), "--state", "x,y,z", "--differentiate"
+    said, found = words(run(*how)), json.loads(run(*how, "--json"))
+    looks = {one["name"]: one["looks"] for one in found["movements"]}
+    assert looks["s3"] == looks["s6"] == {"pot": "round", "free": "free"}[kind]
+    assert ("2 on a surface about which they wind (held to it, as by a pot, or free strokes that circle)" in said) == (
+        kind == "pot"
+    )
+    assert (found["free_share"] > 0.15) == (kind == "free")
 
 
 def to_a_goal(folder, held):

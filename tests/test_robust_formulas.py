@@ -427,6 +427,22 @@ def test_what_turns_with_the_state_does_not_depend_on_order_units_or_place():
         )
 
 
+@pytest.mark.parametrize("size", [0.0, 5e-4])
+def test_a_pot_at_one_speed_is_told_by_positions_as_velocities_do_not(size):
+    turn, rng = np.linspace(0.0, 15.0, 500), np.random.default_rng(0)
+    around = np.column_stack([np.cos(turn), np.sin(turn)])
+    path = np.column_stack([0.1 * around, 0.06 * np.cos(0.4 * turn)])
+    actions = np.column_stack([-0.1 * around[:, 1], 0.1 * around[:, 0], -0.024 * np.sin(0.4 * turn)])
+    actions += 2e-3 * rng.standard_normal(actions.shape)
+    states = path + size * rng.standard_normal(path.shape)
+    groups, noise, free = np.zeros(500, dtype=int), np.full(500, 4e-6), np.tile(np.eye(3), (500, 1, 1))
+    N = uc.null_space_projection(np.column_stack([around, np.zeros(500)])[:, None])
+    assert_allclose(projections_of(actions, groups, noise), free, atol=1e-9)
+    assert_allclose(curved_projections(states, actions, groups, free, noise), N, atol=0.05)
+    for other in (states[:, [1, 0, 2]], states * [3.0, 1.0, 1.0], np.hstack([states, states])):
+        assert_allclose(curved_projections(other, actions, groups, free, noise), free)  # no positions of these
+
+
 def test_noise_that_smoothing_hid_is_at_least_the_misfit():
     samples = samples_of(draw())
     least = 0.015**2 * (samples.actions**2).sum(axis=1).mean() / 2

@@ -12,7 +12,7 @@ from .forms import Constant, Form, Surface, Velocities
 from .known import Constraint, JacobianRows, Plane, PolicyAligned, SwitchingLine
 from .learnt import LearntConstraint
 from .matrices import constraint_matrices
-from .mechanisms import identify
+from .mechanisms import identify, kept
 from .spectrum import Fields
 
 STORED = (Choice, Constant, Fields, Form, LearntConstraint, Surface, Velocities)
@@ -28,5 +28,6 @@ __all__ = [
     "SwitchingLine",
     "constraint_matrices",
     "identify",
+    "kept",
     "null_space_component",
 ]

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.display import listed
-from ..constraints import mechanisms
+from ..constraints import kept
 from ..learners import robust
 from ..recordings import Demonstration, Recipe, readers, stack
 from .marks import ENOUGH, Mark, Verdict
@@ -71,10 +71,10 @@ def crossed(demonstrations: Sequence[Demonstration], noise: float) -> list[str]:
         across = ((others @ held.T) ** 2).sum() > FLAT**2 * (others**2).sum()
         noisy = float(np.sqrt(robust.noise_by_differences(places, np.zeros(len(places), dtype=np.intp))))
         off = max(WITHIN * noisy, TIGHT * float(np.linalg.norm(np.ptp(places, axis=0))))
-        kept = all(_largest(each @ held.T) <= most for each, most in ((own, WITHIN * noise), (places, off)))
-        if across and held[2].any() and kept:
+        on_it = all(_largest(each @ held.T) <= most for each, most in ((own, WITHIN * noise), (places, off)))
+        if across and held[2].any() and on_it:
             found[index] = "line" if held[1].any() else "flat"
-        elif mechanisms.winding([np.diff(places, axis=0)]) and mechanisms.kept(places) is not None:
+        elif kept(places, wound=True) is not None:
             found[index] = "round"
     return found
 

@@ -13,7 +13,7 @@ from .hybrid import Hybrid
 from .inconsistency import Inconsistency
 from .learner import Learner
 from .named import named
-from .robust import Likelihood, NoiseCorrected, Robust, Segments
+from .robust.learner import Likelihood, NoiseCorrected, Robust, Segments
 from .solution import Belief, Judged, Solution, Uncertainty
 
 __all__ = [

@@ -103,9 +103,8 @@ def _looseness(one: Fit) -> float:
 def _log_evidence(fits: list[Fit], straight: list[Fit] | None, time: float, white: float) -> float:
     """Of one kind, whose noise is common to all fits, and of that which it is where it does not bend."""
     variances = noise(fits)
-    value = (
-        _explained(fits, time, straight) - _slack(fits, white) + sum(_parameters(one, variances, time) for one in fits)
-    )
+    paid = _slack(fits, white) - sum(_parameters(one, variances, time) for one in fits)
+    value = _explained(fits, time, straight) - paid
     if straight is None:
         return value
     bends = sum(one.mechanism.count for one in fits) - sum(one.mechanism.count for one in straight)

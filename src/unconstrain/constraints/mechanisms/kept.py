@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from math import log
 
@@ -10,13 +11,13 @@ import numpy as np
 from ...base.arrays import Array
 from .identify import FEWEST, LIKELY, identify
 from .mechanism import Mechanism
-from .track import noise_by_differences
+from .track import noise_by_differences, winding
 
 ROUND = ("circle", "sphere", "cylinder", "screw")
 
-WITHIN, EXACT = 1.5, 1e-5
-"""Positions leave what they keep to by less than so many times what is white in them, or than this share of their
-spread.
+WITHIN, EXACT, NEAR = 1.5, 1e-5, 0.05
+"""Positions leave what they keep to by less than so many times what is white in them, or than the second share of their
+spread, and not by more than the third: rows that are not in the order of time seem to be all noise.
 
 The first was 0.8 to 1.4 on 170 surfaces of four kinds under noise of 0.3 mm, and 1.9 to 4.3 for free strokes that were
 taken for round ones."""
@@ -25,21 +26,39 @@ MOST_POSITIONS = 200
 """Positions, at most, by which a mechanism is named; more are thinned evenly."""
 
 
-def kept(positions: Array) -> Mechanism | None:
-    """What one demonstration's positions (T, 2) or (T, 3), in order of time, keep to, if it is round; else None.
+def kept(positions: Array, wound: bool = False) -> Mechanism | None:
+    """Return the round mechanism that one demonstration keeps to, by its positions; None if to none.
 
-    That is so where each kind that is likely is round, and noise that is white explains how far they leave it. Of
+    That is so where each kind that is likely is round, and noise that is white explains how far positions leave it. Of
     these kinds it is the one that holds least: a path along a cylinder may be a screw as well.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (T, 2) or (T, 3)
+        In the order of time.
+    wound : bool
+        Only if what is held turns more on their way than free strokes do: these may turn within a bowl, as if on it.
+
+    Examples
+    --------
+    >>> turn = np.linspace(0, 9, 90)[:, None]
+    >>> uc.constraints.kept(0.4 * np.hstack([np.cos(turn), np.sin(turn)])).kind
+    'circle'
     """
-    if len(positions) < FEWEST:
-        return None
     spread = float(np.sqrt(positions.var(axis=0).sum()))
-    most = max(WITHIN * noise_by_differences(positions, np.zeros(len(positions))), EXACT * spread)
-    if not spread > 0.0 or _off_quadric(positions) > most:
+    if len(positions) < FEWEST or spread == 0.0:
         return None
-    likely = _likely(positions[:: -(-len(positions) // MOST_POSITIONS)].tobytes(), positions.shape[1])
-    least = min(likely, key=lambda one: one[0].rank)
-    return least[0] if least[1] <= most and all(one.kind in ROUND and not one.vague for one, _ in likely) else None
+    white = noise_by_differences(positions, np.zeros(len(positions), dtype=np.intp))
+    most = max(min(WITHIN * white, NEAR * spread), EXACT * spread)
+    if _off_quadric(positions) > most:
+        return None
+    thinned = positions[:: -(-len(positions) // MOST_POSITIONS)]
+    likely = _likely((thinned - positions.mean(axis=0)).tobytes(), positions.shape[1])
+    round_ = all(one.kind in ROUND and not one.vague for one, _ in likely)
+    found, off = min(likely, key=lambda one: one[0].rank)
+    found = replace(found, centre=found.centre + positions.mean(axis=0))
+    turned = not wound or any(winding([normals]) for normals in found.rows(positions).swapaxes(0, 1))
+    return found if round_ and off <= most and turned else None
 
 
 @lru_cache(maxsize=256)

@@ -9,7 +9,7 @@ True
 """
 
 from .constants import LEAST_MISFIT, SPHERE_HIDDEN_BY_NOISE
-from .learner import Likelihood, NoiseCorrected, Robust, Segments
+from .learner import Robust
 from .noise import noise_by_differences
 from .pivot import pivot_of
 from .segments import held_throughout
@@ -17,10 +17,7 @@ from .segments import held_throughout
 __all__ = [
     "LEAST_MISFIT",
     "SPHERE_HIDDEN_BY_NOISE",
-    "Likelihood",
-    "NoiseCorrected",
     "Robust",
-    "Segments",
     "held_throughout",
     "noise_by_differences",
     "pivot_of",

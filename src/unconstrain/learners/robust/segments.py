@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Array
-from ...constraints import mechanisms
+from ...constraints import kept
 from ...risks import null_space_projection, project, unit_actions
 from .constants import (
     HELD_VARIANCES,
@@ -143,13 +143,13 @@ def curved_projections(states: Array, actions: Array, labels: NDArray[np.intp], 
         axes, variance = axes[:, values > 0.5], float(noise[rows].mean())
         found[rows] = _curved(states[rows], actions[rows], axes, variance)
         if positions and axes.shape[1] > 1 and np.allclose(found[rows], flat[rows]):
-            found[rows] = _kept(states[rows] - states[rows].mean(axis=0), actions[rows], flat[rows], variance)
+            found[rows] = _kept(states[rows], actions[rows], flat[rows], variance)
     return found
 
 
 def _kept(positions: Array, actions: Array, flat: Array, variance: float) -> Array:
-    """N̂ (T, d, d) of a demonstration, of the round mechanism that its positions keep to, if its motion does; or flat."""
-    mechanism = mechanisms.kept(positions)
+    """N̂ (T, d, d) of what is round that a demonstration keeps to, by its positions and by its motion; or flat."""
+    mechanism = kept(positions)
     if mechanism is None or mechanism.rank < actions.shape[1] - round(np.trace(flat[0])):
         return flat
     N = null_space_projection(mechanism.rows(positions), 1e-3)
