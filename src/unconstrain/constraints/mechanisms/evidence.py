@@ -8,7 +8,8 @@ extent of the movement in each direction t that is free,
 The first term is the fit where the kind holds. Where it does not, the movement is uniform over its extent, the second
 term: a kind that holds less pays for the freedom it claims. The third is Laplace's, W = n/N σ_b⁻²; a priori, with
 W₀ = 1/N S_b⁻², a parameter moves the mechanism by as much as the recording extends. The fourth is the same for the two
-ends of ℓ_t, which lie anywhere in L; the box that they make is turned as it fits best, which is paid for, too.
+ends of ℓ_t, which lie anywhere in L; the box that they make is turned as it fits best, which is paid for, too. On a
+surface that bends it counts as no smaller than on a flat one.
 
 How strongly a kind bends away from a straight one, a circle from a line, is of any size: the prior of its q parameters
 beyond that one's has the width S s, and s is uniform in the logarithm (a mixture of g-priors, Liang et al. 2008). With
