@@ -52,7 +52,8 @@ def planes_of(demonstrations: Sequence[Demonstration]) -> Array:
     common, together = flat(centred, ONE)[0], whole.var(axis=0).sum() < 2.0 * centred.var(axis=0).sum()
     if common[2].any() and not common[1].any():
         return common[2:]
-    return each[:, 2] if together and each[:, 2].any(axis=1).all() and not each[:, 1].any() else whole[:0]
+    own = all(held[2].any() and _on_it(one, held) for one, held in zip(states, each, strict=True))
+    return each[:, 2] if together and own and not each[:, 1].any() else whole[:0]
 
 
 def crossed(demonstrations: Sequence[Demonstration], noise: float) -> list[str]:
@@ -66,17 +67,20 @@ def crossed(demonstrations: Sequence[Demonstration], noise: float) -> list[str]:
     found = [""] * len(demonstrations)
     for index in range(len(found) if (states.shape[1], actions.shape[1]) == (3, 3) else 0):
         own, others, places = actions[groups == index], actions[groups != index], states[groups == index]
-        places = places - places.mean(axis=0)
         held = flat(places)[0]
         across = ((others @ held.T) ** 2).sum() > FLAT**2 * (others**2).sum()
-        noisy = float(np.sqrt(robust.noise_by_differences(places, np.zeros(len(places), dtype=np.intp))))
-        off = max(WITHIN * noisy, TIGHT * float(np.linalg.norm(np.ptp(places, axis=0))))
-        on_it = all(_largest(each @ held.T) <= most for each, most in ((own, WITHIN * noise), (places, off)))
-        if across and held[2].any() and on_it:
+        if across and held[2].any() and _largest(own @ held.T) <= WITHIN * noise and _on_it(places, held):
             found[index] = "line" if held[1].any() else "flat"
         elif kept(places, wound=True) is not None:
             found[index] = "round"
     return found
+
+
+def _on_it(places: Array, held: Array) -> bool:
+    """Whether positions (T, n) leave no direction that was held (n, n) by more than their noise, or hardly."""
+    noise = float(np.sqrt(robust.noise_by_differences(places, np.zeros(len(places), dtype=np.intp))))
+    most = max(WITHIN * noise, TIGHT * float(np.linalg.norm(np.ptp(places, axis=0))))
+    return _largest((places - places.mean(axis=0)) @ held.T) <= most
 
 
 def _largest(values: Array) -> float:
