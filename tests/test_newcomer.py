@@ -120,7 +120,7 @@ def test_what_comes_next_differentiates_as_it_was_typed(folder, tmp_path, how):
     files = [folder / f"w{k}.csv" for k in range(3)]
     run("fit", *files, "--state", "X,Y", *how.split(), "--model", "affine", "-o", tmp_path / "p.npz")
     for said in (text(call("info", tmp_path / "p.npz")), text(call("score", tmp_path / "p.npz", folder / "unseen"))):
-        assert f" RECORDINGS.csv --state X,Y {how}" in said
+        assert f" RECORDINGS.csv --state 'X [mm],Y [mm]' {how} " in f"{said} "
         assert "--by savgol" not in said
 
 

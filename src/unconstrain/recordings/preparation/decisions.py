@@ -94,7 +94,7 @@ def unused(asked: Recipe, decided: Recipe, recording: Recording) -> tuple[Remark
     """Remarks on columns that move and are no states: beside guessed ones, on angles how to take them in; else on z."""
     columns, used = zip(recording.columns, recording.values.T, strict=True), _used(decided)
     if asked.states is not None or not decided.states:
-        return _siblings(decided.states or (), dict(columns), used)
+        return _siblings(decided.states, dict(columns), used) if decided.states else ()
     moving = {name: column for name, column in columns if name not in used and _moves(column)}
     angles = [name for name in moving if ANGLE.fullmatch(bare(name)) or wraps(moving[name])]
     angles = [] if decided.actions else angles  # which have no velocity then
