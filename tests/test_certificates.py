@@ -150,7 +150,8 @@ def test_on_the_command_line_the_exit_code_says_it(tmp_path):
         CliRunner().invoke(main, ["certify", str(tmp_path / "mm.npz")]).output.split()
     )
     assert "guaranteed" in bad.output
-    assert f"Next: unconstrain export {tmp_path / 'guided.npz'} -o policy.c" in good.output
+    assert f"\n    unconstrain export {tmp_path / 'guided.npz'} -o policy.c\n" in good.output
+    assert "Next: To run free (under a new constraint, compare it" in " ".join(good.output.split())
     assert "Next: 'unconstrain fit --guided cycle', if it is to go round, or 'unconstrain fit --guided GOAL'" in flat
     assert all(f"--guided {to} -o guided.npz" in bad.output for to in ("cycle", "GOAL"))
     assert not re.search(r"by V|V falls|as V", good.output)

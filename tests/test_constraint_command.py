@@ -247,7 +247,7 @@ def test_plates_of_other_tilts_have_a_constraint_each_and_a_table(tilted, tmp_pa
     assert "Record what is missing" not in said
     [line] = [line for line in said.splitlines() if line.startswith("Mechanism: ")]
     assert "a plane for each of 3 demonstrations, against" in line
-    assert line.rstrip().endswith(":1 (10:1 are odds).")
+    assert line.rstrip().endswith(":1 (10:1 are odds for what is first).")
     rows = [line.split() for line in said.splitlines() if line.startswith("plate_")]
     assert_allclose(
         [float(row[row.index("constant") + 2].rstrip("°")) for row in rows], np.degrees(np.abs(TILTS)), atol=1
@@ -265,7 +265,7 @@ def test_plates_of_other_tilts_have_a_constraint_each_and_a_table(tilted, tmp_pa
 def test_one_plate_has_one_constraint_in_the_unit_of_its_file_and_of_no_other(tilted, tmp_path, monkeypatch):
     said = run("constraint", tilted / "plate_1.csv", "-o", tmp_path / "p.npz")
     assert "Mechanism: a plane through (" in said
-    assert "(± is half of a 95 % interval, 10:1 are odds)." in " ".join(said.split())
+    assert "(± is half of a 95 % interval, 10:1 are odds for what is first)." in " ".join(said.split())
     text = (tilted / "plate_1.csv").read_text().replace(" [mm]", "")
     (tmp_path / "none.csv").write_text(text)
     assert "Mechanism, if these are positions: a plane through (" in run(

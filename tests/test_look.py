@@ -314,7 +314,7 @@ def test_it_agrees_with_diagnose_and_leaves_to_it_what_recordings_tell(tmp_path,
     said = run("look", *files, "-o", tmp_path / "a.html")
     whole = " ".join(said.split())
     assert said.startswith(f"{mark} 4 demonstrations, nothing odd: ready to learn from.")
-    assert "What recordings tell of a policy, 'unconstrain diagnose' judges." in whole
+    assert "'unconstrain diagnose' judges what recordings tell of a policy." in whole
     flat = "All demonstrations lie on one plane or parallel ones"
     judged = " ".join(run("diagnose", *files, "--model", "affine").split())
     assert [flat in whole, flat in judged, judged.startswith("✖")] == [mark == "!"] * 3

@@ -115,6 +115,15 @@ def test_what_comes_next_is_typed_as_this_was(tmp_path):
     assert re.search(rf"Next: unconstrain fit .*alle\.csv {then}", shown)
 
 
+@pytest.mark.parametrize("how", ["--differentiate", "--by kalman"])
+def test_what_comes_next_differentiates_as_it_was_typed(folder, tmp_path, how):
+    files = [folder / f"w{k}.csv" for k in range(3)]
+    run("fit", *files, "--state", "X,Y", *how.split(), "--model", "affine", "-o", tmp_path / "p.npz")
+    for said in (text(call("info", tmp_path / "p.npz")), text(call("score", tmp_path / "p.npz", folder / "unseen"))):
+        assert f" RECORDINGS.csv --state 'X [mm],Y [mm]' {how} " in f"{said} "
+        assert "--by savgol" not in said
+
+
 def test_many_files_are_a_pattern_that_stands_for_just_these(folder):
     each = sorted(folder.glob("*.csv"))
     for files, typed in ((each, shlex.quote(f"{folder}/*.csv")), (each[:4], shlex.join(map(str, each[:4])))):
@@ -764,7 +773,7 @@ def test_regions_of_a_diagnosis_are_one_number_each(folder):
     whole = json.loads(run("diagnose", *few, "--json", *report))
     told = whole["regions"]
     assert whole["verdict"]["next"].partition("'")[0] in html.unescape(report[1].read_text("utf-8"))
-    open_ = "Where all leave a direction open"
+    open_ = "Where none tells it in some direction"
     assert f"Do not trust: {open_ if whole['told_together'] < 1 else 'States that nobody came near.'}" in said
     assert all(f"{name}: " in said for name in ("told by all", "told by three", "may be off by", "moved by"))
     assert all(isinstance(one[name], float) for one in told for name in ("determined", "together", "along"))

@@ -219,6 +219,21 @@ def test_a_look_at_a_policy_that_moves_otherwise_begins_with_that(folder, tmp_pa
     assert "But run from the same starts, 2 of 3 go round too small; 3 of 3 too slow." in " ".join(said.split())
 
 
+@pytest.mark.parametrize(("told", "mark"), [(0.75, "!"), (1.0, "✔")])
+def test_a_look_at_a_policy_says_why_it_is_doubted_and_of_what_it_speaks(folder, tmp_path, told, mark):
+    held, policy = sorted(folder.glob("held_*.csv")), uc.load(folder / "same.npz")
+    alone = words(run("look", *held, "-o", tmp_path / "a.html"))
+    assert alone.startswith("✔ 3 demonstrations, nothing odd: ready to learn from. 'unconstrain diagnose' judges what")
+    notes = uc.storage.load_notes(folder / "same.npz") | {informing.TOLD: told}
+    uc.save(policy, tmp_path / "told.npz", notes)
+    said = words(run("look", *held, tmp_path / "told.npz", "-o", tmp_path / "b.html"))
+    little = "But across the motion recordings tell the policy too little. " * (mark == "!")
+    assert said.startswith(
+        f"{mark} 3 demonstrations, nothing odd. {little}Run from the same starts, the policy keeps size"
+    )
+    assert "ready to learn from" not in said
+
+
 def test_a_wrong_plane_is_named_as_the_likely_cause_of_a_bad_score(folder):
     normal = np.random.default_rng(3).standard_normal(3) * [0.1, 0.1, 0.0] + [0.0, 0.0, 1.0]
     for plane, wrong in ((normal, False), ([1.0, 0.2, 0.0], True)):
@@ -716,7 +731,14 @@ def test_of_copies_of_one_recording_no_free_or_constrained_ones_are_counted(tmp_
     assert ("at 0% of their states three demonstrations or more tell the policy" in said) == copies
     assert ("How 4 demonstrations look: 4 free." in said) == (not copies)
     assert ({one["looks"] for one in told} == {"untold"}) == copies
-    assert ("Mean probability that a sample was free" in said) == (not copies)
+    lead = "Mean probability that a sample was free; above 50% a demonstration looks free, below 10% constrained, and"
+    assert (lead in said) == (not copies)
+    table = re.findall(r" (\d) 300 (free|constrained|either) (>?\d+)% >?\d+%", said)
+    assert len(table) == 4 * (not copies)
+    assert {how for _, how, _ in table} == (set() if copies else {"free"})
+
+
+SWIRL = np.array([[-1.0, -0.8, 0.0], [0.8, -1.0, 0.3], [0.0, -0.3, -1.0]])
 
 
 def stirred(folder, kind):
@@ -758,9 +780,8 @@ def to_a_goal(folder, held):
     rng, files = np.random.default_rng(3), []
     for k in range(8):
         normal, start = rng.normal(size=3), rng.uniform(-200, 200, 3)
-        swirl = np.array([[-1.0, -0.8, 0.0], [0.8, -1.0, 0.3], [0.0, -0.3, -1.0]])
         along = uc.constraints.Plane(normal) if held else None
-        one = uc.rollout(lambda x, to=swirl: x @ to.T, start, 200, 0.02, along)
+        one = uc.rollout(lambda x: x @ SWIRL.T, start, 200, 0.02, along)
         rows = np.column_stack([one.times, one.states + 0.1 * rng.standard_normal((200, 3))])
         files.append(write(folder / f"s{k}.csv", "t [s],x [mm],y [mm],z [mm]", rows))
     return files
@@ -772,8 +793,36 @@ def test_runs_that_are_held_where_a_stroke_lies_are_compared_free_too(tmp_path, 
     said = words(run("fit", *files, "--state", "x,y,z", "--model", "affine", "-o", policy))
     assert "un from the same starts, it keeps size" in said
     for told in (said, words(run("info", policy)), words(run("export", policy, "-o", tmp_path / "p.c"))):
-        assert bool(re.search(r"each held to the plane \(\d\).*; run free, (\d) of \1 go elsewhere, 's", told)) == held
-        assert ("farthest, which is wrong if they were free strokes" in told) == held
+        assert bool(re.search(r"each held to the plane \(\d\) or line \(\d\) that it lies in", told)) == held
+        assert ("that it lies in: all that would go elsewhere if run free look held" in told) == held
+        assert "if they were free strokes" not in told  # which diagnose does not doubt either
+
+
+def test_a_run_that_is_held_is_doubted_only_where_its_stroke_may_have_been_free(tmp_path):
+    files, free = to_a_goal(tmp_path, True)[:4], tmp_path / "free"
+    free.mkdir()
+    how = *files, *to_a_goal(free, False)[5:7], "--state", "x,y,z", "--model", "affine"
+    looks = {one["name"]: one["looks"] for one in json.loads(run("diagnose", *how, "--json"))["movements"]}
+    said = words(run("fit", *how, "-o", tmp_path / "p.npz"))
+    told = re.search(r"that it lies in; (.*?) would go elsewhere if run free, so the policy is wrong there if", said)
+    named = re.findall(r"'(\w+)'", told[1])
+    assert named
+    assert "constrained" in looks.values()
+    assert not [name for name in named if looks[name] == "constrained"]
+    assert "if they were free strokes, which recordings do not tell" in words(run("info", tmp_path / "p.npz"))
+    beside = words(run("look", *how[:8], tmp_path / "p.npz", "-o", tmp_path / "a.html"))
+    assert f"{told[1]} would go elsewhere" in beside  # as fit says
+
+
+@pytest.mark.parametrize(("count", "model"), [(3, "affine"), (6, "affine"), (6, "local"), (8, "affine")])
+def test_fit_calls_too_little_what_diagnose_calls_so(tmp_path, count, model):
+    how = *to_a_goal(tmp_path, True)[:count], "--state", "x,y,z", "--model", model
+    judged = words(run("diagnose", *how))
+    fit = words(run("fit", *how, "-o", tmp_path / "p.npz"))
+    little = count == 3 or model == "local"
+    assert bool(re.search(r"and at \d+% none tells it in some direction: too little\.", judged)) == little
+    assert fit.startswith("! Recordings tell too little: at") == little
+    assert "enough in most places" not in judged if little else ": enough" in judged
 
 
 @pytest.mark.parametrize("held", [True, False])
@@ -836,6 +885,9 @@ def test_a_certificate_says_beside_what_is_guaranteed_that_runs_stray(tmp_path, 
     assert said.startswith(f"{mark} ")
     assert (f"But run from the starts of demonstrations, {moves}. Trust:" in said) == (mark == "!")
     assert "unguided" not in said
+    export = "Next: To run free (under a new constraint, compare it with one without --guided): unconstrain export"
+    assert (export in said) == (mark == "✔")
+    assert ("Next: Fit without --guided, which does better" in said) == (mark == "!")
 
 
 def test_rails_are_named_as_lines_and_free_strokes_are_not(tmp_path):

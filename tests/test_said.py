@@ -377,15 +377,15 @@ def test_a_look_at_a_policy_copies_the_command_that_reads_as_it_did(work, tmp_pa
     rows = [np.loadtxt(one, delimiter=",", skiprows=1) for one in sorted((work / "in ways").iterdir())]
     write(tmp_path / "all.csv", "n,x,y", np.vstack([np.insert(one[:, 1:], 0, k, axis=1) for k, one in enumerate(rows)]))
     monkeypatch.chdir(tmp_path)
-    how = ("--state", "x,y", "--by", "savgol", "--rate", "50", "--still", "0.01", "--group", "n")
-    run("fit", "all.csv", *how, "-o", "p.npz")
+    how = ("--state", "x,y", "--rate", "50", "--still", "0.01", "--group", "n")
+    run("fit", "all.csv", "--differentiate", *how, "-o", "p.npz")
     run("look", "p.npz", "all.csv", *more, "-o", "look.html")
     [line] = re.findall(r'"(unconstrain fit [^"]*)","-o policy.npz"', (tmp_path / "look.html").read_text("utf-8"))
-    words = shlex.split(line)
+    words = [word for word in shlex.split(line) if word != "--differentiate"]
     options = dict(zip(words[3::2], words[4::2], strict=True))
     assert options == dict(zip(how[::2], how[1::2], strict=True)) | dict(zip(more[::2], more[1::2], strict=True))
     assert len(words) == 3 + 2 * len(options)
-    run(*words[1:], "-o", "again.npz")
+    run(*shlex.split(line)[1:], "-o", "again.npz")
     stored = [uc.storage.load_notes(one)["recipe"] for one in ("p.npz", "again.npz")]
     assert stored[1] == stored[0] | ({"window_s": 0.1, "still": 0.02} if more else {})
 

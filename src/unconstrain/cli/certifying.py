@@ -63,12 +63,13 @@ def _judged(policy: str, stored: Any, found: uc.motion.certificate.Certificate) 
     far = far if notes.get(LOST) is None else explained_by(stored, notes).said
     far = f"That it moves as demonstrated is not guaranteed: {far[0].lower()}{far[1:]}"
     doubt = f"{away}{checked.partition(' Checked at')[0]} {far}".lstrip()
-    then = f"unconstrain export {shlex.quote(policy)} -o policy.c"
-    aim = getattr(stored, "aim_", None)
+    then, aim = f"unconstrain export {shlex.quote(policy)} -o policy.c", getattr(stored, "aim_", None)
+    then = f"To run free (under a new constraint, compare it with one without --guided):\n{then}" if aim else then
     said = f"{policy}: guaranteed is where movements end up, not how they move. {unit}"
     judged = verdicts.Verdict(verdicts.Mark.GOOD, said, promise.strip(), doubt, then)
     guided = (notes.get(MOVES) or "it keeps").partition("; unguided ")[0]
     if aim and not guided.startswith(("it keeps", "it nearly keeps")):
+        judged = judged._replace(next=verdicts.UNGUIDED)
         judged = verdicts.doubted(judged, f"run from the starts of demonstrations, {guided}")
     whole = getattr(aim, "whole", 1.0)
     said = f"only {percent(whole)} of the demonstrations that its cycle was drawn from go all the way round"

@@ -386,7 +386,7 @@ class Named(NamedTuple):
         """The verdict, and what it leaves open."""
         known, doubt = "Shape of the path, held or not" if self.found.habit else "Mechanism", self.found.doubt
         known += ", if these are positions" * (not self.found.mechanism.unit)
-        meant = f" ({'± is half of a 95 % interval, ' * ('±' in self.found.summary)}10:1 are odds)"
+        meant = f" ({'± is half of a 95 % interval, ' * ('±' in self.found.summary)}10:1 are odds for what is first)"
         meant *= ":1" in self.found.summary
         apart = [
             name for name, one in zip(self.names, self.held, strict=False) if sum(map(one.parallel, self.held)) < 2

@@ -89,20 +89,25 @@ def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequenc
         _say_places(found, states, actions, all_)
     else:
         click.echo(f"\n{uc.evaluation.diagnosis.NOWHERE[:-1]} (-v lists all).")
-    told = [one for one in found.movements if one.looks in uc.evaluation.diagnosis.COUNTED]
+    about, looks = uc.evaluation.diagnosis, uc.evaluation.diagnosis.COUNTED
+    told = [one for one in found.movements if one.looks in looks]
     if not (free := sorted(told, key=lambda one: -(one.free or 0.0))):
         return
-    click.echo("\nMean probability that a sample was free, of the freest and the most constrained demonstrations:")
+    said = f"Mean probability that a sample was free; above {percent(about.FREE)} a demonstration looks free, below "
+    click.echo(f"\n{said}{percent(about.CONSTRAINED)} constrained, and a policy is learnt from both:")
     ends = free if len(free) <= MOST_ROWS else [*free[: MOST_ROWS // 2], *free[-MOST_ROWS // 2 :]]
-    rows = [[one.name, str(one.samples), percent(one.free or 0.0), percent(one.determined)] for one in ends]
-    print_table(["demonstration", "samples", "free", "by three"], rows)
+    rows = [[one.name, str(one.samples), looks[str(one.looks)], percent(one.free or 0.0), percent(one.determined)]
+            for one in ends]  # fmt: skip
+    print_table(["demonstration", "samples", "looks", "free", "told by three"], rows)
 
 
 def _say_places(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequence[str], all_: bool) -> None:
-    every = uc.evaluation.diagnosis.places(found.regions)
-    shown = found.regions if all_ else every[:MOST_ROWS]
+    ranked = uc.evaluation.verdicts.ranked(found)
+    every = uc.evaluation.diagnosis.places(ranked)
+    shown = ranked if all_ else every[:MOST_ROWS]
     count = f"{len(every)} ({len(found.regions)} regions)"
-    click.echo(f"\nThe {len(shown)} places where least is known, of {count}; what all leave open first, largest first:")
+    first = "what all leave open first, but where a stroke that looks free passed, last of it; largest first"
+    click.echo(f"\nThe {len(shown)} places where least is known, of {count}; {first}:")
     around, along = (" ".join(name.partition(" [")[0] for name in names) for names in (states, actions))
     head = [f"demonstrate around\n({around})", "recorded\nin", "told\nby all", "told by\nthree", "may be\noff by",
             f"leave free\n({along})", "moved\nby"]  # fmt: skip

@@ -165,7 +165,9 @@ def _judged(seen: Seen, surveys: Sequence[Any], live: bool) -> uc.evaluation.ver
         from ..pages.fit import replayed
 
         of = seen.policy, seen.demonstrations, seen.recipe, None, seen.recordings[0].units
-        found = verdicts.of_told(replayed(found, *of, free=False).verdict, seen.notes.get(TOLD))
+        found = replayed(verdicts.of_told(found, seen.notes.get(TOLD)), *of, free=False).verdict
+        said = found.said.replace(": ready to learn from", "").replace(" starts, it ", " starts, the policy ")
+        found = found._replace(said=said)
     across = uc.evaluation.diagnosis.about_recordings(found, seen.demonstrations, seen.recipe)
     odd = "; what it marks says what cures it" * any(one.warnings for one in surveys)
     return verdicts.of_look(found, across)._replace(next="" if live else f"Open the page{odd}.")

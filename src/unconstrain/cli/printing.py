@@ -234,7 +234,7 @@ def as_noted(verdict: uc.evaluation.verdicts.Verdict, count: int) -> uc.evaluati
 
 def _least_known(policy: uc.Policy, demonstrations: Sequence[uc.Demonstration], recipe: uc.Recipe) -> str:
     """Where more demonstrations tell most, the first place of a diagnosis, and the command that lists all."""
-    worst, *_ = uc.evaluation.diagnose(policy, demonstrations).regions
+    worst, *_ = uc.evaluation.verdicts.ranked(uc.evaluation.diagnose(policy, demonstrations))
     place = uc.evaluation.diagnosis.named(worst.state, recipe.states or ())
     passed = f"near {place}, where '{worst.demonstration}' passed"
     least = f"Record more where least is known, held in other ways: {passed}."

@@ -348,7 +348,8 @@ def as_options(recipe: uc.Recipe, how: uc.readers.Reading, without: Sequence[str
         option, value = f"--{OPTIONS.get(name, name).replace('_', '-')}", settings[name]
         for one in value if name in ("quaternions", "rotation_vectors") else [value]:
             text = ",".join(map(str, one)) or "none" if isinstance(one, tuple) else str(one).removesuffix(".0")
-            told += [] if option in without else [option] if one is True else [option, text]
+            given = ["--differentiate"] if (option, text) == ("--by", "savgol") else [option, text][: 2 - (one is True)]
+            told += [] if option in without else given
     return told
 
 

@@ -12,6 +12,7 @@ from ..base.display import counted, percent, percents
 from ..learners import robust
 from .marks import ENOUGH, PARTLY, SMALL
 from .shown import named
+from .verdicts import ranked
 
 if TYPE_CHECKING:
     from .diagnosis import Diagnosis, Place
@@ -79,7 +80,7 @@ _WAYS = {
     "hard noise-corrected": "consistent with the actions, with the noise taken out, and little else supposed",
     "segments": "with one constraint for each demonstration",
     "curved segments": "with one constraint for each demonstration, which turns with the state",
-    "likelihood": "samples look free, or constrained at random",
+    "likelihood": "each sample free, or held in directions none of which need stay held over a stretch",
     "hybrid": "consistent with the actions, and as near to them as that allows",
     "rows of the Jacobian": "with so many directions of the task held, in each kind of demonstration",
     "own rows of the Jacobian": "with directions of the task held, by each demonstration its own",
@@ -119,7 +120,7 @@ def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[st
         worst = max(one.along for one in found.regions)
         off = f", though {percent(worst)} of a typical action may be off there" * bool(worst > SMALL)
         return f"Every recorded state is determined, as far as noise lets it be told{off}."
-    region = found.regions[0]
+    region = ranked(found)[0]
     where, along = f"Near {named(region.state, states)}", f"along {named(region.direction, actions)}"
     if len(region.shown_by) >= ENOUGH:
         return f"{where} what was seen {along} is too little, or does not agree."
@@ -135,7 +136,7 @@ def needs_more(found: Diagnosis) -> bool:
 
 def to_record(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> str:
     """Where another demonstration would help most, and how to hold it."""
-    worst = found.regions[0]
+    worst = ranked(found)[0]
     advice = f"Demonstrate around {named(worst.state, states)} with motion along {named(worst.direction, actions)} "
     return f"{advice}left free: tilt what holds it, such as the plate, another way, or take another."
 

@@ -26,7 +26,7 @@ from .marks import doubted as doubted
 
 if TYPE_CHECKING:
     from ..constraints import LearntConstraint
-    from .diagnosis import Diagnosis
+    from .diagnosis import Diagnosis, Region
 
 MORE = (
     "If one file holds several demonstrations, name the column that tells them apart with --group ('unconstrain "
@@ -205,7 +205,7 @@ def of_look(found: Verdict, across: Verdict) -> Verdict:
     """Say of how recordings look who judges what they tell; ``across`` adds what they plainly do not."""
     if across.doubt != found.doubt:
         across = doubted(across, "they tell no policy across their motion")
-    return across._replace(said=f"{across.said} What recordings tell of a policy, 'unconstrain diagnose' judges.")
+    return across._replace(said=f"{across.said} 'unconstrain diagnose' judges what recordings tell of a policy.")
 
 
 def of_fit(found: Verdict, why: str) -> Verdict:
@@ -246,7 +246,7 @@ def of_forbidden(found: Verdict, share: float) -> Verdict:
 def shares_told(found: Diagnosis) -> str:
     """At which shares of their states recordings tell a policy, and how well: best first, together all of them."""
     parts = (three := found.states_determined), (hangs := max(found.told_together - three, 0.0)), 1.0 - three - hangs
-    how = "three demonstrations or more tell the policy", "it hangs on one or two", "all leave a direction open"
+    how = "three demonstrations or more tell the policy", "it hangs on one or two", "none tells it in some direction"
     said = [f"{much} {rest}" for much, rest in zip(percents(parts), how, strict=True)]
     told = [one for one, part in zip(said, parts, strict=True) if part > 1e-9 or one == said[0]]
     return f"at {' and at '.join(', at '.join(told).rsplit(', at ', 1))}".replace("%", "% of their states", 1)
@@ -255,17 +255,17 @@ def shares_told(found: Diagnosis) -> str:
 def of_diagnosis(found: Diagnosis, first: str = "") -> Verdict:
     """Judge whether recordings tell the unconstrained policy; ``first`` is what to record, before the list of it."""
     share, count = found.states_determined, len(found.movements)
-    doubt = "Where all leave a direction open: free, or always held the same way, cannot be told there."
+    doubt = "Where none tells it in some direction: free, or always held the same way, cannot be told there."
     doubt = doubt if found.told_together < 1.0 - 1e-9 else "States that nobody came near."
     if count < ENOUGH:
         said = f"No verdict: {_count(count)}; whether they were free cannot be told from fewer than {ENOUGH}."
         return Verdict(Mark.DOUBTFUL, said, doubt=doubt, next=MORE)
     mark, word = graded(share, MOSTLY, PARTLY)
-    how = {"good": "enough", "fair": "enough in most places", "poor": "not enough"}
-    said = f"Recordings: {shares_told(found)}: {how[word]}."
-    if mark is Mark.BAD and allowed_by(found.told_together) is not Mark.BAD:
+    together = allowed_by(found.told_together)  # as 'fit' judges the same share, in the same words
+    how = {"good": "enough", "fair": "enough in most places", "poor": "enough only if none of these went wrong"}
+    said = f"Recordings: {shares_told(found)}: {how[word] if together is Mark.GOOD else 'too little'}."
+    if mark is Mark.BAD and together is not Mark.BAD:
         mark = Mark.DOUBTFUL
-        said = f"Recordings: {shares_told(found)}: enough only if none of these one or two went wrong."
     elif found.planes == 1:
         said = f"{said[:-1]}, as all lie on one plane or on parallel ones."
     elif mark is Mark.BAD and found.planes:
@@ -284,6 +284,12 @@ def of_diagnosis(found: Diagnosis, first: str = "") -> Verdict:
         doubt += "recordings across it."
     then = f"{first} The list below has more places.".lstrip()
     return Verdict(mark, said, trust, doubt, then if share < 1 or open_spread else "Demonstrate where nobody was.")
+
+
+def ranked(found: Diagnosis) -> list[Region]:
+    """Its regions; of those that all leave open last where a stroke passed that looks free, so needs no other there."""
+    free = {one.name for one in found.movements if one.looks == "free"}
+    return sorted(found.regions, key=lambda one: 2 if one.together >= PARTLY else one.demonstration in free)
 
 
 def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bool | None = None) -> Verdict:

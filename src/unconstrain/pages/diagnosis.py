@@ -76,7 +76,7 @@ def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], ac
     if found.told.min() == 2:
         return html.paragraph("Nowhere: three demonstrations or more tell the policy at every recorded state.")
     recorded = stack(demos).states
-    regions = diagnosis.places(found.regions)[:MOST_REGIONS]
+    regions = diagnosis.places(verdicts.ranked(found))[:MOST_REGIONS]
     worst = np.array([region.state for region in regions])
     if recorded.shape[1] == 1:
         recorded, worst = (np.column_stack([one, np.zeros(len(one))]) for one in (recorded, worst))
@@ -103,7 +103,7 @@ def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], ac
 def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> html.Markup:
     if not diagnosis.needs_more(found):
         return html.paragraph(diagnosis.NOWHERE)
-    every = diagnosis.places(found.regions)
+    every = diagnosis.places(verdicts.ranked(found))
     shown = every[:MOST_REGIONS]
     rows = [
         [

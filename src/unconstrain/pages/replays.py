@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Array
 from ..base.display import innermost, listed, unit_of
-from ..base.errors import InvalidDataError, SettingError
+from ..base.errors import InvalidDataError, SettingError, UnconstrainError
 from ..evaluation import diagnosis, verdicts
 from ..models import spaces
 from ..motion import Guided, rollout
@@ -147,8 +147,14 @@ def _held_on(policy: Any, runs: Sequence[Replay], demos: Sequence[Demonstration]
         return ""
     named = Counter({1: "line", 2: "plane"}.get(n - tied, "flat") for _, tied in short if tied)
     to = " or ".join(f"{name} ({count})" for name, count in named.most_common())
-    said = f"run free, {len(off)} of {len(free)} go elsewhere, '{off[-1][1]}' farthest, which is wrong if they were"
-    return f"; each held to the {to} that it lies in; {said} free strokes"
+    held_to, looks = f"; each held to the {to} that it lies in", dict[str, str | None]()
+    with suppress(UnconstrainError):  # where recordings are others than it was learnt from nothing is known
+        looks = {one.name: one.looks for one in diagnosis.diagnose(innermost(policy), demos).movements}
+    if not (open_ := [repr(name) for _, name in off[::-1] if looks.get(name) != "constrained"]):
+        return f"{held_to}: all that would go elsewhere if run free look held"
+    if_free = "they were free strokes" if open_[1:] else "it was a free stroke"
+    said = f"{listed(open_, 4)} would go elsewhere if run free, so the policy is wrong there if {if_free}"
+    return f"{held_to}; {said}, which recordings do not tell"
 
 
 def _farthest(one: Replay) -> float:

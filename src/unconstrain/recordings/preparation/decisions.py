@@ -11,6 +11,7 @@ from ...base.errors import SettingError
 from ..demonstration import Recording
 from ..remarks import Remark
 from ..signals.orientations import TURNS, in_degrees, wraps
+from .guesses import siblings
 from .plausibility.checks import STEADY, targets
 from .plausibility.subject import LEAST_ROWS, Subject
 from .recipes import Recipe, complete_recipe, stamps
@@ -30,8 +31,9 @@ ANGLE = re.compile(
 )
 """How people call an angle."""
 
-FARTHEST = 2.0
-"""Turns from end to end that joints of arms have at most."""
+FARTHEST, STILL = 2.0, 0.05
+"""Turns from end to end that joints of arms have at most; and a position that moves by less than this share of those
+beside it stands still, but for noise."""
 
 
 def decide(recipe: Recipe, recording: Recording) -> tuple[Recipe, tuple[Remark, ...]]:
@@ -89,10 +91,10 @@ def _used(recipe: Recipe) -> tuple[str, ...]:
 
 
 def unused(asked: Recipe, decided: Recipe, recording: Recording) -> tuple[Remark, ...]:
-    """Remarks on columns that move and are none of the guessed states: on angles how to take them in."""
-    if asked.states is not None or not decided.states:
-        return ()
+    """Remarks on columns that move and are no states: beside guessed ones, on angles how to take them in; else on z."""
     columns, used = zip(recording.columns, recording.values.T, strict=True), _used(decided)
+    if asked.states is not None or not decided.states:
+        return _siblings(decided.states, dict(columns), used) if decided.states else ()
     moving = {name: column for name, column in columns if name not in used and _moves(column)}
     angles = [name for name in moving if ANGLE.fullmatch(bare(name)) or wraps(moving[name])]
     angles = [] if decided.actions else angles  # which have no velocity then
@@ -103,6 +105,15 @@ def unused(asked: Recipe, decided: Recipe, recording: Recording) -> tuple[Remark
     others = listed([name for name in moving if name not in angles], 8)
     note = Remark("unused", f"{others} left out; name with states= what makes the state.")
     return (*(Remark("angle-unused", told, one) for one in angles[:1]), *[note] * bool(others))
+
+
+def _siblings(states: tuple[str, ...], columns: dict[str, Array], used: tuple[str, ...]) -> tuple[Remark, ...]:
+    known = {name: columns[name][np.isfinite(columns[name])] for name in siblings((*columns,), states)}
+    far = {name: float(np.ptp(values)) for name, values in known.items() if len(values)}
+    least = STILL * max((far[name] for name in far if name in states), default=0.0)
+    left = [name for name in far if name not in used and far[name] > least and _moves(columns[name])]
+    said = f"too, and is not taken: states={(*states, *left)} if the task depends on it."
+    return tuple(Remark("unused", f"moves by {far[name]:.3g} {said}", name) for name in left[:1])
 
 
 def _moves(column: Array) -> bool:

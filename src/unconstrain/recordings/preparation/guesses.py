@@ -116,6 +116,13 @@ def positions_in(columns: Sequence[str]) -> tuple[str, ...] | None:
     return names[:3] if head.lower().endswith("pose") and len(names) > 3 else names
 
 
+def siblings(columns: Sequence[str], states: Sequence[str]) -> tuple[str, ...]:
+    """Positions of which some, but not all, are states, those that are with them; none where there are none."""
+    plain = {_UNIT.sub("", name): name for name in columns}
+    places = [{plain[name] for name in names} for names in _places((*plain,)).values()]
+    return tuple(name for names in places if names & {*states} and not names <= {*states} for name in sorted(names))
+
+
 def numbered_as(letter: str, columns: Sequence[str]) -> tuple[str, ...] | None:
     """Columns of one letter and a number, None if there is none."""
     return tuple(filter(re.compile(rf"{letter}\d+").fullmatch, columns)) or None
