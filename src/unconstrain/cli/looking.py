@@ -18,7 +18,7 @@ from ..base.display import counted, listed
 from ..base.errors import ModelFileError, ReadError, SettingError, UnconstrainError
 from ..base.files import write
 from .constraining import arm_of, said_elsewhere
-from .informing import OF, TOLD, learnt_from
+from .informing import CONSTRAINTS, OF, TOLD, learnt_from
 from .printing import option_for_json, refuse_warnings, say_judged, say_verdict, say_written
 from .reading import as_options, as_pattern, options_for_reading, prepared, reading_of, typed
 from .speaking import as_typed
@@ -114,7 +114,7 @@ class Seen(NamedTuple):
     recipe: uc.Recipe
     recordings: Sequence[uc.Recording]
     policy: uc.Policy | uc.Guided | None
-    constraint: uc.LearntConstraint | None
+    constraint: Any
     roles: Mapping[str, Any]
     """How files are read, as the policy or constraint remembers it."""
     notes: Mapping[str, Any]
@@ -132,8 +132,8 @@ def _seen(paths: Sequence[str | Path], reading: dict[str, Any]) -> Seen:
     if not recorded:
         found = ", ".join(map(str, paths))
         raise ReadError(f"{found}: holds no recording to look at; add some: unconstrain look {found} wipe_*.csv")
-    constraints = [one for one in models.values() if isinstance(one, uc.LearntConstraint)]
-    policies = [one for one in models.values() if not isinstance(one, uc.LearntConstraint)]
+    constraints = [one for one in models.values() if isinstance(one, CONSTRAINTS)]
+    policies = [one for one in models.values() if not isinstance(one, CONSTRAINTS)]
     ordered = sorted(models, key=lambda path: models[path] in policies)  # a policy's notes last: they hold
     own = {path: uc.storage.load_notes(path) for path in ordered}
     columns = {uc.Recipe.from_dict(one.get("recipe", {})).states for one in own.values()}
@@ -249,7 +249,7 @@ def _model(path: str | Path) -> Any:
     """The policy or constraint in a file; None where it holds a recording."""
     if Path(path).suffix.lower() == ".npz":
         with suppress(ModelFileError):
-            return uc.load(path, uc.Policy | uc.LearntConstraint | uc.Guided)  # type: ignore[arg-type]
+            return uc.load(path, uc.Policy | uc.Guided | CONSTRAINTS)  # type: ignore[arg-type]
     return None
 
 
