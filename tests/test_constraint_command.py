@@ -628,7 +628,7 @@ def test_the_file_of_one_stroke_is_its_mechanism_and_a_roll_out_stays_on_it(kind
     told = run("constraint", one, *COLUMNS, "-o", tmp_path / "c.npz"), run("info", tmp_path / "c.npz")
     for said in told:
         assert f"The file holds to the mechanism, {STAYS[kind]} of 3 directions." in " ".join(said.split())
-    assert f"a mechanism: {STAYS[kind].partition(':')[0]}" in told[1]
+    assert f"a learnt constraint: {STAYS[kind].partition(':')[0]}" in told[1]
     held, way = ("--constraint", tmp_path / "c.npz"), ("--start", ",".join(f"{one:.9f}" for one in start))
     run("rollout", drifting, *held, *way, "--least-support", 0, "--steps", 100, "-o", tmp_path / "path.csv")
     path = np.loadtxt(tmp_path / "path.csv", delimiter=",", skiprows=1)[:, 1:4]
@@ -694,7 +694,9 @@ def test_a_mechanism_that_was_saved_in_python_is_a_constraint_of_the_commands(dr
     held, way = ("--constraint", tmp_path / "m.npz"), ("--start", ",".join(map(str, start)), "--least-support", 0)
     run("rollout", drifting, *held, *way, "--steps", 50, "-o", tmp_path / "path.csv")
     assert off(np.loadtxt(tmp_path / "path.csv", delimiter=",", skiprows=1)[:, 1:4]) < 2e-3
-    assert "2 of 3 directions" in run("info", tmp_path / "m.npz")
+    said = run("info", tmp_path / "m.npz")
+    assert "2 of 3 directions" in said
+    assert "a mechanism: a circle (hinge)" in said
     one = write(tmp_path / "one.csv", HEAD, [rows])
     run("look", one, tmp_path / "m.npz", *COLUMNS, "-o", tmp_path / "look.html")
     flat = np.random.default_rng(0).uniform(-1, 1, (50, 2))

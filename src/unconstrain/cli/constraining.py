@@ -17,7 +17,7 @@ import unconstrain as uc
 from ..base.display import bare, listed, unit_of
 from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
-from .informing import CONSTRAINTS, OF, PASSING, SHOWN, WHERE, provenance, verdict_of
+from .informing import OF, PASSING, SHOWN, WHERE, constraints, provenance, verdict_of
 from .printing import of_option, option_for_json, print_table, refuse_warnings, say_verdict, say_written
 from .progress import shown
 from .reading import loaded, numbers, of_words, options_for_reading, prepared, said_recipe, with_options
@@ -288,7 +288,7 @@ def held_of(
         return _plane_of(plane, arm, actions)
     if path is None:
         return None
-    learnt = loaded(path, CONSTRAINTS)
+    learnt = loaded(path, constraints())
     by_itself = isinstance(learnt, uc.constraints.mechanisms.Mechanism)
     found = 2 * (len(learnt.centre),) if by_itself else (learnt.choice_.columns, learnt.choice_.actions)
     if found != (states := len(at[0]), actions):

@@ -39,11 +39,13 @@ MARK = "verdict"
 OF, SHOWN, WHERE, PASSING = "of", "shown by positions", "least and largest states", "let pass"
 """Notes of a constraint: of which demonstrations; if a mechanism is sure; where; how much of it does not hold."""
 
-CONSTRAINTS = uc.LearntConstraint | uc.constraints.mechanisms.Mechanism
-"""What files hold that a robot can be held by: what was learnt, or a mechanism that was saved by itself."""
-
 CONTENTS, ENDS = "contents", 2**16
 """Note of what each demonstration is known again by, and bytes at either end of a file by which that is."""
+
+
+def constraints() -> Any:
+    """What a robot can be held by that files hold: what was learnt, or a mechanism that was saved by itself."""
+    return uc.LearntConstraint | uc.constraints.mechanisms.Mechanism
 
 
 def provenance(paths: Iterable[str | Path], recipe: uc.Recipe, first: uc.Recording, **reading: Any) -> dict[str, Any]:
@@ -93,7 +95,7 @@ def info(file: str, as_json: bool) -> None:
 
     A policy, guided or not, or a constraint.
     """
-    held, notes = loaded(file, uc.Policy | uc.Guided | CONSTRAINTS), uc.storage.load_notes(file)
+    held, notes = loaded(file, uc.Policy | uc.Guided | constraints()), uc.storage.load_notes(file)
     inner = ("recipe", "units", "digests", CONTENTS, GUIDE, MARK, NOISE, MOVES, SHOWN, WHERE, PASSING)
     rest = {name: value for name, value in notes.items() if name not in inner}
     verdict = to_copy(verdict_of(held, notes), file, notes)
@@ -102,8 +104,9 @@ def info(file: str, as_json: bool) -> None:
         click.echo(json.dumps(told | {"verdict": verdict.to_json()}, indent=2))
         return
     say_verdict(verdict)
-    kind = {uc.LearntConstraint: "a learnt constraint", uc.Guided: "a guided policy"}.get(type(held), "a policy")
-    kind = f"a mechanism: {by.title}" if (by := _held_by(held)) else kind
+    other = "a mechanism" if (by := _held_by(held)) is held else "a policy"
+    kind = {uc.LearntConstraint: "a learnt constraint", uc.Guided: "a guided policy"}.get(type(held), other)
+    kind += f": {by.title}" if by else ""
     told["holds"] = f"{kind}: {told.pop('model')}" if "model" in told else kind
     if told.get("noise") and isinstance(innermost(held), uc.Policy) and not innermost(held).scale_:
         told["noise"] = f"{told['noise']:.4g} {unit_of(told.get('actions', ()))}".rstrip()
