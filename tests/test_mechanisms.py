@@ -1,7 +1,7 @@
 """Mechanisms with names: found in movements, with odds and intervals that can be trusted."""
 
-import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,13 +9,13 @@ from numpy.testing import assert_allclose
 
 import unconstrain as uc
 from recorded import DATA, needs_rim
-from unconstrain.base.errors import InvalidDataError
+from unconstrain.base.errors import InvalidDataError, ModelFileError
 from unconstrain.constraints import identify
-from unconstrain.constraints.mechanisms import restored
+from unconstrain.constraints.mechanisms import Mechanism
 from unconstrain.constraints.mechanisms.fitting import fit
 from unconstrain.constraints.mechanisms.fitting import noise as one_noise
 from unconstrain.constraints.mechanisms.identify import _track
-from unconstrain.constraints.mechanisms.kinds import Circle, Cylinder, Line, Plane, Point, Screw, Sphere
+from unconstrain.constraints.mechanisms.kinds import Circle, Cylinder, FlatCircle, Line, Plane, Point, Screw, Sphere
 from unconstrain.constraints.mechanisms.mechanism import frame_of, on_one_side
 from unconstrain.constraints.mechanisms.tied import Hinge, Slider, TurningScrew
 from unconstrain.constraints.mechanisms.track import Track, correlation_time
@@ -49,19 +49,34 @@ def arc(degrees, samples=400, radius=0.71, seed=0):
     return exact + noise(exact.shape, seed)
 
 
-@pytest.mark.parametrize("mechanism", PLACED.values(), ids=PLACED)
-def test_a_mechanism_is_the_same_after_a_way_through_a_file(mechanism):
-    again = restored(json.loads(json.dumps(mechanism.numbers())))
-    states = AT + noise((20, 3), size=1.0)
+FLAT = {"FlatCircle": FlatCircle(centre=AT[:2], frame=np.eye(2), radius=0.4)}
+TIED = {kind.__name__: kind(centre=AT, frame=FRAME, radius=0.4, pitch=0.05) for kind in (Slider, Hinge, TurningScrew)}
+
+
+@pytest.mark.parametrize("mechanism", (EVERY := PLACED | FLAT | TIED).values(), ids=EVERY)
+def test_a_mechanism_is_the_same_after_a_way_through_a_file(mechanism, tmp_path):
+    sure = replace(mechanism, covariance=1e-6 * np.eye(mechanism.count), unit="m", quantile=2.1)
+    uc.save(sure, tmp_path / "m.npz")
+    again = uc.load(tmp_path / "m.npz", Mechanism)
+    states = sure.centre + noise((20, len(sure.centre)), size=1.0)
     assert type(again) is type(mechanism)
     assert_allclose(again(states, np.zeros(20)), mechanism(states, np.zeros(20)), atol=1e-15)
     assert again.rank == np.linalg.matrix_rank(mechanism(states[:1], np.zeros(1))[0])
+    assert again.sentence == sure.sentence
+    assert "±" in again.sentence
 
 
-@pytest.mark.parametrize("change", [{"kind": "door"}, {"centre": "here"}, {"radius": None}, {"frame": [[1], [2, 3]]}])
-def test_what_is_no_mechanism_is_refused(change):
-    with pytest.raises(InvalidDataError, match="is none that 'unconstrain constraint' wrote"):
-        restored(PLACED["Circle"].numbers() | change)
+@pytest.mark.parametrize("change", [{"centre": np.ones(2)}, {"radius": "far"}, {"frame": np.full((3, 3), np.nan)}])
+def test_a_file_that_holds_no_mechanism_is_refused(change, tmp_path):
+    uc.save(replace(PLACED["Circle"], **change), tmp_path / "m.npz")
+    with pytest.raises(ModelFileError, match="the policy in it is not complete"):
+        uc.load(tmp_path / "m.npz", Mechanism)
+
+
+def test_a_file_of_a_mechanism_is_no_policy_and_says_where_it_belongs(tmp_path):
+    uc.save(PLACED["Circle"], tmp_path / "m.npz")
+    with pytest.raises(ModelFileError, match="holds a mechanism, expected a policy"):
+        uc.load(tmp_path / "m.npz")
 
 
 @pytest.mark.parametrize("mechanism", PLACED.values(), ids=PLACED)
@@ -267,7 +282,7 @@ def test_lengths_are_in_the_unit_that_is_said():
     metres, millimetres, nothing = (
         identify(scale * arc(110), unit=unit).sentence for scale, unit in ((1, "m"), (1e3, "mm"), (1e3, ""))
     )
-    assert re.search(r"radius 0\.71\d* m ± [\d.]+ mm,", metres)
+    assert re.search(r"radius 0\.7[01]\d* m ± [\d.]+ mm,", metres)
     assert re.search(r"radius 7\d\d\.?\d* mm ± [\d.]+ mm,", millimetres)
     assert re.search(r"radius 7\d\d\.?\d* ± [\d.]+,", nothing)
 

@@ -139,7 +139,7 @@ def test_a_file_of_a_constraint_says_which_mechanism_was_named(tmp_path):
     told = json.loads(run("constraint", door, "-o", tmp_path / "c.npz", "--json"))
     assert "a circle (hinge)" in told["mechanism"]
     assert json.loads(run("info", tmp_path / "c.npz", "--json"))["mechanism"] == told["mechanism"]
-    assert "learnt of velocities, not to that" in " ".join(
+    assert "The file holds to the mechanism, a circle (hinge)" in " ".join(
         run("constraint", door, "-o", tmp_path / "c.npz", "--force").split()
     )
 

@@ -27,10 +27,11 @@ from dataclasses import fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
 from types import MethodType
-from typing import Any, TypeVar, overload
+from typing import Any, TypeVar, get_args, overload
 
 import numpy as np
 
+from . import constraints
 from .base import files
 from .base.errors import ModelFileError, UnconstrainError
 from .base.foreign import check_size, ours_alone
@@ -58,6 +59,7 @@ from .training import Folds, HeldOut, Split, Training
 
 __all__ = ["load", "load_notes", "register", "save"]
 
+Mechanism = constraints.mechanisms.Mechanism
 VERSION = 3
 """Of the file format. Older files stay readable; newer ones are refused."""
 
@@ -65,7 +67,8 @@ _FORMAT = "unconstrain-policy"
 _HEADER = "header"
 _EXPECTED = "a file that 'unconstrain fit' or save() wrote"
 _INCOMPLETE = "the policy in it is not complete"
-_WORDS: dict[type, str] = {Policy: "policy", Guided: "guided policy", LearntConstraint: "learnt constraint"}
+_WORDS: dict[type, str] = {Policy: "policy", Guided: "guided policy"}
+_WORDS |= {LearntConstraint: "learnt constraint", Mechanism: "mechanism"}
 
 _KNOWN: dict[str, type] = {
     kind.__name__: kind
@@ -80,7 +83,7 @@ _KNOWN: dict[str, type] = {
         *STORED,
         *secondary.STORED,
     )
-}
+} | constraints.mechanisms.STORED
 
 K = TypeVar("K")
 
@@ -102,13 +105,15 @@ def register(kind: type) -> type:
 
 
 def save(
-    policy: Policy | Guided | LearntConstraint, path: str | os.PathLike[str], notes: Mapping[str, Any] | None = None
+    policy: Policy | Guided | LearntConstraint | Mechanism,
+    path: str | os.PathLike[str],
+    notes: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write a policy, guided or not, or a learnt constraint to a file, whole or not at all.
+    """Write a policy, guided or not, a learnt constraint or a mechanism to a file, whole or not at all.
 
     Parameters
     ----------
-    policy : Policy, Guided or LearntConstraint
+    policy : Policy, Guided, LearntConstraint or Mechanism
         Fitted or not. A policy's moments go along, so that it can learn on from sums. Samples do not: what was fitted
         by a learner that looks at them, such as :class:`~unconstrain.Robust`, predicts as before, and to learn more has
         to be fitted anew, or copied or pickled in place of saved. A constraint goes without what it was learnt from,
@@ -161,7 +166,7 @@ def load(path: str | os.PathLike[str], kind: type[Any] = Policy) -> Any:
     ----------
     path : str or path-like
     kind : type
-        ``Policy``, ``Guided`` or ``LearntConstraint``.
+        ``Policy``, ``Guided``, ``LearntConstraint`` or ``constraints.mechanisms.Mechanism``.
 
     Raises
     ------
@@ -188,9 +193,12 @@ def load(path: str | os.PathLike[str], kind: type[Any] = Policy) -> Any:
         except UnconstrainError as error:
             raise ModelFileError(f"{path}: {_INCOMPLETE} ({type(error).__name__}: {error}).") from error
         if not isinstance(policy, kind):
-            wanted = "policy" if issubclass(Policy, kind) else _WORDS.get(kind, kind.__name__)
+            kinds = get_args(kind) or (kind,)
+            wanted = "policy" if issubclass(Policy, kind) else " or ".join(_WORDS.get(k, k.__name__) for k in kinds)
             held = next((each for each in _WORDS if isinstance(policy, each)), type(policy))
-            use = " Give it beside a policy, as constraint= of rollout." if held is LearntConstraint else ""
+            use = (
+                " Give it beside a policy, as constraint= of rollout." if held in (LearntConstraint, Mechanism) else ""
+            )
             use = " In Python, load it with uc.load(path, uc.Guided)." if held is Guided and kind is Policy else use
             raise ModelFileError(f"{path}: holds a {_WORDS.get(held, held.__name__)}, expected a {wanted}.{use}")
         with warnings.catch_warnings():
@@ -214,7 +222,7 @@ def _tried_policy(policy: Policy) -> list[Any]:
 
 
 def _tried_constraint(constraint: LearntConstraint) -> list[Any]:
-    repr(constraint)
+    repr((constraint, constraint.mechanism_))
     if not hasattr(constraint, "choice_"):
         return []
     place = np.ones((1, constraint.choice_.columns))
@@ -225,6 +233,10 @@ _TRIED: dict[type, Callable[[Any], list[Any]]] = {
     Policy: _tried_policy,
     Guided: lambda guided: [guided(guided.goal_[None]).reshape(1, len(guided.goal_))],
     LearntConstraint: _tried_constraint,
+    Mechanism: lambda one: [
+        one(one.centre + one.frame).reshape(len(one.frame), -1, len(one.centre)),
+        [repr(one) != ""],
+    ],
 }
 """What is asked of each kind, once, before it is given away."""
 
@@ -323,7 +335,8 @@ def _pack(value: Any, arrays: dict[str, np.ndarray[Any, Any]]) -> Any:
     if isinstance(value, MethodType) and value.__name__ == "jacobian":
         return {"jacobian": _pack(value.__self__, arrays)}
     kind = type(value)
-    if _known(kind.__name__) is not kind:
+    name = next((name for name, one in _KNOWN.items() if one is kind), kind.__name__)
+    if _known(name) is not kind:
         raise ModelFileError(
             f"cannot store a {kind.__name__}: only classes that are known by name can be read back without running "
             f"code. Known are {', '.join(sorted(_KNOWN))}; add a dataclass of your own with storage.register."
@@ -337,7 +350,7 @@ def _pack(value: Any, arrays: dict[str, np.ndarray[Any, Any]]) -> Any:
         if is_dataclass(value)
         else value.__getstate__()
     )
-    return {"class": kind.__name__, "parts": {name: _pack(part, arrays) for name, part in parts.items()}}
+    return {"class": name, "parts": {name: _pack(part, arrays) for name, part in parts.items()}}
 
 
 def _unpack(value: Any, arrays: Mapping[str, np.ndarray[Any, Any]]) -> Any:

@@ -17,7 +17,7 @@ import unconstrain as uc
 from ..base.display import bare, listed, unit_of
 from ..base.errors import InvalidDataError, SettingError
 from ..base.files import write
-from .informing import HELD_BY, OF, PASSING, SHOWN, WHERE, provenance, verdict_of
+from .informing import OF, PASSING, SHOWN, WHERE, constraints, provenance, verdict_of
 from .printing import of_option, option_for_json, print_table, refuse_warnings, say_verdict, say_written
 from .progress import shown
 from .reading import loaded, numbers, of_words, options_for_reading, prepared, said_recipe, with_options
@@ -31,9 +31,6 @@ MOST_POSITIONS = 4000
 
 LENGTHS = ("", "m", "mm", "cm", "um", "km", "in", "ft")
 """Units of positions, and none."""
-
-FOLLOWED = "rollout --constraint and score --constraint hold to that mechanism, in parallel through the start."
-NOT_FOLLOWED = "rollout --constraint and score --constraint hold to the directions learnt of velocities, not to that."
 
 FEATURES = ("auto", "constant", "affine", "quadratic", "rbf")
 
@@ -129,18 +126,26 @@ def _of(
 ) -> dict[str, Any]:
     """What a file notes of the demonstration that it is of, of where that was, and of the mechanism."""
     states = uc.stack([one for one in demonstrations if name in ("", one.name)]).states
-    told = {WHERE: [states.min(axis=0).tolist(), states.max(axis=0).tolist()]}
+    told: dict[str, Any] = {WHERE: [states.min(axis=0).tolist(), states.max(axis=0).tolist()]}
     told[OF] = [name] if name else [one.name for one in demonstrations]
-    found = {} if named is None else {PASSING: named.passing({name: learnt}, demonstrations)}
-    return told | found | ({} if named is None else named.notes(name, learnt))
+    if named is None:
+        return told
+    told[PASSING] = named.passing({name: learnt}, demonstrations), named.found.mechanism.title
+    return told | {SHOWN: named.shown({name: learnt}), "mechanism": dict(named.each).get(name, named.found.summary)}
 
 
 def _judged(
     learnt: Mapping[str, uc.LearntConstraint], named: Named | None, demonstrations: Sequence[uc.Demonstration]
 ) -> uc.evaluation.verdicts.Verdict:
-    """What was learnt, and what it is by name where that holds more."""
+    """What was learnt, what it is by name where that holds more, and what of these is in the files."""
     if named is None:
         return uc.evaluation.verdicts.of_constraint(*learnt.values())
+    return uc.evaluation.verdicts.of_files(_judged_by_name(learnt, named, demonstrations), *learnt.values())
+
+
+def _judged_by_name(
+    learnt: Mapping[str, uc.LearntConstraint], named: Named, demonstrations: Sequence[uc.Demonstration]
+) -> uc.evaluation.verdicts.Verdict:
     found = uc.evaluation.verdicts.of_constraint(*learnt.values(), shown=named.shown(learnt))
     kinds = dict(zip(named.names, named.found.candidates[0].kinds, strict=False))
     if "free" in kinds.values() and {*kinds.values()} - {"free", "undecided"}:
@@ -158,8 +163,10 @@ def _judged(
         return found._replace(said=said, next="Learn those of one mechanism alone, with --episodes or --leave-out.")
     if named.found.kind == "free" and named.found.decided:
         found = found._replace(said=found.said.replace("do not decide it", "keep to nothing that would hold them"))
-    rank, more = max(one.rank_ for one in learnt.values()), named.passing(learnt, demonstrations)
-    return uc.evaluation.verdicts.of_mechanism(found, rank, named.found.mechanism, named.is_followed(learnt), more)
+    rank, mechanism = max(one.choice_.fields.rank for one in learnt.values()), named.found.mechanism
+    followed = bool(named.shown(learnt)) and all(one.mechanism_ for one in learnt.values())
+    found = uc.evaluation.verdicts.of_passing(found, named.passing(learnt, demonstrations), mechanism.title)
+    return uc.evaluation.verdicts.of_mechanism(found, rank, mechanism, followed)
 
 
 def _report(
@@ -220,7 +227,7 @@ def _agreeing(
                 other = _learnt(uc.LearntConstraint(features), part, surface)
                 best = min(best, other if shared else {part[0].name: other[""]}, key=wrong)
         learnt = best if shared else learnt | best
-    return learnt
+    return {name: named.kept(name, one, demonstrations) for name, one in learnt.items()}
 
 
 def _of_demonstration(output: str, name: str) -> str:
@@ -251,6 +258,7 @@ def _numbers(learnt: uc.LearntConstraint) -> dict[str, Any]:
         "features": choice.name,
         "candidates": dict(choice.candidates),
         "doubts": list(choice.doubts),
+        "holds_to": "what was learnt" if learnt.mechanism_ is None else learnt.mechanism_.sentence,
     }
 
 
@@ -280,8 +288,9 @@ def held_of(
         return _plane_of(plane, arm, actions)
     if path is None:
         return None
-    learnt = loaded(path, uc.LearntConstraint)
-    found = learnt.choice_.columns, learnt.choice_.actions
+    learnt = loaded(path, constraints())
+    by_itself = isinstance(learnt, uc.constraints.mechanisms.Mechanism)
+    found = 2 * (len(learnt.centre),) if by_itself else (learnt.choice_.columns, learnt.choice_.actions)
     if found != (states := len(at[0]), actions):
         raise SettingError(f"{path}: holds {found[1]} actions at {found[0]} states, expected {actions} at {states}.")
     notes = uc.storage.load_notes(path)
@@ -292,7 +301,7 @@ def held_of(
         click.echo(f"Note: {path}: {said}", err=True)
     if (judged := verdict_of(learnt, notes)).mark is not uc.evaluation.verdicts.Mark.GOOD:
         click.echo(f"Note: {path}: {judged.said} {f'Do not trust: {judged.doubt}' * bool(judged.doubt)}", err=True)
-    return learnt if learnt.task or HELD_BY not in notes else uc.constraints.mechanisms.restored(notes[HELD_BY])
+    return learnt if by_itself else learnt.mechanism_ or learnt
 
 
 def _plane_of(plane: tuple[float, ...], arm: Any, actions: int) -> uc.constraints.Constraint:
@@ -350,10 +359,19 @@ class Named(NamedTuple):
         less = "" in learnt and learnt[""].rank_ < max(one.rank for one in self.held)
         return self.found.kind == "mixture" or (less and len(self.held) > 1 and self.found.decided)
 
-    def is_followed(self, learnt: Mapping[str, uc.LearntConstraint]) -> bool:
-        """Whether each of what was learnt, by name, is held by the mechanism, not by the directions learnt."""
-        one = len(self.held) == 1
-        return bool(self.shown(learnt)) and all((one or name) and not each.task for name, each in learnt.items())
+    def kept(self, name: str, learnt: uc.LearntConstraint, demos: Sequence[uc.Demonstration]) -> uc.LearntConstraint:
+        """What was learnt of one demonstration, or of all, held by its mechanism if positions decide on that.
+
+        A path or a plane says no more than what velocities show. A surface that bends does, and free strokes have some.
+        """
+        kinds = self.found.candidates[0].kinds
+        own = dict(zip(self.names if len(kinds) > 1 else [name], zip(self.held, kinds, strict=True), strict=False))
+        mechanism, kind = own.get(name, (None, "undecided"))
+        open_ = ["free", "undecided", "held", *(["sphere", "cylinder"] if self.found.habit else [])]
+        sure = self.found.decided or self.found.odds >= uc.constraints.mechanisms.LIKELY  # others may be undecided
+        if kind in open_ or not sure:
+            return learnt
+        return learnt.held_by(mechanism, *uc.stack([one for one in demos if name in ("", one.name)])[:2])
 
     def passing(self, learnt: Mapping[str, uc.LearntConstraint], demonstrations: Sequence[uc.Demonstration]) -> float:
         """How much of what a mechanism that is sure holds, or of its own if that is less, what was learnt lets pass."""
@@ -367,12 +385,6 @@ class Named(NamedTuple):
             alike = np.linalg.svd(held.rows(one.states) @ rows.swapaxes(1, 2), compute_uv=False)
             found.append(float(np.median(1.0 - np.minimum(alike.min(axis=1, initial=1.0), 1.0) ** 2) ** 0.5))
         return max(found)
-
-    def notes(self, name: str, learnt: uc.LearntConstraint) -> dict[str, Any]:
-        """What goes into the file of one demonstration, or of all together: words, and numbers where it is sure."""
-        own = self.held[self.names.index(name)] if name and len(self.held) > 1 else self.held[0]
-        told = {"mechanism": dict(self.each).get(name, self.found.summary), SHOWN: self.shown({name: learnt})}
-        return told | ({HELD_BY: own.numbers()} if self.is_followed({name: learnt}) else {})
 
     @property
     def each(self) -> list[tuple[str, str]]:
@@ -434,13 +446,13 @@ def _length_of(units: Sequence[str]) -> str:
 def _say(
     learnt: Mapping[str, uc.LearntConstraint], surface: bool, labels: Sequence[Sequence[str]], named: Named | None
 ) -> None:
-    what = f"{unit_of(labels[not surface])} of {'distance from it' if surface else 'action'}".lstrip()
     if "" in learnt:
-        _say_one(learnt[""], what)
+        unit, of = unit_of(labels[not surface]), "distance from it" if surface else "action"
+        _say_one(learnt[""], f"{unit} of {of}" if unit else f"(unit of the {'states' if surface else 'actions'})")
     else:
         click.echo("Each demonstration has its own: one constraint for all misses more where held out.")
     if named is not None:
-        click.echo("\n".join([*named.sentences, FOLLOWED if named.is_followed(learnt) else NOT_FOLLOWED]))
+        click.echo("\n".join(named.sentences))
     head, rows = table_of(learnt, named)
     if rows:
         print_table(head, rows)
@@ -451,9 +463,9 @@ def _say(
 def _say_one(learnt: uc.LearntConstraint, what: str) -> None:
     choice = learnt.choice_
     smooth = f", smoothed with {choice.smoothness:g}" if choice.smoothness else ""
-    click.echo(f"Learnt: {learnt.rank_} of {choice.actions} directions held, by {choice.name} features{smooth}.")
-    missed = f"where held out {choice.held_out:.3g} of its mean square"
-    click.echo(f"Noise and misfit along them are about {learnt.noise_:.3g} {what}, and {missed}.")
+    click.echo(f"Learnt: {choice.fields.rank} of {choice.actions} directions held, by {choice.name} features{smooth}.")
+    missed = f"where held out {choice.held_out:.3g} of the mean square of all that moves"
+    click.echo(f"Noise and misfit along them are about {choice.noise:.3g} {what}, and {missed}.")
     rows = [[name, f"{share:.3g}"] for name, share in choice.candidates.items()]
     print_table(["features", "missed where held out"], rows)
     if choice.candidates.get(choice.name, 0.0) > min(choice.candidates.values()):
@@ -465,9 +477,12 @@ def table_of(
 ) -> tuple[list[str], list[list[str]]]:
     """What held each demonstration, where that differs: head and rows; the whole of it is wide."""
     own = {name: one for name, one in learnt.items() if name}
+    by = [one.mechanism_.kind if one.mechanism_ else one.choice_.name for one in own.values()]
     columns = {
-        "looks held": [f"{one.rank_} of {one.choice_.actions}, {one.choice_.name}" for one in own.values()],
-        "missed where held out": [f"{one.choice_.held_out:.3g}" for one in own.values()],
+        "looks held": [
+            f"{one.rank_} of {one.choice_.actions}, {how}" for one, how in zip(own.values(), by, strict=True)
+        ],
+        "missed where held out": [f"{one.choice_.held_out:.3g}" * (not one.mechanism_) for one in own.values()],
     }
     names = list(own)
     if named is not None and named.each:

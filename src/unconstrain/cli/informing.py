@@ -36,11 +36,16 @@ GUIDE = "can be guided to"
 MARK = "verdict"
 """Note of how ``fit`` judged it."""
 
-OF, HELD_BY, SHOWN, WHERE, PASSING = "of", "held by", "shown by positions", "least and largest states", "let pass"
-"""Notes of a constraint: of which demonstrations; mechanism; if that is sure; where; how much of it does not hold."""
+OF, SHOWN, WHERE, PASSING = "of", "shown by positions", "least and largest states", "let pass"
+"""Notes of a constraint: of which demonstrations; if a mechanism is sure; where; how much of it does not hold."""
 
 CONTENTS, ENDS = "contents", 2**16
 """Note of what each demonstration is known again by, and bytes at either end of a file by which that is."""
+
+
+def constraints() -> Any:
+    """What a robot can be held by that files hold: what was learnt, or a mechanism that was saved by itself."""
+    return uc.LearntConstraint | uc.constraints.mechanisms.Mechanism
 
 
 def provenance(paths: Iterable[str | Path], recipe: uc.Recipe, first: uc.Recording, **reading: Any) -> dict[str, Any]:
@@ -90,8 +95,8 @@ def info(file: str, as_json: bool) -> None:
 
     A policy, guided or not, or a constraint.
     """
-    held, notes = loaded(file, uc.Policy | uc.LearntConstraint | uc.Guided), uc.storage.load_notes(file)
-    inner = ("recipe", "units", "digests", CONTENTS, GUIDE, MARK, NOISE, MOVES, HELD_BY, SHOWN, WHERE, PASSING)
+    held, notes = loaded(file, uc.Policy | uc.Guided | constraints()), uc.storage.load_notes(file)
+    inner = ("recipe", "units", "digests", CONTENTS, GUIDE, MARK, NOISE, MOVES, SHOWN, WHERE, PASSING)
     rest = {name: value for name, value in notes.items() if name not in inner}
     verdict = to_copy(verdict_of(held, notes), file, notes)
     told = {"file": Path(file).name, "holds": type(held).__name__, **_columns(notes), **_of(held, notes), **rest}
@@ -99,7 +104,9 @@ def info(file: str, as_json: bool) -> None:
         click.echo(json.dumps(told | {"verdict": verdict.to_json()}, indent=2))
         return
     say_verdict(verdict)
-    kind = {uc.LearntConstraint: "a learnt constraint", uc.Guided: "a guided policy"}.get(type(held), "a policy")
+    other = "a mechanism" if (by := _held_by(held)) is held else "a policy"
+    kind = {uc.LearntConstraint: "a learnt constraint", uc.Guided: "a guided policy"}.get(type(held), other)
+    kind += f": {by.title}" if by else ""
     told["holds"] = f"{kind}: {told.pop('model')}" if "model" in told else kind
     if told.get("noise") and isinstance(innermost(held), uc.Policy) and not innermost(held).scale_:
         told["noise"] = f"{told['noise']:.4g} {unit_of(told.get('actions', ()))}".rstrip()
@@ -124,10 +131,12 @@ def _columns(notes: Mapping[str, Any]) -> dict[str, Any]:
 
 def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
     """What was learnt, and how; a guided policy is told by the one in it, less what guiding takes."""
+    if by := _held_by(held):
+        told = {"held": f"{by.rank} of {len(by.centre)} directions", "mechanism": by.sentence}
+        return told | ({} if held is by else {"noise": held.noise_})
     if isinstance(held, uc.LearntConstraint):
-        count = uc.constraints.mechanisms.restored(notes[HELD_BY]).rank if notes.get(HELD_BY) else held.rank_
-        told = f"{count} of {held.choice_.actions} directions"
-        return {"held": told, "features": held.choice_.name, "noise": held.noise_}
+        told = {"held": f"{held.rank_} of {held.choice_.actions} directions", "features": held.choice_.name}
+        return told | {"noise": held.noise_}
     policy, lost = innermost(held), notes.get(LOST) or 0.0
     solution = getattr(policy, "solution_", None)
     if solution is None:
@@ -147,13 +156,21 @@ def _of(held: Any, notes: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+def _held_by(held: Any) -> Any:
+    """The mechanism that a constraint holds to; None if there is none, and of a policy."""
+    return held if isinstance(held, uc.constraints.mechanisms.Mechanism) else getattr(held, "mechanism_", None)
+
+
 def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Verdict:
     """Judge a policy, constraint or guided policy by what it explained where held out, and what ``fit`` wrote down."""
+    if (by := _held_by(held)) is held:
+        said = f"{by.sentence[0].upper()}{by.sentence[1:]}. How sure that is was not saved with it."
+        return uc.evaluation.verdicts.Verdict(uc.evaluation.verdicts.Mark.DOUBTFUL, said)
     if isinstance(held, uc.LearntConstraint):
-        found = uc.evaluation.verdicts.of_constraint(held, shown=notes.get(SHOWN))
-        named = notes.get(HELD_BY) and uc.constraints.mechanisms.restored(notes[HELD_BY])
-        judged, passing = uc.evaluation.verdicts.of_mechanism, notes.get(PASSING) or 0.0
-        return judged(found, held.rank_, named, sure=True, passing=passing) if named else found
+        verdicts, shown = uc.evaluation.verdicts, notes.get(SHOWN)
+        found = verdicts.of_passing(verdicts.of_constraint(held, shown=shown), *notes.get(PASSING) or (0.0, ""))
+        found = verdicts.of_mechanism(found, held.choice_.fields.rank, by, shown is True) if by else found
+        return verdicts.of_files(found, held) if SHOWN in notes else found
     if not hasattr(innermost(held), "solution_"):
         mark = uc.evaluation.verdicts.Mark.BAD
         return uc.evaluation.verdicts.Verdict(mark, "Not fitted: it cannot predict.", next="'unconstrain fit'")

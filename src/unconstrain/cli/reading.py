@@ -225,7 +225,7 @@ def loaded(path: str, kind: Any) -> Any:
         for saved in (one for one in files if zipfile.is_zipfile(one) and not is_recording(one)):
             typed = shlex.join([saved, path, *(file for file in files if file != saved)])
             then = f"The policy comes first: unconstrain {context.info_name} {typed}"
-        wanted = "learnt constraint" if kind is uc.LearntConstraint else "policy"
+        wanted = "policy" if issubclass(uc.Policy, kind) else "learnt constraint"
         raise ModelFileError(f"{path}: is a recording, not a {wanted}. {then}") from error
 
 

@@ -22,7 +22,7 @@ from ..training import Batch, FirstLook
 from .choice import EXACT, Choice, chosen, simplest
 from .evidence import FOLDS, Evidence
 from .forms import NAMED, Jacobian, Lifted, Surface, Velocities, forms_of
-from .mechanisms import winding
+from .mechanisms import Mechanism, winding
 
 
 class LearntConstraint(Parameters, Shown):
@@ -52,6 +52,8 @@ class LearntConstraint(Parameters, Shown):
         The form that was taken, what all were worth where held out, and what the data does not tell.
     evidence_ : Evidence
         Sums of all samples so far.
+    mechanism_ : Mechanism or None
+        What positions showed to hold, in place of the form that was taken; rank and noise are then its own.
 
     Examples
     --------
@@ -67,6 +69,7 @@ class LearntConstraint(Parameters, Shown):
     noise_: float
     choice_: Choice
     evidence_: Evidence
+    mechanism_: Mechanism | None = None
 
     def __init__(
         self, features: FeatureMap | Placeable | str = "auto", jacobian: Jacobian | None = None, *, task: bool = False
@@ -202,7 +205,14 @@ class LearntConstraint(Parameters, Shown):
     def __call__(self, states: ArrayLike, times: Array | None = None) -> Array:
         """Orthonormal rows of A, zero where fewer are held, shape (N, rank, d); it does not depend on the times."""
         samples = self._lifted(states)
-        return self.choice_.fields.rows(samples)
+        return self.choice_.fields.rows(samples) if self.mechanism_ is None else self.mechanism_(np.asarray(states))
+
+    def held_by(self, mechanism: Mechanism, states: Array, actions: Array) -> Self:
+        """A copy that is held by a mechanism of these states (N, n), along which actions (N, n) are noise."""
+        other = copy(self)
+        other.mechanism_, other.rank_ = mechanism, mechanism.rank
+        other.noise_ = float((np.einsum("nkd,nd->nk", mechanism(states), actions) ** 2).mean() ** 0.5)
+        return other
 
     def target(self, states: ArrayLike, times: Array | None = None) -> Array:
         """The b of the task ``A u = b``, for the rows of A as they are returned, shape (N, rank)."""
@@ -238,7 +248,7 @@ class LearntConstraint(Parameters, Shown):
     def _learnt(self, evidence: Evidence) -> Self:
         draft = copy(self)
         draft.choice_, draft.evidence_ = chosen(evidence).checked(), evidence
-        draft.rank_, draft.noise_ = draft.choice_.fields.rank, draft.choice_.noise
+        draft.rank_, draft.noise_, draft.mechanism_ = draft.choice_.fields.rank, draft.choice_.noise, None
         self.__dict__ = draft.__dict__
         return self
 
@@ -246,7 +256,8 @@ class LearntConstraint(Parameters, Shown):
         if not hasattr(self, "choice_"):
             return (f"features={self.features!r}",)
         held = f"{counted(self.rank_, 'direction')} of {self.choice_.actions} held"
-        return self.choice_.name or "own features", held, f"noise={self.noise_:.3g}"
+        form = self.choice_.name or "own features" if self.mechanism_ is None else self.mechanism_.kind
+        return form, held, f"noise={self.noise_:.3g}"
 
 
 def _loss(one: LearntConstraint | None, *others: Array) -> float:

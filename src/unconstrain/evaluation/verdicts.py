@@ -310,7 +310,8 @@ def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bo
         by = "diagnose" if single else "fit"
         then += f" '{by}' compares several with one policy, which may tell that they were held."
         said = f"Whether anything was held cannot be told{' by one demonstration alone' * single}: {why}."
-        return Verdict(Mark.DOUBTFUL, said, doubt=f"That {min(ranks)} of {choice.actions} are held.", next=then)
+        many = " to ".join(map(str, sorted({min(ranks), max(ranks)})))
+        return Verdict(Mark.DOUBTFUL, said, doubt=f"That {many} of {choice.actions} are held.", next=then)
     mark, word = graded(1.0 - missed)
     held = f"{min(ranks)} of {choice.actions} directions were held"
     apart = f", others in each of {_count(len(every))}" if others else ""
@@ -338,18 +339,18 @@ CONTRARY = 0.5
 """What lets pass more than this of a direction that a mechanism holds is no constraint of that mechanism."""
 
 
-def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool, passing: float = 0.0) -> Verdict:
-    """Say of a constraint of some rank that positions keep to a mechanism that holds others; first if sure.
+def of_passing(found: Verdict, passing: float, title: str) -> Verdict:
+    """Add to a verdict on what was learnt how much it lets pass of what a mechanism holds, if much."""
+    said = f"positions keep to {title}, and what was learnt lets pass {percent(passing)} of what that holds"
+    other = "Learn it by other --features, as auto does."
+    return found if passing <= CONTRARY else doubted(found, said)._replace(next=other)
 
-    ``passing`` is how much of a direction that the mechanism holds the constraint lets pass.
-    """
+
+def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool) -> Verdict:
+    """Say where velocities show some rank that positions keep to a mechanism that holds others; first if sure."""
     more = f"{named.rank} of {len(named.centre)}"
     then = "Use it with --constraint of 'rollout' or 'score', which follow the mechanism."
-    if passing > CONTRARY:
-        said = f"positions keep to {named.title}, and what was learnt lets pass {percent(passing)} of what that holds"
-        other = f"Learn it by other --features, as auto does. {then * sure}".rstrip()
-        return doubted(found, said)._replace(trust="The mechanism." * sure, next=other)
-    if named.rank == rank or (named.rank < rank and not (sure and found.said.startswith(f"{rank} of "))):
+    if named.rank == rank or (named.rank < rank and not (sure and found.said.startswith(f"{named.rank} of "))):
         return found
     if not sure:
         keep = f"Positions may keep to {named.title}, which holds {more}; as it turns, velocities show less of it."
@@ -357,6 +358,15 @@ def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool, passing: flo
     why = "It turns on the way" if named.rank > rank else "It was passed one way only"
     said = f"{more} directions were held, by {named.title}. {why}, so velocities alone show {rank}"
     return found._replace(said=said + found.said.partition(" directions were held")[2], next=then)
+
+
+def of_files(found: Verdict, *held: LearntConstraint) -> Verdict:
+    """Add to a verdict on constraints what their files hold to: mechanisms, or what was learnt."""
+    named, (first, *others) = [one.mechanism_ for one in held if one.mechanism_], held
+    what = f"the mechanism, {named[0].title}" if named else f"what was learnt, by {first.choice_.name} features"
+    said = f"The file holds to {what}: {first.rank_} of {first.choice_.actions} directions."
+    each = f"Of {len(held)} files {len(named)} hold to mechanisms, the others to what was learnt."
+    return found._replace(said=f"{found.said} {each if others else said}")
 
 
 def of_support(support: Array, times: Array | None, unknown: Array | None = None) -> Verdict:

@@ -7,14 +7,12 @@ and where fits begin. What is round begins at the algebraic fit, that of ``â€–xâ
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
 from ...base.arrays import Array
-from ...base.errors import InvalidDataError
 from ...risks import unit_actions
 from .mechanism import Form, M, Mechanism, frame_of
 from .track import Track, principal
@@ -236,16 +234,6 @@ class Screw(Mechanism):
 KINDS: tuple[type[Mechanism], ...] = (Free, Point, Line, Plane, Circle, Sphere, Cylinder, Screw)
 FLAT_KINDS: tuple[type[Mechanism], ...] = (Free, Point, Line, FlatCircle)
 """Those of positions in a plane."""
-
-
-def restored(told: Mapping[str, Any]) -> Mechanism:
-    """The mechanism whose :meth:`~.Mechanism.numbers` these are; an InvalidDataError where they are not."""
-    try:
-        centre, frame = (np.asarray(told[name], np.float64) for name in ("centre", "frame"))
-        [kind] = [one for one in (KINDS if len(centre) == 3 else FLAT_KINDS) if one.form.kind == told["kind"]]
-        return kind(centre=centre, frame=frame, radius=float(told["radius"]), pitch=float(told["pitch"]))
-    except (KeyError, TypeError, ValueError) as error:
-        raise InvalidDataError(f"mechanism: {told!r} is none that 'unconstrain constraint' wrote.") from error
 
 
 def angle(mechanism: Mechanism, track: Track) -> Array:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate
-from typing import Any, ClassVar, NamedTuple, Self, TypeVar
+from typing import ClassVar, NamedTuple, Self, TypeVar
 
 import numpy as np
 
@@ -74,9 +74,9 @@ class Mechanism(Shown):
     orientation: Array = field(default_factory=lambda: IDENTITY)
     covariance: Array | None = None
     quantile: float = 1.96
-    unit: str = "m"
+    unit: str = ""
 
-    def __call__(self, states: Array, times: Array) -> Array:
+    def __call__(self, states: Array, times: Array | None = None) -> Array:
         """Return A, shape (T, k, D): orthonormal rows, of zeros where nothing is held."""
         return self.rows(np.asarray(states, dtype=np.float64))
 
@@ -143,8 +143,8 @@ class Mechanism(Shown):
         near = max(sure.get("centre", 0.0), sure.get("across", 0.0), sure.get("along", 0.0))
         tilt = f" ± {np.degrees(sure['tilt']):.2g}°" if "tilt" in sure else ""
         return self.form.phrase.format(
-            centre=_vector(self.centre, near),
-            axis=_vector(self.axis, 0.01) + tilt,
+            centre=_with_unit(_vector(self.centre, near), near, self.unit),
+            axis=_vector(self.axis, sure.get("tilt", 0.0)) + tilt,
             radius=_length(self.radius, sure.get("radius", 0.0), self.unit),
             pitch=_length(2 * np.pi * self.pitch, 2 * np.pi * sure.get("pitch", 0.0), self.unit),
         )
@@ -158,16 +158,6 @@ class Mechanism(Shown):
     def title(self) -> str:
         """What it is, without where: ``a circle (hinge)``."""
         return self.form.phrase.partition(" {")[0].rpartition(" ")[0] or self.form.phrase
-
-    def numbers(self) -> dict[str, Any]:
-        """By which it can be restored, for a file."""
-        return {
-            "kind": self.kind,
-            "centre": self.centre.tolist(),
-            "frame": self.frame.tolist(),
-            "radius": float(self.radius),
-            "pitch": float(self.pitch),
-        }
 
     def moved(self, step: Array) -> Self:
         """Changed by small numbers (k,) of the chart: lengths, and rotations in radians."""
@@ -247,7 +237,11 @@ def _vector(values: Array, margin: float) -> str:
 
 
 def _length(value: float, margin: float, unit: str) -> str:
-    return f"{value:z.{_digits(margin)}f} {unit}".rstrip() + f" ± {small_length(margin, unit)}"
+    return _with_unit(f"{value:z.{_digits(margin)}f}", margin, unit)
+
+
+def _with_unit(said: str, margin: float, unit: str) -> str:
+    return f"{said} {unit}".rstrip() + f" ± {small_length(margin, unit)}" * bool(margin)
 
 
 def small_length(value: float, unit: str) -> str:
@@ -257,8 +251,8 @@ def small_length(value: float, unit: str) -> str:
 
 
 def _digits(margin: float) -> int:
-    """Decimals that a margin leaves."""
-    return int(np.clip(np.ceil(-np.log10(max(margin, 1e-6))), 0, 6))
+    """Decimals of two digits of a margin: what is rounded away is far less than that."""
+    return int(np.clip(1 - np.floor(np.log10(margin)), 0, 6)) if margin else 6
 
 
 def _tilted(frame: Array, tilt: Array) -> Array:
