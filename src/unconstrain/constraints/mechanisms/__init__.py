@@ -2,14 +2,11 @@
 
 from .identify import LIKELY as LIKELY
 from .identify import identify as identify
-<<<<<<< HEAD
 from .kept import kept as kept
-from .kinds import restored as restored
-=======
 from .kinds import FLAT_KINDS, KINDS
+from .kinds import restored as restored
 from .mechanism import Mechanism as Mechanism
 from .tied import TIED_KINDS
->>>>>>> mech
 from .track import winding as winding
 
 STORED = {f"mechanisms.{kind.__name__}": kind for kind in (*KINDS, *FLAT_KINDS, *TIED_KINDS)}
