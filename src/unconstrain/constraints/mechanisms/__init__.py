@@ -4,7 +4,6 @@ from .identify import LIKELY as LIKELY
 from .identify import identify as identify
 from .kept import kept as kept
 from .kinds import FLAT_KINDS, KINDS
-from .kinds import restored as restored
 from .mechanism import Mechanism as Mechanism
 from .tied import TIED_KINDS
 from .track import winding as winding
