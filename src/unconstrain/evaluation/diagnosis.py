@@ -24,7 +24,7 @@ from .metrics import along_motion
 from .sentences import CONSTRAINED as CONSTRAINED
 from .sentences import COUNTED as COUNTED
 from .sentences import FREE as FREE
-from .sentences import NOWHERE as NOWHERE
+from .sentences import LOOKS as LOOKS
 from .sentences import about_choice as about_choice
 from .sentences import about_freedom as about_freedom
 from .sentences import about_suspects as about_suspects
@@ -32,6 +32,7 @@ from .sentences import in_words as in_words
 from .sentences import looks
 from .sentences import models_of as models_of
 from .sentences import needs_more as needs_more
+from .sentences import nowhere as nowhere
 from .sentences import sentences as sentences
 from .sentences import to_record as to_record
 from .shown import FLAT as FLAT
