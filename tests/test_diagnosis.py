@@ -16,7 +16,7 @@ from test_cli import call, refused, run, write
 from test_report import References
 from unconstrain.base.errors import InvalidDataError, SettingError
 from unconstrain.evaluation import verdicts
-from unconstrain.evaluation.diagnosis import Diagnosis, about_recordings, diagnose, sentences, to_record
+from unconstrain.evaluation.diagnosis import Diagnosis, about_recordings, diagnose, nowhere, sentences, to_record
 from unconstrain.evaluation.marks import WELL
 from unconstrain.pages import diagnosis, fit
 
@@ -151,7 +151,7 @@ class TestWhatIsFound:
                 {"noise_share": 0.2, "noise": 1.0, "jitter": 0.1},
                 "what the model does not follow, fast parts that --window smooths, or people who vary.",
             ),
-            ({"noise_share": 0.2, "noise": 1.0, "jitter": 0.1}, "Only 0.1 of it changes from sample to sample"),
+            ({"noise_share": 0.2, "noise": 1.0, "jitter": 0.1}, "Only 0.1 of it (2%) changes from sample to sample"),
             (
                 {"undecided_share": 0.4},
                 "and of 40% recordings cannot tell: they were free or always held in the same way",
@@ -417,7 +417,7 @@ def test_strokes_on_planes_of_their_own_are_not_called_bad_recordings(fitted):
     own = verdicts.of_diagnosis(replace(found, planes=12))
     assert own.mark is verdicts.Mark.DOUBTFUL
     assert own.said.startswith("Recordings: at 0% of their states")
-    assert own.said.endswith("too little to be sure, though each lies on a plane of its own.")
+    assert own.said.endswith("too little for this model to be sure, though each lies on a plane of its own.")
 
 
 def stroke(start, end, rest, name):
@@ -529,3 +529,12 @@ def test_two_demonstrations_tell_nothing_together(count, told):
         demos.append(uc.Demonstration(states, ways * np.vecdot(ways, wanted)[:, None]))
     found = uc.ParametricPolicy(uc.Affine(), uc.Robust()).fit_demonstrations(demos)
     assert (found.solution_.believed.told_together > 0.9) == told
+
+
+@pytest.mark.parametrize(("jitter", "share", "missed"), [(0.3, 0.2, True), (0.9, 0.2, False), (0.3, 0.05, False)])
+def test_misfit_is_said_where_it_is_most_of_what_is_missed_and_not_small(fitted, jitter, share, missed):
+    found = replace(diagnose(*fitted), noise=1.0, jitter=jitter, noise_share=share)
+    judged = verdicts.of_diagnosis(found)
+    assert ("beyond noise it misses 19% of a typical action" in judged.doubt) == missed
+    assert ("Another --model" in judged.next) == missed
+    assert ("none cures that the model misses 19%" in nowhere(found)) == missed

@@ -806,5 +806,42 @@ def test_where_nothing_is_left_to_record_no_places_are_listed(tmp_path):
     assert "places where least is known" in told
 
 
+def reaches(folder, count, bend=0.0):
+    """Files of free strokes to a goal from everywhere, in spirals, whose policy is affine where it is not bent."""
+    rng, times = np.random.default_rng(0), 0.05 * np.arange(60)
+    for k in range(count):
+        policy = lambda x: x @ np.array([[-1.0, -2.0], [2.0, -1.0]]) - bend * x * np.abs(x)  # noqa: E731
+        done = uc.rollout(policy, rng.uniform(-1, 1, 2), 60, 0.05)
+        rows = np.column_stack([times, done.states, done.actions + 0.01 * rng.standard_normal((60, 2))])
+        write(folder / f"{k}.csv", "t,x,y,vx,vy", rows)
+    return folder / "*.csv", "--state", "x,y", "--action", "vx,vy", "--model"
+
+
+@pytest.mark.parametrize("bend", [0.0, 8.0])
+def test_what_a_model_misses_beyond_noise_is_told_apart_from_what_recordings_leave_open(tmp_path, bend):
+    how = reaches(tmp_path, 8, bend)
+    said = text(call("diagnose", *how, "affine"))
+    judged = said.partition("Next: ")[0]
+    assert bool(re.search(r"The model: beyond noise it misses \d+% of a typical action on average", judged)) == bool(
+        bend
+    )
+    assert ("Another --model of 'fit' may miss less, or more: compare by 'score' on" in said) == bool(bend)
+    assert bool(re.search(r"changes from sample to sample; the rest is what the model", said)) == bool(bend)
+    if "No place needs another" in said:
+        assert ("; none cures that the model misses" in said) == bool(bend)
+
+
+@pytest.mark.parametrize("count", [16, 18])
+def test_a_diagnosis_lists_all_demonstrations_where_they_are_few_and_else_the_ends_of_all(tmp_path, count):
+    asked = ("diagnose", *reaches(tmp_path, count), "affine")
+    row = r"^(\d+) +60 +(?:free|constrained|either|undecided) +[<>]?\d+% +[<>]?\d+%"
+    said, all_ = run(*asked), run(*asked, "-v")
+    listed = re.findall(row, said, re.MULTILINE)
+    assert len(listed) == len({*listed}) == 16
+    assert ("(-v lists 2 more, between):" in said) == (count == 18)
+    assert len({*re.findall(row, all_, re.MULTILINE)}) == count
+    assert "more, between" not in all_
+
+
 def test_help_says_for_what_a_robot_can_be_shown():
     assert "With --live or --rrd: states are joint angles of this robot" in " ".join(run("look", "--help").split())

@@ -272,9 +272,8 @@ def test_lengths_and_velocities_are_told_in_the_unit_of_the_columns(tmp_path, he
     assert re.search(rf" noise [\d.e-]+ {speed or 'guided'} ", words(run("info", tmp_path / "p.npz")))
     learnt = f" {speed}".rstrip()
     said = words(run("diagnose", *how, "--model", "affine"))
-    assert re.search(
-        rf", [\d.e-]+{learnt} on each action coordinate, \S+ of a typical action \([\d.e]+{learnt}\)", said
-    )
+    each = learnt or re.escape(" (unit of the actions)")
+    assert re.search(rf", [\d.e-]+{each} on each action coordinate, \S+ of a typical action \([\d.e]+{learnt}\)", said)
     said = words(run("constraint", *how, "--features", "constant", "-o", tmp_path / "c.npz"))
     along = f"{learnt} of action" if unit else " (unit of the actions)"
     assert re.search(rf"misfit along them are about [\d.e-]+{re.escape(along)}, and where held out", said)
@@ -797,6 +796,10 @@ def test_runs_that_are_held_where_a_stroke_lies_are_compared_free_too(tmp_path, 
         assert bool(re.search(r"each held to the plane \(\d\) or line \(\d\) that it lies in", told)) == held
         assert ("that it lies in: all that would go elsewhere if run free look held" in told) == held
         assert "if they were free strokes" not in told  # which diagnose does not doubt either
+    named = re.findall(r"'(s\d)'", said.partition("each held to the ")[2].partition("each held to the ")[2])
+    assert (len(named) > 4 and named == [*dict.fromkeys(named)]) == held  # by name in the body, where they are many
+    few = json.loads(run("score", policy, *files[:3], "--json"))["verdict"]["said"]
+    assert bool(re.search(r"each held to the \w+ \('s\d'", few)) == held
 
 
 def test_a_run_that_is_held_is_doubted_only_where_its_stroke_may_have_been_free(tmp_path):
@@ -821,9 +824,19 @@ def test_fit_calls_too_little_what_diagnose_calls_so(tmp_path, count, model):
     judged = words(run("diagnose", *how))
     fit = words(run("fit", *how, "-o", tmp_path / "p.npz"))
     little = count == 3 or model == "local"
-    assert bool(re.search(r"and at \d+% none tells it in some direction: too little\.", judged)) == little
+    assert bool(re.search(r"and at \d+% none tells it in some direction: too little for this", judged)) == little
+    assert ("no recording tells the policy in some direction, for this model" in fit) == little
+    assert "Or fit a model of fewer weights" not in fit  # there is none
     assert fit.startswith("! Recordings tell too little: at") == little
     assert "enough in most places" not in judged if little else ": enough" in judged
+
+
+def test_of_a_model_that_recordings_tell_too_little_of_a_simpler_one_is_named(tmp_path):
+    how = *to_a_goal(tmp_path, True)[:4], "--state", "x,y,z", "--model", "cubic"
+    said = words(run("fit", *how, "-o", tmp_path / "p.npz"))
+    assert "no recording tells the policy in some direction, for this model" in said
+    assert "Or fit a model of fewer weights, which needs less, as without --model. All such places: uncon" in said
+    assert "too little for this model" in words(run("diagnose", *how))
 
 
 @pytest.mark.parametrize("held", [True, False])
@@ -905,7 +918,13 @@ def test_rails_are_named_as_lines_and_free_strokes_are_not(tmp_path):
     looks = {one["name"]: one["looks"] for one in json.loads(run(*how, "--json"))["movements"]}
     lines = [name for name, how in looks.items() if how == "line"]
     assert set(lines) <= {"s0", "s1", "s2", "s3"}
-    assert (f"{len(lines)} on a line that others leave (held to it, as by a rail" in words(run(*how))) == bool(lines)
+    said = words(run(*how))
+    assert (f"{len(lines)} on a line that others leave (held to it, as by a rail" in said) == bool(lines)
+    short = {"line": "on a line", "flat": "on a plane", "untold": "undecided", "unsure": "either"}
+    table = re.findall(r" (s\d) 200 ([a-z ]+) [<>]?\d+% [<>]?\d+%", said)
+    assert sorted(table) == sorted((name, short.get(one, one)) for name, one in looks.items())  # all, as JSON says
+    others = {"line", "flat", "untold"} & {*looks.values()}
+    assert ("; on a plane, on a line and undecided it tells nothing:" in said) == bool(others)
     alone = "diagnose", *[tmp_path / f"s{k}.csv" for k in range(4)], *how[2:]
     assert "on a line that others leave (held to it, as by a rail" in words(run(*alone))
 

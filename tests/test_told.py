@@ -154,6 +154,7 @@ def test_which_samples_are_fast_is_said_only_where_noise_is_known(tmp_path):
         assert re.search(r"^demonstration +(.*?)  ", said, flags=re.MULTILINE)[1] == head
         assert bool(re.search(r"\d of 150", said)) == (head == "fast samples")
         assert ("fast samples: of ten times" in said) == (head == "fast samples")
+        assert ("explains (fast)  normalised inconsistency (noise too)" in said) == (head == "fast samples")
 
 
 def test_a_round_of_a_guided_cycle_takes_the_time_that_is_promised_however_fast_its_policy_is():

@@ -146,6 +146,9 @@ class TestSupport:
     def test_where_support_ends_is_said_in_seconds(self):
         found = verdicts.of_support(np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.5, 1.0]))
         assert (found.mark, found.trust) == (Mark.DOUBTFUL, "")  # what is near may be far off
+        assert found.doubt == "All from 1.00 s on: where none passes, and after it."
+        told = verdicts.of_support(np.ones(3), np.array([0.0, 0.5, 1.0]), np.array([0.0, 0.4, 0.0]))
+        assert told.doubt == "Directions that fewer than 3 demonstrations tell, from 0.50 s on."
         small = verdicts.of_support(np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.5, 1.0]), np.zeros(3))
         ended = verdicts.of_early_end(small, "It stops. Go on.")
         assert (ended.trust, ended.next) == ("The first 1.00 s.", "Go on.")
@@ -218,9 +221,8 @@ def test_a_check_mark_takes_states_that_recordings_tell(folder, tmp_path, told, 
     uc.save(learnt, tmp_path / "p.npz", {"determined share of states": told})
     said = " ".join(call("info", tmp_path / "p.npz").stdout.split())
     assert said.startswith(mark)
-    lead = (
-        "! Recordings tell too little: at 21% of the recorded states no recording tells the policy in some direction."
-    )
+    lead = "! Recordings tell too little: at 21% of the recorded states no recording tells the policy in some direction"
+    lead += ", for this model."
     assert said.startswith(lead) == (mark == "!")
     assert ("'unconstrain diagnose' says what to record." in said) == (mark == "!")
 
@@ -367,15 +369,16 @@ def test_a_score_tells_what_recordings_show_in_all_directions_of_their_planes():
     assert verdicts.of_planes(found, none, motion) == found
     assert (fine.mark, fine.said) == (found.mark, found.said)
     assert fine.trust.endswith(
-        "In all directions of the planes that 3 of 4 demonstrations kept to, the policy explains 95% of the motion."
+        "In all directions left free by the planes that 3 of 4 demonstrations kept to, the policy explains 95% of the "
+        "motion (said first: along the recorded motion alone)."
     )
     assert (poor.mark, poor.trust) == (Mark.DOUBTFUL, found.trust)
     assert poor.said.endswith(
-        "But in all directions of the planes that 3 of 4 demonstrations kept to, the policy explains 60% of the "
-        "motion, unless more than a plane held them."
+        "But in all directions left free by the planes that 3 of 4 demonstrations kept to, the policy explains 60% of "
+        "the motion (said first: along the recorded motion alone), unless more than a plane held them."
     )
     assert (
-        "of the plane that it kept to, the policy explains"
+        "left free by the plane that it kept to, the policy explains"
         in verdicts.of_planes(found, np.array([0.95]), motion[:1]).trust
     )
 
@@ -396,7 +399,7 @@ def test_the_command_scores_recordings_in_their_planes(tmp_path):
     assert right["in_planes"] == pytest.approx([1.0] * 3)
     assert max(wrong["in_planes"]) < 0.9
     assert "unless more than a plane held them" in wrong["verdict"]["said"]
-    assert "In all directions of the planes that 3 of 3" in right["verdict"]["trust"]
+    assert "In all directions left free by the planes that 3 of 3" in right["verdict"]["trust"]
     known = json.loads(call("score", tmp_path / "off.npz", files[0], *options, "--plane", "0,0,1").stdout)
     assert "plane held" not in known["verdict"]["said"]  # it is given
 

@@ -18,12 +18,13 @@ from .progress import shown
 from .reading import check_enough, options_for_reading, prepared, said_recipe
 from .writing import check_outputs, option_for_force
 
-MOST_ROWS = 8
+MOST_ROWS, MOST_LISTED = 8, 16
+"""Places and demonstrations that are listed without -v."""
 
 LEGEND = {
     "told by all": "share of samples there at which all recordings leave open a tenth of an action, or below noise.",
     "told by three": "the same whichever two are left out; of each state 'told' of uc.evaluation.diagnose says it.",
-    "may be off by": "of a typical action, any two left out; if large though all tell it, it hangs on one or two.",
+    "may be off by": "of a typical action, any two left out, misfit apart; if large, yet told by all, it hangs on few.",
     "moved by": "how many moved along 'leave free' there, by more than noise; others, elsewhere, may tell it, too.",
 }
 
@@ -33,7 +34,7 @@ LEGEND = {
 @options_for_model
 @click.option("-o", "--report", type=click.Path(dir_okay=False), help="Also write an HTML page there.")
 @option_for_force
-@click.option("-v", "--verbose", is_flag=True, help="Print all regions.")
+@click.option("-v", "--verbose", is_flag=True, help="Print all regions and demonstrations.")
 @option_for_json
 def diagnose(
     files: Sequence[str],
@@ -88,16 +89,20 @@ def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequenc
     if all_ or uc.evaluation.diagnosis.needs_more(found):
         _say_places(found, states, actions, all_)
     else:
-        click.echo(f"\n{uc.evaluation.diagnosis.NOWHERE[:-1]} (-v lists all).")
-    about, looks = uc.evaluation.diagnosis, uc.evaluation.diagnosis.COUNTED
-    told = [one for one in found.movements if one.looks in looks]
-    if not (free := sorted(told, key=lambda one: -(one.free or 0.0))):
+        click.echo(f"\n{uc.evaluation.diagnosis.nowhere(found, ' (-v lists all)')}")
+    about, kinds = uc.evaluation.diagnosis, {one.looks for one in found.movements}
+    others = kinds - {*about.COUNTED}
+    if None in kinds or (kinds == others and len(others) == 1):
         return
+    free = sorted(found.movements, key=lambda one: -(one.free or 0.0))
     said = f"Mean probability that a sample was free; above {percent(about.FREE)} a demonstration looks free, below "
-    click.echo(f"\n{said}{percent(about.CONSTRAINED)} constrained, and a policy is learnt from both:")
-    ends = free if len(free) <= MOST_ROWS else [*free[: MOST_ROWS // 2], *free[-MOST_ROWS // 2 :]]
-    rows = [[one.name, str(one.samples), looks[str(one.looks)], percent(one.free or 0.0), percent(one.determined)]
-            for one in ends]  # fmt: skip
+    said += f"{percent(about.CONSTRAINED)} constrained, and a policy is learnt from both"
+    said += "; on a plane, on a line and undecided it tells nothing" * bool(others)
+    half = len(free) if all_ else MOST_LISTED // 2
+    ends, left = [*free[:half], *free[half:][-half:]], max(len(free) - 2 * half, 0)
+    rows = [[one.name, str(one.samples), about.LOOKS[str(one.looks)].partition(" that ")[0].partition(" (")[0],
+             percent(one.free or 0.0), percent(one.determined)] for one in ends]  # fmt: skip
+    click.echo(f"\n{said}{f' (-v lists {left} more, between)' * bool(left)}:")
     print_table(["demonstration", "samples", "looks", "free", "told by three"], rows)
 
 

@@ -41,7 +41,7 @@ MEANINGS = {
     "explains": "weighted share of the squared motion, along the recorded directions, that the policy explains; go by "
     "this, as the verdict does: of the fast samples the slower count less",
     "normalised inconsistency": "the paper's squared error along the motion, over the variance of the actions; slow "
-    "samples count as much as fast ones, so it may look worse; 0 is perfect",
+    "samples and noise count as much as fast ones, so it may look worse; 0 is perfect",
     "nUPE": "squared error of the whole policy, over the variance of the actions; 0 is perfect",
     "nCPE": "squared error along what the constraint leaves free, over the variance of the actions; 0 is perfect",
     "nPOE": "recorded motion that the constraint would forbid, over the variance of the actions; 0 is perfect",
@@ -238,6 +238,8 @@ def _least_known(policy: uc.Policy, demonstrations: Sequence[uc.Demonstration], 
     place = uc.evaluation.diagnosis.named(worst.state, recipe.states or ())
     passed = f"near {place}, where '{worst.demonstration}' passed"
     least = f"Record more where least is known, held in other ways: {passed}."
+    simplest = click.get_current_context().params.get("model") in ("local", "affine", "linear")
+    least += " Or fit a model of fewer weights, which needs less, as without --model." * (not simplest)
     return f"{least} All such places:\n{next_command('diagnose')}"
 
 

@@ -117,7 +117,8 @@ def _print_scores(verdict: Any, rows: Any, left: Sequence[list[str]], ran: str, 
     """A verdict, scores of each demonstration and all, why others have none, and figures of runs from their starts."""
     say_verdict(verdict)
     noisy = any(one.noise is not None for one in of)  # which samples are fast is not known else
-    head = ["demonstration", "fast " * noisy + "samples", "explains", "normalised inconsistency", "nPOE", "nCPE"]
+    head = ["demonstration", "fast " * noisy + "samples", "explains" + " (fast)" * noisy]
+    head += ["normalised inconsistency" + " (noise too)" * noisy, "nPOE", "nCPE"]
     each = [_row(noisy, *one.values()) for one in rows]
     why = zip(("hardly moved", "too short"), left, strict=True)
     none = [[name, "", f"{how}: no score"] for how, names in why for name in names]

@@ -25,13 +25,14 @@ from .sentences import CONSTRAINED as CONSTRAINED
 from .sentences import COUNTED as COUNTED
 from .sentences import FREE as FREE
 from .sentences import KEPT, looks
-from .sentences import NOWHERE as NOWHERE
+from .sentences import LOOKS as LOOKS
 from .sentences import about_choice as about_choice
 from .sentences import about_freedom as about_freedom
 from .sentences import about_suspects as about_suspects
 from .sentences import in_words as in_words
 from .sentences import models_of as models_of
 from .sentences import needs_more as needs_more
+from .sentences import nowhere as nowhere
 from .sentences import sentences as sentences
 from .sentences import to_record as to_record
 from .shown import FLAT as FLAT

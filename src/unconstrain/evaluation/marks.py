@@ -33,6 +33,9 @@ UNITS = {"metres and millimetres": 1000.0, "degrees and radians": 57.3}
 NEARBY = 0.6
 """Support of nearly all recorded states: they are within one width of a kernel, exp(−½). Below, none came by."""
 
+MISFIT = 1.5
+"""Residuals above this many times the noise by differences in time are mostly misfit of the model."""
+
 SMALL = 0.1
 """An undetermined spread below this share of the typical action is negligible."""
 

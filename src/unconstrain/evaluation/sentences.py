@@ -10,15 +10,12 @@ import numpy as np
 
 from ..base.display import counted, percent, percents
 from ..learners import robust
-from .marks import ENOUGH, PARTLY, SMALL
+from .marks import ENOUGH, MISFIT, PARTLY, SMALL
 from .shown import named
-from .verdicts import ranked
+from .verdicts import misfit, ranked
 
 if TYPE_CHECKING:
     from .diagnosis import Diagnosis, Place
-
-MISFIT = 1.5
-"""Residuals above this many times the noise by differences in time are mostly misfit of the model."""
 
 LITTLE = 0.01
 """Shares of samples below this are not worth a sentence."""
@@ -26,7 +23,6 @@ LITTLE = 0.01
 FREE, CONSTRAINED = 0.5, 0.1
 """A demonstration looks free above the first, and constrained below the second mean probability of free samples."""
 
-NOWHERE = "No place needs another demonstration: three or more tell the policy at each."
 COUNTED = {"free": "free", "constrained": "constrained", "unsure": "either"}
 LOOKS = COUNTED | {"flat": "on a plane that others cross (held to it, or short free strokes)"}
 LOOKS["line"] = "on a line that others leave (held to it, as by a rail, or straight free strokes)"
@@ -65,12 +61,14 @@ def _about_noise(found: Diagnosis, unit: str) -> str:
     verdict = "little" if found.noise_share < SMALL else "some" if found.noise_share < 3 * SMALL else "much"
     too_much = found.noise_share > robust.SPHERE_HIDDEN_BY_NOISE
     hidden = " So much noise makes the following unreliable." if too_much else ""
-    said = f"Noise and misfit: {verdict}, {found.noise:.3g}{unit} on each action coordinate, "
+    each = unit or " (unit of the actions)"
+    said = f"Noise and misfit: {verdict}, {found.noise:.3g}{each} on each action coordinate, "
     said += f"{percent(found.noise_share)} of a typical action ({found.typical:.3g}{unit}) on all together.{hidden}"
     if found.noise_share < 0.5 * SMALL or found.noise < MISFIT * found.jitter:
         return said
     rest = "the rest is what the model does not follow, fast parts that --window smooths, or people who vary."
-    return f"{said} Only {found.jitter:.3g}{unit} of it changes from sample to sample; {rest}"
+    share = percent(found.noise_share * found.jitter / found.noise)
+    return f"{said} Only {found.jitter:.3g}{unit} of it ({share}) changes from sample to sample; {rest}"
 
 
 _WAYS = {
@@ -127,6 +125,12 @@ def _about_regions(found: Diagnosis, states: Sequence[str], actions: Sequence[st
     but = f" but {' and '.join(map(repr, region.shown_by))}, with a part of the motion" * bool(region.shown_by)
     more = ("three", "two", "one")[len(region.shown_by)]
     return f"{where} nobody moved {along} by more than noise{but}: record {more} more there."
+
+
+def nowhere(found: Diagnosis, more: str = "") -> str:
+    """That no place needs another demonstration, and what none cures; ``more`` is said of the places."""
+    model = f"; none cures that the model misses {percent(misfit(found))} of a typical action" * bool(misfit(found))
+    return f"No place needs another demonstration: three or more tell the policy at each{more}{model}."
 
 
 def needs_more(found: Diagnosis) -> bool:

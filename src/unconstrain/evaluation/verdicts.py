@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Array
 from ..base.display import counted, percent, percents
 from ..models import SUPPORTED
-from .marks import ENOUGH, FAIR, FAR_OFF, FEW, FORBIDDEN, OTHERWISE, PARTLY, UNITS, graded, no_better
+from .marks import ENOUGH, FAIR, FAR_OFF, FEW, FORBIDDEN, MISFIT, OTHERWISE, PARTLY, UNITS, graded, no_better
 from .marks import GOOD as GOOD
 from .marks import MOSTLY as MOSTLY
 from .marks import NEARBY as NEARBY
@@ -77,7 +77,7 @@ def of_untold(share: float) -> str:
     """Say at which share of the recorded states all recordings together leave the policy open."""
     if (said := percent(max(share, 0.0))) == "0%":
         return "all recordings together tell the policy at every recorded state"
-    return f"at {said} of the recorded states no recording tells the policy in some direction"
+    return f"at {said} of the recorded states no recording tells the policy in some direction, for this model"
 
 
 def of_explained(
@@ -144,8 +144,9 @@ def of_score(
     few = f" It takes {ENOUGH} recordings to be sure." if demonstrations < ENOUGH else ""
     who, motion = "The policy", "the motion" if learnt else "held-out motion"
     if under is not None:
-        much = f"explains {percent(under)} of {motion}" if under >= 0 else f"misses {motion} by more than that varies"
-        who = f"Under the constraint given, as a held robot moves, the policy {much} (1 − nCPE). Along the motion, it"
+        much = f"explains {percent(under)}" if under >= 0 else "misses more than all"
+        who = f"In all directions left free by the constraint given, the policy {much} of the variance of {motion} "
+        who += "(1 − nCPE). Along the recorded motion alone, it"
     untold = of_untold(1 - told) if told is not None and told < MOSTLY else ""
     more = (
         f"Movement under other constraints{untold and f': {untold}'}. Noise, and motion faster or slower than learnt, "
@@ -187,8 +188,8 @@ def of_planes(found: Verdict, shares: Array, motion: Array) -> Verdict:
         return found
     share = float(np.average(shares[kept], weights=motion[kept]))
     many = f"planes that {kept.sum()} of {_count(len(shares))} kept to"
-    where = f"in all directions of the {'plane that it kept to' if len(shares) == 1 else many}, the policy "
-    where += _explains(share, "the motion")
+    where = f"in all directions left free by the {'plane that it kept to' if len(shares) == 1 else many}, the policy "
+    where += f"{_explains(share, 'the motion')} (said first: along the recorded motion alone)"
     if graded(share)[0] is Mark.GOOD:
         return found._replace(trust=f"{found.trust} {where[0].upper()}{where[1:]}.".lstrip())
     return doubted(found, f"{where}, unless more than a plane held {'it' if len(shares) == 1 else 'them'}")
@@ -252,6 +253,12 @@ def shares_told(found: Diagnosis) -> str:
     return f"at {' and at '.join(', at '.join(told).rsplit(', at ', 1))}".replace("%", "% of their states", 1)
 
 
+def misfit(found: Diagnosis) -> float:
+    """What a model misses of a typical action beyond the noise of recordings; 0 if that is not most, or small."""
+    share = found.noise_share * float(np.sqrt(1.0 - min(found.jitter / max(found.noise, 1e-300), 1.0) ** 2))
+    return share if found.noise >= MISFIT * found.jitter and share > SMALL else 0.0
+
+
 def of_diagnosis(found: Diagnosis, first: str = "") -> Verdict:
     """Judge whether recordings tell the unconstrained policy; ``first`` is what to record, before the list of it."""
     share, count = found.states_determined, len(found.movements)
@@ -263,7 +270,7 @@ def of_diagnosis(found: Diagnosis, first: str = "") -> Verdict:
     mark, word = graded(share, MOSTLY, PARTLY)
     together = allowed_by(found.told_together)  # as 'fit' judges the same share, in the same words
     how = {"good": "enough", "fair": "enough in most places", "poor": "enough only if none of these went wrong"}
-    said = f"Recordings: {shares_told(found)}: {how[word] if together is Mark.GOOD else 'too little'}."
+    said = f"Recordings: {shares_told(found)}: {how[word] if together is Mark.GOOD else 'too little for this model'}."
     if mark is Mark.BAD and together is not Mark.BAD:
         mark = Mark.DOUBTFUL
     elif found.planes == 1:
@@ -272,7 +279,7 @@ def of_diagnosis(found: Diagnosis, first: str = "") -> Verdict:
         mark, said = Mark.DOUBTFUL, f"{said[:-1]} to be sure, though each lies on a plane of its own."
     if found.noise_share > 3 * SMALL:
         mark = no_better(mark)
-        said = f"{said[:-1]}, though noise is {percent(found.noise_share)} of a typical action."
+        said = f"{said[:-1]}, though noise and misfit are {percent(found.noise_share)} of a typical action."
     spread = np.hypot(found.undetermined, found.from_noise)[found.told == 2]
     trust = f"The policy {'at these states' if share == 1 else 'where three or more tell it'}, to about "
     trust += f"{percent(np.linalg.norm(spread) / max(len(spread), 1) ** 0.5)} of a typical action, a standard deviation"
@@ -283,7 +290,12 @@ def of_diagnosis(found: Diagnosis, first: str = "") -> Verdict:
         doubt += " 'fit' and 'score' may still explain much: they judge a policy along the motion, this judges "
         doubt += "recordings across it."
     then = f"{first} The list below has more places.".lstrip()
-    return Verdict(mark, said, trust, doubt, then if share < 1 or open_spread else "Demonstrate where nobody was.")
+    then = then if share < 1 or open_spread else "Demonstrate where nobody was."
+    if missed := misfit(found):
+        doubt += f" The model: beyond noise it misses {percent(missed)} of a typical action on average, in places "
+        doubt += "more, unless people vary as much; 'may be off by' counts none of that."
+        then += " Another --model of 'fit' may miss less, or more: compare by 'score' on recordings held back."
+    return Verdict(mark, said, trust, doubt, then)
 
 
 def ranked(found: Diagnosis) -> list[Region]:
@@ -379,18 +391,20 @@ def of_support(support: Array, times: Array | None, unknown: Array | None = None
     open_ = np.zeros_like(away) if unknown is None else (unknown > SMALL) & ~away
     if not (off := away | open_).any():
         return Verdict(Mark.GOOD, f"Near demonstrations for all {seconds[-1]:.2f} s: supported.")
-    trust = f"The first {seconds[int(off.argmax())]:.2f} s." if off.argmax() and unknown is not None else ""
+    begins = f"{seconds[int(off.argmax())]:.2f} s"
+    trust = f"The first {begins}." if off.argmax() and unknown is not None else ""
     mark = Mark.BAD if (support < SUPPORTED).mean() > 0.5 else Mark.DOUBTFUL
     none = f"No demonstration passes near for {_part(away, seconds)}: extrapolated."
     if unknown is None or not open_.any():
-        return Verdict(mark, none, trust, "Where none passes, and after it.", "Start nearer, or demonstrate there.")
+        doubt = f"All from {begins} on: where none passes, and after it."
+        return Verdict(mark, none, trust, doubt, "Start nearer, or demonstrate there.")
     middle, worst = float(np.median(unknown[open_])), seconds[int(np.where(open_, unknown, 0.0).argmax())]
     said = f"{none} Near some" if away.any() else "Near demonstrations"
     said += f", but {_part(open_, seconds)}, fewer than {ENOUGH} tell the policy in every direction: "
     much = f"about {percent(middle)} of" if middle < 1 else "as much as"
     said += f"there its action, all coordinates together, may be off by {much} its typical one on this way, a standard "
     said += f"deviation, and a coordinate that moves little by far more of its own; most at {worst:.2f} s."
-    doubt = f"Directions that fewer than {ENOUGH} demonstrations tell there."
+    doubt = f"Directions that fewer than {ENOUGH} demonstrations tell, from {begins} on."
     return Verdict(mark, said, trust, doubt, "'unconstrain diagnose' says what to record.")
 
 

@@ -66,7 +66,7 @@ def unknown(
         return [html.paragraph(f"Nothing can be said about that: {error}")]
     said = diagnosis.sentences(found, states, actions)
     if not diagnosis.needs_more(found):
-        return [html.bullets([*said, diagnosis.NOWHERE])]
+        return [html.bullets([*said, diagnosis.nowhere(found)])]
     told = f"Recordings: {verdicts.shares_told(found)}.", diagnosis.to_record(found, states, actions)
     return [html.bullets([*said, *told]), _map(found, demos, states, actions), _next(found, states, actions)]
 
@@ -102,7 +102,7 @@ def _map(found: Diagnosis, demos: list[Demonstration], states: Sequence[str], ac
 
 def _next(found: Diagnosis, states: Sequence[str], actions: Sequence[str]) -> html.Markup:
     if not diagnosis.needs_more(found):
-        return html.paragraph(diagnosis.NOWHERE)
+        return html.paragraph(diagnosis.nowhere(found))
     every = diagnosis.places(verdicts.ranked(found))
     shown = every[:MOST_REGIONS]
     rows = [

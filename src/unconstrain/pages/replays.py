@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 import warnings
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
@@ -26,8 +25,8 @@ if TYPE_CHECKING:
     from ..policies import Policy
     from ..recordings import Recipe
 
-MOST, STEPS = 20, 1000
-"""Demonstrations, and steps of each, that are run at most: seconds."""
+MOST, STEPS, MOST_NAMED = 20, 1000, 4
+"""Demonstrations, and steps of each, that are run at most: seconds; and how many a verdict names."""
 
 GUIDES = {
     "auto": "'unconstrain fit --guided auto' keeps it to the goal or the cycle that was shown, from anywhere.",
@@ -131,30 +130,33 @@ def replayed(
         some = f"{len(known)} of {len(demos)} demonstrations"
         why = "; what held the others, if anything, they do not tell well enough" * (held is None and len(runs) < MOST)
         words, of = f"{words}, as far as compared ({some}{why})", f"for {some}{alike}, {of}"
-    on = _held_on(policy, known, demos, recipe) if held is None else ""
-    words, figures = (one and one + on for one in (words, verdicts.size_and_pace(extents, paces, lasts, of, said)))
+    on = _held_on(policy, known, demos, recipe) if held is None else ("", "")
+    both = words, verdicts.size_and_pace(extents, paces, lasts, of, said)
+    words, figures = (one and one + more for one, more in zip(both, on, strict=True))
     judged = _advised(verdicts.of_replays(found, words, strays, starts), found, policy, demos)
     return Replayed(judged, told | {"away": gone}, runs, figures, words)
 
 
-def _held_on(policy: Any, runs: Sequence[Replay], demos: Sequence[Demonstration], recipe: Recipe) -> str:
-    """Where runs were held that go round in no plane, so may have been free; empty if free ones do the same."""
+def _held_on(policy: Any, runs: Sequence[Replay], demos: Sequence[Demonstration], recipe: Recipe) -> Sequence[str]:
+    """Where runs that turn in no plane were held, so may have been free, and with names; empty if free ones do so."""
     n, far = demos[0].states.shape[1], STRAYS * float(np.linalg.norm(np.ptp(stack(demos).states, axis=0)))
     short = [(one.done, diagnosis.flat(one.done.states)[0].any(axis=1).sum()) for one in runs if one.pace != one.pace]
     held = [one for one, tied in short if tied]
     free = replays(policy, held, recipe, partial(_same, np.zeros((n, n)))) if held else []
     if not (off := sorted((away, one.done.name) for one in free if (away := _farthest(one)) > far)):
-        return ""
-    named = Counter({1: "line", 2: "plane"}.get(n - tied, "flat") for _, tied in short if tied)
-    to = " or ".join(f"{name} ({count})" for name, count in named.most_common())
-    held_to, looks = f"; each held to the {to} that it lies in", dict[str, str | None]()
+        return "", ""
+    kinds = [({1: "line", 2: "plane"}.get(n - tied, "flat"), repr(one.name)) for one, tied in short if tied]
+    names = {kind: [name for each, name in kinds if each == kind] for kind, _ in kinds}
+    most = sorted(names, key=lambda kind: -len(names[kind]))
+    few, every = (" or ".join(f"{kind} ({how(names[kind])})" for kind in most) for how in (len, listed))
+    few, looks = every if len(held) <= MOST_NAMED else few, dict[str, str | None]()
     with suppress(UnconstrainError):  # where recordings are others than it was learnt from nothing is known
         looks = {one.name: one.looks for one in diagnosis.diagnose(innermost(policy), demos).movements}
-    if not (open_ := [repr(name) for _, name in off[::-1] if looks.get(name) != "constrained"]):
-        return f"{held_to}: all that would go elsewhere if run free look held"
-    if_free = "they were free strokes" if open_[1:] else "it was a free stroke"
-    said = f"{listed(open_, 4)} would go elsewhere if run free, so the policy is wrong there if {if_free}"
-    return f"{held_to}; {said}, which recordings do not tell"
+    said = ": all that would go elsewhere if run free look held"
+    if open_ := [repr(name) for _, name in off[::-1] if looks.get(name) != "constrained"]:
+        if_free = f"{'they were free strokes' if open_[1:] else 'it was a free stroke'}, which recordings do not tell"
+        said = f"; {listed(open_, 4)} would go elsewhere if run free, so the policy is wrong there if {if_free}"
+    return f"; each held to the {few} that it lies in{said}", f"; each held to the {every} that it lies in{said}"
 
 
 def _farthest(one: Replay) -> float:
