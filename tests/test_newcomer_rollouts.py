@@ -769,7 +769,7 @@ def test_who_winds_about_a_pot_is_not_called_free(tmp_path, kind):
     said, found = words(run(*how)), json.loads(run(*how, "--json"))
     looks = {one["name"]: one["looks"] for one in found["movements"]}
     assert looks["s3"] == looks["s6"] == {"pot": "round", "free": "free"}[kind]
-    assert ("2 on a surface about which they wind (held to it, as by a pot, or free strokes that circle)" in said) == (
+    assert ("2 winding about a surface (held to it, as by a pot, or free strokes that circle)" in said) == (
         kind == "pot"
     )
     assert (found["free_share"] > 0.15) == (kind == "free")

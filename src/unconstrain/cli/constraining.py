@@ -463,7 +463,8 @@ def _say(
 def _say_one(learnt: uc.LearntConstraint, what: str) -> None:
     choice = learnt.choice_
     smooth = f", smoothed with {choice.smoothness:g}" if choice.smoothness else ""
-    click.echo(f"Learnt: {choice.fields.rank} of {choice.actions} directions held, by {choice.name} features{smooth}.")
+    of = "Learnt" if learnt.mechanism_ is None else "Of velocities alone"
+    click.echo(f"{of}: {choice.fields.rank} of {choice.actions} directions held, by {choice.name} features{smooth}.")
     missed = f"where held out {choice.held_out:.3g} of the mean square of all that moves"
     click.echo(f"Noise and misfit along them are about {choice.noise:.3g} {what}, and {missed}.")
     rows = [[name, f"{share:.3g}"] for name, share in choice.candidates.items()]

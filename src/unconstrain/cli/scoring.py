@@ -70,7 +70,8 @@ def score(
     judged = judged if held is not None else verdicts.of_planes(judged, planes, _motion(demonstrations))
     with shown("running it from the same starts"):
         found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units, starts=HERE)
-    judged = verdicts.of_forbidden(_left(found.verdict, moving, demonstrations), whole.get("npoe", 0.0))
+    taken = 0.0 if held is None else uc.evaluation.metrics.forbidden(held, demonstrations)
+    judged = verdicts.of_forbidden(_left(found.verdict, moving, demonstrations), taken)
     verdict = to_copy(verdicts.of_unit(judged, _times(learnt, states)), policy, notes, of=files)
     if not as_json:
         _print_scores(verdict, [*before, *rows, whole], (still, short), found.in_figures, demonstrations)

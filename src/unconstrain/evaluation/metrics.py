@@ -257,6 +257,16 @@ def npoe(constraint: Constraint, demonstrations: Demonstrations) -> float:
     return _squares(actions - project(projections, actions)) / _spread(actions)
 
 
+def forbidden(constraint: Constraint, demonstrations: Demonstrations) -> float:
+    """Share of the squared motion that a constraint would have taken away, less what noise by differences explains."""
+    demos = _listed(demonstrations)
+    _, actions, groups = stack(demos)
+    projections = np.concatenate([_projections(demo, constraint) for demo in demos])
+    held = actions.size - float(np.trace(projections, axis1=1, axis2=2).sum())
+    taken = _squares(actions - project(projections, actions)) - held * robust.noise_by_differences(actions, groups)
+    return max(taken, 0.0) / (_squares(actions) or 1.0)
+
+
 def nnpe(component: PolicyLike, demonstrations: Demonstrations) -> float:
     """Normalised null-space projection error of a component v(x), ``Σ ‖v − v̂v̂ᵀ u‖² / Σ ‖u − mean u‖²``.
 

@@ -26,7 +26,7 @@ FREE, CONSTRAINED = 0.5, 0.1
 COUNTED = {"free": "free", "constrained": "constrained", "unsure": "either"}
 LOOKS = COUNTED | {"flat": "on a plane that others cross (held to it, or short free strokes)"}
 LOOKS["line"] = "on a line that others leave (held to it, as by a rail, or straight free strokes)"
-LOOKS["round"] = "on a surface about which they wind (held to it, as by a pot, or free strokes that circle)"
+LOOKS["round"] = "winding about a surface (held to it, as by a pot, or free strokes that circle)"
 LOOKS["untold"] = "undecided (too little else was seen there, or all was held the same way)"
 """How demonstrations look, and how that is said; those of the first three are compared by probability."""
 

@@ -238,8 +238,8 @@ def of_glitches(found: Verdict, names: str) -> Verdict:
 
 
 def of_forbidden(found: Verdict, share: float) -> Verdict:
-    """Add to a score under a constraint that it would not allow some share of the recorded motion, nPOE, if much."""
-    said = f"The constraint given forbids {percent(share)} of this motion (nPOE): likely another held it. {found.said}"
+    """Add to a score under a constraint that it would not allow some share of the recorded motion, if much."""
+    said = f"The constraint given forbids {percent(share)} of this motion: likely another held it. {found.said}"
     then = "Score without it, or give what held them ('unconstrain constraint' learns that)."
     return found if share <= FORBIDDEN else found._replace(mark=no_better(found.mark), said=said, next=then)
 

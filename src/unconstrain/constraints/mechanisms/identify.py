@@ -233,7 +233,7 @@ def identify(
     orientations: ArrayLike | None = None,
     forces: ArrayLike | None = None,
     groups: Groups | None = None,
-    unit: str = "m",
+    unit: str = "",
 ) -> Identification:
     """Fit every kind of mechanism to recorded positions and compare them.
 
@@ -248,7 +248,7 @@ def identify(
     groups : sequence, shape (N,), optional
         Which demonstration each sample is from. One mechanism for all is compared with one for each.
     unit : str
-        Of the positions; empty where it is not known.
+        Of the positions, for sentences; empty where it is not known.
 
     Raises
     ------

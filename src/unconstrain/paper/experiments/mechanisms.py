@@ -194,7 +194,7 @@ def trial(name: str, seed: int, index: int) -> dict[str, Any]:
     """One mechanism: what was found, with which odds, and which parameters are inside their intervals."""
     kind = KINDS[name]
     simulated = simulate(np.random.default_rng([seed, index]), kind)
-    found = uc.constraints.identify(simulated.positions, simulated.orientations)
+    found = uc.constraints.identify(simulated.positions, simulated.orientations, unit="m")
     right = found.kind == kind.name
     kept = list(inside(found.mechanism, simulated)) if right else []
     return {
@@ -244,7 +244,7 @@ def normals(rate: float = 20.0) -> list[dict[str, Any]]:
     """
     rows = []
     for bout in uc.datasets.load_rim_wiping(rate=rate):
-        found = uc.constraints.identify(bout.demonstration.states)
+        found = uc.constraints.identify(bout.demonstration.states, unit="m")
         plane = next(one for one in found.candidates if one.kind == "plane")
         curved, off_curved = mean_normal(bout.demonstration.states, plane.mechanisms[0].axis)
         rows.append(
