@@ -41,8 +41,8 @@ def kept(positions: Array, wound: bool = False) -> Mechanism | None:
 
     Examples
     --------
-    >>> turn = np.linspace(0, 9, 90)[:, None]
-    >>> uc.constraints.kept(0.4 * np.hstack([np.cos(turn), np.sin(turn)])).kind
+    >>> turn, noise = np.linspace(0, 9, 90), np.random.default_rng(0).normal(scale=1e-3, size=(90, 2))
+    >>> uc.constraints.kept(0.4 * np.column_stack([np.cos(turn), np.sin(turn)]) + noise).kind
     'circle'
     """
     spread = float(np.sqrt(positions.var(axis=0).sum()))
