@@ -569,8 +569,8 @@ def test_what_is_flat_free_or_out_of_order_keeps_to_nothing_round():
     turn = np.linspace(0.0, 9.0, 300)[:, None]
     ring = np.hstack([np.cos(turn), np.sin(turn)]) + noise((300, 2))
     assert uc.constraints.kept(ring).kind == uc.constraints.kept(1000.0 * ring + 5000.0).kind == "circle"
-    assert uc.constraints.kept(ring, wound=True) is None  # it turns 1.4 times
-    assert uc.constraints.kept(np.vstack([ring, ring]), wound=True) is not None
+    assert uc.constraints.kept(ring[:150], wound=True) is None  # it turns 0.7 times
+    assert uc.constraints.kept(ring, wound=True) is not None  # 1.4 times
     assert uc.constraints.kept(1.2 * np.random.default_rng(0).permutation(ring) + noise((300, 2), size=0.1)) is None
     assert uc.constraints.kept(np.ones((300, 2))) is None
     assert uc.constraints.kept(ring[:5]) is None

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import unconstrain as uc
 from seen import opened
@@ -647,7 +648,7 @@ def test_where_some_demonstrations_alone_are_run_it_is_said_how_many_and_why(fol
     wound = [[t, 60 * np.cos(t), 60 * np.sin(t) * np.cos(t / 7), 60 * np.sin(t) * np.sin(t / 7)] for t in turns]
     bent = write(tmp_path / "bent.csv", HEAD, np.array(wound) * [0.1, 1, 1, 1])
     asked = ("--by", "savgol", "--model", "affine", "--learner", "direct", "-o", tmp_path / "p.npz", "--force")
-    told = "for 4 of 5 demonstrations that look flat (on a line, in a plane) or free, "
+    told = "for 4 of 5 demonstrations that look flat (on a line, in a plane), round or free, "
     said = " ".join(run("fit", *held, bent, *asked).split())
     assert f"Run from the same starts: {told}size" in said
     assert re.search(
@@ -773,6 +774,22 @@ def test_who_winds_about_a_pot_is_not_called_free(tmp_path, kind):
         kind == "pot"
     )
     assert (found["free_share"] > 0.15) == (kind == "free")
+
+
+def test_who_winds_about_a_pot_is_run_on_its_wall_where_the_policy_says_so(tmp_path):
+    """The policy is the truth: free, it would leave the wall for the middle of the pot."""
+    files = stirred(tmp_path, "pot")[2:5]
+    demos = uc.prepare(uc.read(files), uc.Recipe(states=("x", "y", "z"), differentiate="savgol"))
+    recipe = uc.Recipe(states=("x", "y", "z"))
+
+    def far(policy, of):
+        at = [one.run.states - [450.0, 50.0, 200.0] for one in replays(policy, demos, recipe) if one.done.name == of]
+        return np.hypot(at[0][:, 0], at[0][:, 1])
+
+    swirl = np.array([[-0.4, -2.0, 0.0], [2.0, -0.4, 0.0], [0.0, 0.0, -0.7]])
+    assert_allclose(far(lambda x: (x - [450.0, 50.0, 200.0]) @ swirl.T, "s3"), 90.0, atol=2.0)
+    round_ = swirl * [[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 1.0]]  # who keeps to it by itself is run free
+    assert np.ptp(far(lambda x: (x - [450.0, 50.0, 200.0]) @ (round_ + 0.02 * np.eye(3)).T, "s3")) > 5.0
 
 
 def to_a_goal(folder, held):

@@ -57,7 +57,7 @@ def test_angles_that_only_look_flat_are_not_run_as_on_a_plane(arm, tmp_path):
     assert " of 8 demonstrations; what held the others, if anything, they do not tell well enough)" in said
     assert "size over time" not in doubt
     judged = words(run("score", arm / "p.npz", arm / "*.csv"))
-    assert " demonstrations that look flat (on a line, in a plane) or free, size " in judged
+    assert " demonstrations that look flat (on a line, in a plane), round or free, size " in judged
     assert "turn out" not in judged
     assert "turn out" not in words(run("info", arm / "p.npz"))
 

@@ -16,10 +16,12 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Array
 from ..base.display import innermost, listed, unit_of
 from ..base.errors import InvalidDataError, SettingError, UnconstrainError
+from ..constraints import kept
 from ..evaluation import diagnosis, verdicts
 from ..models import spaces
 from ..motion import Guided, rollout
 from ..recordings import Demonstration, stack
+from ..risks import null_space_projection, project
 
 if TYPE_CHECKING:
     from ..policies import Policy
@@ -52,6 +54,9 @@ PASSING = 0.2
 
 FOLLOWED = 0.1
 """What held is known, or that nothing did, if the policy under it misses less than this share of squared actions."""
+
+BETTER = 0.5
+"""Who winds about a surface was held if the policy along it misses less than this share of what it misses free."""
 
 SPANNED = 0.4
 """A plane tells that it held what spreads over it by this share of its longest extent, across that, too: what bends
@@ -120,7 +125,7 @@ def replayed(
     measured = {"extent": extents, "pace": paces, "last_round": lasts, "apart": apart}
     finite = {name: values[np.isfinite(values)] for name, values in measured.items()}
     told = {name: float(np.median(values)) if len(values) else None for name, values in finite.items()}
-    alike = "" if held is not None else " that look flat (on a line, in a plane) or free"
+    alike = "" if held is not None else " that look flat (on a line, in a plane), round or free"
     (words, strays), of = verdicts.moves(extents, paces, lasts), "of those that stay, " * bool(gone)
     if gone:
         named = listed([f"'{name}' (after {seconds:.2g} s)" for name, seconds in gone.items()], 4)
@@ -259,8 +264,10 @@ def replays(
     shapes = [_shape(policy, one) for one in chosen]
     task = held.target if getattr(held, "task", False) else None
     starts, steps = np.array([one.states[0] for one in chosen]), round(max(lasted) / dt) + 1
-    known = [held is not None or not free or _told(policy, one) for one in chosen]  # others were not chosen
-    own = [partial(_same, rows * how) for (rows, _), how in zip(shapes, known, strict=True)] if held is None else held
+    own, known = held, [True] * len(chosen)
+    if held is None:
+        ways = [_way(policy, *each, free) for each in zip(chosen, shapes, strict=True)]
+        own, known = [way for way, _ in ways], [how for _, how in ways]
     moving, near = bounded(policy, stack(demos).states)
     runs = rollout(moving, starts, steps, dt, own, task=task, least_support=0.0)
     cut = [run[: round(seconds / dt) + 1] for run, seconds in zip(runs, lasted, strict=True)]
@@ -276,10 +283,32 @@ def _shape(policy: Any, demo: Demonstration) -> tuple[Array, Array]:
     return diagnosis.flat(demo.states, 0.1 * diagnosis.FLAT if freely else diagnosis.FLAT)
 
 
+def _way(policy: Any, demo: Demonstration, shape: tuple[Array, Array], free: bool) -> tuple[Any, bool]:
+    """What its run is held to, a surface about which it winds, plane or line, and whether it tells that it was."""
+    surface = kept(demo.states, wound=True) if demo.states.shape[1] == 3 else None
+    if surface is not None:
+        freely = policy(demo.states)
+        along = project(null_space_projection(surface.rows(demo.states)), freely)
+        if _missed(demo, along) < BETTER * _missed(demo, freely):
+            return partial(_on, surface), True
+    known = not free or _told(policy, demo)  # others were not chosen
+    return partial(_same, shape[0] * known), known
+
+
+def _on(surface: Any, states: Array, times: Array) -> Array:
+    """Its rows, and zeros, so that there are as many as for others."""
+    rows = surface(states, times)
+    return np.pad(rows, ((0, 0), (0, rows.shape[2] - rows.shape[1]), (0, 0)))
+
+
 def _followed(demo: Demonstration, actions: Array) -> bool:
     """Whether a demonstration moved as these actions say."""
-    off = demo.actions - actions
-    return bool(np.vecdot(off, off).sum() < FOLLOWED * np.vecdot(demo.actions, demo.actions).sum())
+    return _missed(demo, actions) < FOLLOWED
+
+
+def _missed(demo: Demonstration, actions: Array) -> float:
+    """Share of a demonstration's squared actions by which these are off."""
+    return float(((demo.actions - actions) ** 2).sum() / max(float((demo.actions**2).sum()), 1e-300))
 
 
 def _told(policy: Any, demo: Demonstration) -> bool:

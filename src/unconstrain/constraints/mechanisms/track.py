@@ -78,13 +78,18 @@ class Track:
 
 def winding(steps: Iterable[Array]) -> bool:
     """Whether demonstrations turn more on their way, to either side, than free ones, by their steps (T, D) in order."""
+    return turns(steps) >= ROUND
+
+
+def turns(steps: Iterable[Array]) -> float:
+    """How often vectors (T, D) in order turn, to either side; the median of several demonstrations."""
     found = []
     for each in steps:
         means = np.array([part.mean(axis=0) for part in np.array_split(each, min(PARTS, len(each)))])
         ways, lengths = unit_actions(means)
         ways = ways[lengths > LEAST_STEP * lengths.max()]
         found.append(np.arccos(np.clip(np.vecdot(ways[1:], ways[:-1]), -1.0, 1.0)).sum() / (2 * np.pi))
-    return bool(np.median(found) >= ROUND)
+    return float(np.median(found))
 
 
 def principal(positions: Array) -> tuple[Array, Array]:
