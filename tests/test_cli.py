@@ -579,7 +579,7 @@ def test_what_was_repaired_is_said_in_a_note(tmp_path):
     write(tmp_path / "circle_0.csv", "t,x,y", track)
     ran = call("fit", pattern, "--model", "linear", "-o", tmp_path / "p.npz")
     assert ran.code == 0
-    [note] = ran.err.splitlines()
+    [note] = [line for line in ran.err.splitlines() if line.startswith("Note: ")]
     said = (
         "Note: clock-gap: 'circle_0', row 600 (line 602): 1 gap in the time stamps, the longest 3.01 s after 5.99 s; "
     )

@@ -70,8 +70,7 @@ def score(
     judged = judged if held is not None else verdicts.of_planes(judged, planes, _motion(demonstrations))
     with shown("running it from the same starts"):
         found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units, starts=HERE)
-    taken = 0.0 if held is None else uc.evaluation.metrics.forbidden(held, demonstrations)
-    judged = verdicts.of_forbidden(_left(found.verdict, moving, demonstrations), taken)
+    judged = verdicts.of_forbidden(_left(found.verdict, moving, demonstrations), whole.get("forbidden", 0.0))
     verdict = to_copy(verdicts.of_unit(judged, _times(learnt, states)), policy, notes, of=files)
     if not as_json:
         _print_scores(verdict, [*before, *rows, whole], (still, short), found.in_figures, demonstrations)
@@ -168,7 +167,10 @@ def _scores(moving: Any, held: Any, of: Sequence[uc.Demonstration], name: str) -
     found |= {"explains": explained(moving, fast if count >= LEAST else of), "ninc": None}
     with suppress(InvalidDataError):  # constant actions have no variance to normalise by
         found["ninc"] = uc.ninconsistency(moving, of)
-    return found if held is None else found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(moving, of, held)}
+    if held is None:
+        return found
+    forbidden = uc.evaluation.metrics.forbidden(held, of)
+    return found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(moving, of, held), "forbidden": forbidden}
 
 
 def _motion(demonstrations: Sequence[uc.Demonstration]) -> Any:
