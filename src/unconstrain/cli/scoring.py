@@ -70,7 +70,7 @@ def score(
     judged = judged if held is not None else verdicts.of_planes(judged, planes, _motion(demonstrations))
     with shown("running it from the same starts"):
         found = replayed(judged, moving, demonstrations, recipe, held, recordings[0].units, starts=HERE)
-    judged = verdicts.of_forbidden(_left(found.verdict, moving, demonstrations), whole.get("forbidden", 0.0))
+    judged = _forbidden(_left(found.verdict, moving, demonstrations), held, demonstrations)
     verdict = to_copy(verdicts.of_unit(judged, _times(learnt, states)), policy, notes, of=files)
     if not as_json:
         _print_scores(verdict, [*before, *rows, whole], (still, short), found.in_figures, demonstrations)
@@ -111,6 +111,12 @@ def _left(judged: Any, moving: Any, demonstrations: Sequence[uc.Demonstration]) 
     said = f"{judged.said} What it misses is likely ({percent(there / missed)}) as these recordings {left}."
     then = f"Demonstrate where they go, too ('unconstrain look' shows both). {judged.next}"
     return judged._replace(said=said, next=then.rstrip())
+
+
+def _forbidden(judged: Any, held: Any, of: Sequence[uc.Demonstration]) -> Any:
+    """The verdict, with what the constraint that was given would not have allowed."""
+    metrics, verdicts = uc.evaluation.metrics, uc.evaluation.verdicts
+    return judged if held is None else verdicts.of_forbidden(judged, metrics.forbidden(held, of))
 
 
 def _print_scores(verdict: Any, rows: Any, left: Sequence[list[str]], ran: str, of: Sequence[Any]) -> None:
@@ -167,10 +173,7 @@ def _scores(moving: Any, held: Any, of: Sequence[uc.Demonstration], name: str) -
     found |= {"explains": explained(moving, fast if count >= LEAST else of), "ninc": None}
     with suppress(InvalidDataError):  # constant actions have no variance to normalise by
         found["ninc"] = uc.ninconsistency(moving, of)
-    if held is None:
-        return found
-    forbidden = uc.evaluation.metrics.forbidden(held, of)
-    return found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(moving, of, held), "forbidden": forbidden}
+    return found if held is None else found | {"npoe": uc.npoe(held, of), "ncpe": uc.ncpe(moving, of, held)}
 
 
 def _motion(demonstrations: Sequence[uc.Demonstration]) -> Any:
