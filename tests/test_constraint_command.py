@@ -717,19 +717,23 @@ def test_a_free_stroke_that_happens_to_be_on_a_surface_is_no_sure_constraint(see
 
 def test_where_positions_say_that_nothing_held_it_the_file_is_no_constraint_to_be_used(tmp_path):
     to_a_cycle(tmp_path)
-    for files, who in ((["hand_1.csv"], "it"), (["hand_1.csv", "hand_2.csv"], "them")):
+    for files, who in ((["hand_1.csv"], "it"), (["hand_1.csv", "hand_2.csv"], "all of them")):
         paths = [tmp_path / one for one in files]
         order = ("constraint", *paths, "-o", tmp_path / "c.npz", "--force", "--json")
         told = json.loads(run(*order))
         assert told["mechanism"].startswith("a movement that nothing holds, against")
         assert told["verdict"]["said"].startswith(f"Positions say that nothing held {who}. ")
-        assert told["verdict"]["next"] == "Do not use it as a constraint, if these are positions."
+        assert told["verdict"]["next"].startswith("Do not use it as a constraint, if these are positions.")
+        assert ("Learn it of each alone" in told["verdict"]["next"]) == (len(files) > 1)
     run("constraint", tmp_path / "hand_1.csv", "-o", tmp_path / "c.npz", "--force")
     said = " ".join(run("info", tmp_path / "c.npz").split())
     assert said.startswith("! Positions say that nothing held it. The file holds to what was learnt, by quadratic")
     run("fit", tmp_path / "hand_1.csv", tmp_path / "hand_2.csv", "--learner", "direct", "-o", tmp_path / "p.npz")
     way = ("--start", "0.1,0.1", "--steps", 3, "--constraint", tmp_path / "c.npz")
     assert "c.npz: Positions say that nothing held it." in call("rollout", tmp_path / "p.npz", *way).stderr
+    several = ("constraint", *(tmp_path / f"hand_{number}.csv" for number in range(5)), "-o", tmp_path / "s.npz")
+    assert run(*several).startswith("! Positions say that nothing held all of them. ")
+    assert "nothing held" not in run("info", tmp_path / "s_hand_1.npz").split("\n\n")[0]  # that is not of each
     undecided = write(tmp_path / "one.csv", HEAD, [falls(0)])
     assert "nothing held it" not in run("constraint", undecided, *COLUMNS, "-o", tmp_path / "u.npz").split("\n\n")[0]
 

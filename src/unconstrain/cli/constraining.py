@@ -355,9 +355,10 @@ class Named(NamedTuple):
 
     def shown(self, learnt: Mapping[str, uc.LearntConstraint]) -> bool | str | None:
         """Whether positions show what held them; None where it may be a habit, "free" where nothing did."""
-        decided = self.found.decided and not ("" in learnt and self.differs(learnt))
-        told = "free" if self.found.kind == "free" else None if self.found.habit else True
-        return told if decided else False
+        free, part = self.found.kind == "free", "" not in learnt and len(learnt) < len(self.names)
+        if not self.found.decided or ("" in learnt and self.differs(learnt)) or (free and part):
+            return False  # that nothing held all of them tells nothing of one
+        return "free" if free else None if self.found.habit else True
 
     def differs(self, learnt: Mapping[str, uc.LearntConstraint]) -> bool:
         """Whether kinds of mechanisms differ, or one constraint for all holds less than those of each."""
@@ -365,10 +366,7 @@ class Named(NamedTuple):
         return self.found.kind == "mixture" or (less and len(self.held) > 1 and self.found.decided)
 
     def kept(self, name: str, learnt: uc.LearntConstraint, demos: Sequence[uc.Demonstration]) -> uc.LearntConstraint:
-        """What was learnt of one demonstration, or of all, held by its mechanism if positions decide on that.
-
-        Whether that held it is for the verdict to say: free strokes may keep to a surface of their own.
-        """
+        """What was learnt of one demonstration, or of all, held by its mechanism if positions decide on that."""
         kinds = self.found.candidates[0].kinds
         own = dict(zip(self.names if len(kinds) > 1 else [name], zip(self.held, kinds, strict=True), strict=False))
         mechanism, kind = own.get(name, (None, "undecided"))

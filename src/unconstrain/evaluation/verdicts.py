@@ -322,8 +322,10 @@ def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bo
     single, followed = not others and not choice.several, all(getattr(one, "mechanism_", None) for one in every)
     many = f"That {' to '.join(map(str, sorted({min(ranks), max(ranks)})))} of {choice.actions} are held."
     if shown == "free":
-        said = f"Positions say that nothing held {'it' if single else 'them'}."
-        return Verdict(Mark.DOUBTFUL, said, doubt=many, next="Do not use it as a constraint, if these are positions.")
+        said = f"Positions say that nothing held {'it' if single else 'all of them'}."
+        then = "Do not use it as a constraint, if these are positions."
+        then += " Learn it of each alone (--episodes): some may have been held." * (not single)
+        return Verdict(Mark.DOUBTFUL, said, doubt=many, next=then)
     one_way, alone = all(one.choice_.one_way for one in every), others or not choice.several
     straight = sum(one.choice_.wound is False for one in every) > len(every) / 2
     if not shown and (one_way or followed or (alone and straight)):
@@ -343,8 +345,7 @@ def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bo
     if choice.several and not others and not followed and mark is not Mark.GOOD:
         said = f"If one constraint held all: {said}"
         then = "Learn it of each alone (--episodes, --leave-out): each may have been held otherwise, or not at all."
-    if (choice.doubts or len(ranks) > 1 or undecided) and mark is Mark.GOOD:
-        mark = Mark.DOUBTFUL
+    mark = no_better(mark) if choice.doubts or len(ranks) > 1 or undecided else mark
     if choice.lacking and not followed:
         then = "Record what is missing, then learn it again."
     elif single and not followed:
