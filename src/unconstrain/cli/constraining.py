@@ -140,7 +140,13 @@ def _judged(
     """What was learnt, what it is by name where that holds more, and what of these is in the files."""
     if named is None:
         return uc.evaluation.verdicts.of_constraint(*learnt.values())
-    return uc.evaluation.verdicts.of_files(_judged_by_name(learnt, named, demonstrations), *learnt.values())
+    found = uc.evaluation.verdicts.of_files(_judged_by_name(learnt, named, demonstrations), *learnt.values())
+    asked = click.get_current_context().params
+    typed = [name for name in ("features", "with_task", "surface") if asked[name] not in ("auto", False)]
+    how = f"without --{' or --'.join(typed)}".replace("_", "-") if typed else "of one alone, with --episodes"
+    apart = named.shown(learnt) in (True, None) and not any(one.mechanism_ for one in learnt.values())
+    said, other = f" Learnt {how}, it holds to the mechanism." * apart, "; or name the --features" * bool(typed)
+    return found._replace(said=found.said + said, next=found.next.replace(other, ""))
 
 
 def _judged_by_name(
@@ -161,10 +167,8 @@ def _judged_by_name(
     if named.differs(learnt):
         said = f"Demonstrations differ: {named.found.summary}. {found.said.replace('held;', 'held in all;')}"
         return found._replace(said=said, next="Learn those of one mechanism alone, with --episodes or --leave-out.")
-    if named.found.kind == "free" and named.found.decided:
-        found = found._replace(said=found.said.replace("do not decide it", "keep to nothing that would hold them"))
     rank, mechanism = max(one.choice_.fields.rank for one in learnt.values()), named.found.mechanism
-    followed = bool(named.shown(learnt)) and all(one.mechanism_ for one in learnt.values())
+    followed = named.shown(learnt) is True and all(one.mechanism_ for one in learnt.values())
     found = uc.evaluation.verdicts.of_passing(found, named.passing(learnt, demonstrations), mechanism.title)
     return uc.evaluation.verdicts.of_mechanism(found, rank, mechanism, followed)
 
@@ -227,7 +231,7 @@ def _agreeing(
                 other = _learnt(uc.LearntConstraint(features), part, surface)
                 best = min(best, other if shared else {part[0].name: other[""]}, key=wrong)
         learnt = best if shared else learnt | best
-    return {name: named.kept(name, one, demonstrations) for name, one in learnt.items()}
+    return learnt if surface else {name: named.kept(name, one, demonstrations) for name, one in learnt.items()}
 
 
 def _of_demonstration(output: str, name: str) -> str:
@@ -349,10 +353,12 @@ class Named(NamedTuple):
     """The last column."""
     held: Sequence[Any]
 
-    def shown(self, learnt: Mapping[str, uc.LearntConstraint]) -> bool | None:
-        """Whether positions show what held them, and a movement can be held by it; None where it may be a habit."""
-        decided = self.found.decided and self.found.kind != "free" and not ("" in learnt and self.differs(learnt))
-        return False if not decided else None if self.found.habit else True
+    def shown(self, learnt: Mapping[str, uc.LearntConstraint]) -> bool | str | None:
+        """Whether positions show what held them; None where it may be a habit, "free" where nothing did."""
+        free, part = self.found.kind == "free", "" not in learnt and len(learnt) < len(self.names)
+        if not self.found.decided or ("" in learnt and self.differs(learnt)) or (free and part):
+            return False  # that nothing held all of them tells nothing of one
+        return "free" if free else None if self.found.habit else True
 
     def differs(self, learnt: Mapping[str, uc.LearntConstraint]) -> bool:
         """Whether kinds of mechanisms differ, or one constraint for all holds less than those of each."""
@@ -360,16 +366,12 @@ class Named(NamedTuple):
         return self.found.kind == "mixture" or (less and len(self.held) > 1 and self.found.decided)
 
     def kept(self, name: str, learnt: uc.LearntConstraint, demos: Sequence[uc.Demonstration]) -> uc.LearntConstraint:
-        """What was learnt of one demonstration, or of all, held by its mechanism if positions decide on that.
-
-        A path or a plane says no more than what velocities show. A surface that bends does, and free strokes have some.
-        """
+        """What was learnt of one demonstration, or of all, held by its mechanism if positions decide on that."""
         kinds = self.found.candidates[0].kinds
         own = dict(zip(self.names if len(kinds) > 1 else [name], zip(self.held, kinds, strict=True), strict=False))
         mechanism, kind = own.get(name, (None, "undecided"))
-        open_ = ["free", "undecided", "held", *(["sphere", "cylinder"] if self.found.habit else [])]
         sure = self.found.decided or self.found.odds >= uc.constraints.mechanisms.LIKELY  # others may be undecided
-        if kind in open_ or not sure:
+        if kind in ("free", "undecided", "held") or not sure:
             return learnt
         return learnt.held_by(mechanism, *uc.stack([one for one in demos if name in ("", one.name)])[:2])
 
@@ -377,7 +379,7 @@ class Named(NamedTuple):
         """How much of what a mechanism that is sure holds, or of its own if that is less, what was learnt lets pass."""
         import numpy as np
 
-        if self.shown(learnt) is False or any(one.task for one in learnt.values()):
+        if self.shown(learnt) in (False, "free") or any(one.task for one in learnt.values()):
             return 0.0
         own, found = dict(zip(self.names, self.held, strict=False)) if len(self.held) > 1 else {}, [0.0]
         for one in demonstrations if "" in learnt else [one for one in demonstrations if one.name in learnt]:

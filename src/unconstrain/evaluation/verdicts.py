@@ -304,45 +304,53 @@ def ranked(found: Diagnosis) -> list[Region]:
     return sorted(found.regions, key=lambda one: 2 if one.together >= PARTLY else one.demonstration in free)
 
 
-def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bool | None = None) -> Verdict:
-    """Judge a constraint, or one for each demonstration, by what it missed; ``shown`` is whether positions show it."""
+FOLLOW = "Use it with --constraint of 'rollout' or 'score', which follow the mechanism."
+"""What to do where files hold to mechanisms: nothing is missing of their form."""
+
+
+def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bool | str | None = None) -> Verdict:
+    """Judge a constraint, or one for each demonstration, by what it missed.
+
+    ``shown`` is whether positions show it, None where they may be of free ones, too, and "free" where they surely are.
+    """
     every = (learnt, *others)
     choice = max((one.choice_ for one in every), key=lambda each: each.held_out)
     missed, ranks = sum(one.choice_.held_out for one in every) / len(every), {one.rank_ for one in every}
     if max(ranks) == 0:
         said = "No direction was held: nothing constrained these movements, or each direction was seen."
         return Verdict(Mark.DOUBTFUL, said, next="Look whether the demonstrations were held in different ways.")
+    single, followed = not others and not choice.several, all(getattr(one, "mechanism_", None) for one in every)
+    many = f"That {' to '.join(map(str, sorted({min(ranks), max(ranks)})))} of {choice.actions} are held."
+    if shown == "free":
+        said = f"Positions say that nothing held {'it' if single else 'all of them'}."
+        then = "Do not use it as a constraint, if these are positions."
+        then += " Learn it of each alone (--episodes): some may have been held." * (not single)
+        return Verdict(Mark.DOUBTFUL, said, doubt=many, next=then)
     one_way, alone = all(one.choice_.one_way for one in every), others or not choice.several
     straight = sum(one.choice_.wound is False for one in every) > len(every) / 2
-    if not shown and (one_way or (alone and straight)):
+    if not shown and (one_way or followed or (alone and straight)):
         little = "free strokes that turn as little keep to a surface of their own, too"
         why = "each state was passed one way only, as by a free policy" if one_way else little
         then = "Record movements that cross each other, and learn it again; or name the --features."
-        single = not others and not choice.several
-        by = "diagnose" if single else "fit"
-        then += f" '{by}' compares several with one policy, which may tell that they were held."
+        then = f"{FOLLOW if followed else then} '{'diagnose' if single else 'fit'}' compares several with one policy, "
         said = f"Whether anything was held cannot be told{' by one demonstration alone' * single}: {why}."
-        many = " to ".join(map(str, sorted({min(ranks), max(ranks)})))
-        return Verdict(Mark.DOUBTFUL, said, doubt=f"That {many} of {choice.actions} are held.", next=then)
+        return Verdict(Mark.DOUBTFUL, said, doubt=many, next=f"{then}which may tell that they were held.")
     mark, word = graded(1.0 - missed)
-    held = f"{min(ranks)} of {choice.actions} directions were held"
+    held = f"{'At most ' * (len(ranks) > 1)}{min(ranks)} of {choice.actions} directions were held"
     apart = f", others in each of {_count(len(every))}" if others else ""
-    if len(ranks) > 1:
-        held = f"At most {held}"
-        apart += f" (in some up to {max(ranks)} look so, as does a direction in which nobody moved)"
+    apart += f" (in some up to {max(ranks)} look so, as does a direction in which nobody moved)" * (len(ranks) > 1)
     undecided = " Positions do not decide it." if shown is False else ""
     said = f"{held}{apart}; {percent(missed)} of held-out motion is along them: {word}.{undecided}"
-    then = "Use it with --constraint of 'rollout' or 'score'."
-    if choice.several and not others and mark is not Mark.GOOD:
+    then = FOLLOW if followed else "Use it with --constraint of 'rollout' or 'score'."
+    if choice.several and not others and not followed and mark is not Mark.GOOD:
         said = f"If one constraint held all: {said}"
         then = "Learn it of each alone (--episodes, --leave-out): each may have been held otherwise, or not at all."
-    if (choice.doubts or len(ranks) > 1 or undecided) and mark is Mark.GOOD:
-        mark = Mark.DOUBTFUL
-    if choice.lacking:
+    mark = no_better(mark) if choice.doubts or len(ranks) > 1 or undecided else mark
+    if choice.lacking and not followed:
         then = "Record what is missing, then learn it again."
-    elif not choice.several and not others:
+    elif single and not followed:
         then = "Learn it from several demonstrations, from other starts: what one does not do looks held."
-    doubt = "; ".join(text.rstrip(".") for text in choice.doubts)
+    doubt = "; ".join(text.rstrip(".") for text in choice.doubts).replace(", or name the features" * followed, "")
     still = "A direction in which nobody wanted to move looks held, too."
     return Verdict(mark, said, "What was held, near recorded states.", f"{doubt}. {still}" if doubt else still, then)
 
@@ -361,7 +369,6 @@ def of_passing(found: Verdict, passing: float, title: str) -> Verdict:
 def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool) -> Verdict:
     """Say where velocities show some rank that positions keep to a mechanism that holds others; first if sure."""
     more = f"{named.rank} of {len(named.centre)}"
-    then = "Use it with --constraint of 'rollout' or 'score', which follow the mechanism."
     if named.rank == rank or (named.rank < rank and not (sure and found.said.startswith(f"{named.rank} of "))):
         return found
     if not sure:
@@ -369,7 +376,7 @@ def of_mechanism(found: Verdict, rank: int, named: Any, sure: bool) -> Verdict:
         return found._replace(said=f"{found.said} {keep}")
     why = "It turns on the way" if named.rank > rank else "It was passed one way only"
     said = f"{more} directions were held, by {named.title}. {why}, so velocities alone show {rank}"
-    return found._replace(said=said + found.said.partition(" directions were held")[2], next=then)
+    return found._replace(said=said + found.said.partition(" directions were held")[2], next=FOLLOW)
 
 
 def of_files(found: Verdict, *held: LearntConstraint) -> Verdict:
