@@ -310,9 +310,6 @@ COMPARED_STATES = 1000
 LEAST_DEMONSTRATIONS = 4
 """With fewer demonstrations, standard errors are over the folds."""
 
-LEAST_INFORMATIVE = 0.1
-"""The likelihood is not used where fewer than this share of the samples are in other than the uniform component."""
-
 SPHERE_HIDDEN_BY_NOISE = 0.35
 """Noise above this share of the actions hides the sphere: free and constrained samples look the same."""
 

@@ -25,7 +25,7 @@ from .belief import solution, weak_prior
 from .candidate import Candidate
 from .choice import Comparison
 from .consistent import by_segments, noise_corrected
-from .constants import AGREED, AS_DIRECT, LEAST_EXPLAINED, LEAST_INFORMATIVE, LEAST_MISFIT, LONG, MOST_OF_NOISE
+from .constants import AGREED, AS_DIRECT, LEAST_EXPLAINED, LEAST_MISFIT, LONG, MOST_OF_NOISE
 from .held_out import held_out_otherwise, held_out_together
 from .kinematics import KNOWING, Jacobian, with_jacobian
 from .likelihood import free_probability, maximise
@@ -265,8 +265,7 @@ class Robust(_Maximising):
     :mod:`unconstrain.learners.robust.choice`. Candidates are direct
     regression, softened hybrids (eqs 4 to 6), :class:`NoiseCorrected`,
     :class:`Segments` by demonstration, also such as are curved, and
-    :class:`Likelihood` unless noise hides the sphere or nearly all samples are
-    in its uniform component.
+    :class:`Likelihood` unless noise hides the sphere.
 
     Keeps the samples, up to 50,000 of them, and uses them; of more it keeps
     every second, fourth, ... of each demonstration, and ``solution_.free`` is
@@ -341,7 +340,7 @@ class Robust(_Maximising):
             if not np.allclose(curved, projections):
                 learnt.append(by_segments(samples, curved, "curved segments"))
         likely, mixture = self._maximised(samples, training, corrected)
-        if 1.0 - mixture[-1] > LEAST_INFORMATIVE and not hides_sphere(likely.variance, samples):
+        if not hides_sphere(likely.variance, samples):
             free = samples.counts * free_probability(samples, samples.predict(likely.weights), likely.variance, mixture)
             unshown = 2.0 * float(free @ held_throughout(*each)[0]) > free.sum()
             learnt.append(replace(likely, softness=np.inf) if unshown else likely)
