@@ -216,7 +216,7 @@ def test_a_look_at_a_policy_that_moves_otherwise_begins_with_that(folder, tmp_pa
     assert run("look", *held, "-o", tmp_path / "a.html").startswith("✔ 3 demonstrations, nothing odd")
     said = run("look", *held, folder / "slow.npz", "-o", tmp_path / "b.html")
     assert said.startswith("! 3 demonstrations, nothing odd")
-    assert "But run from the same starts, 2 of 3 go round too small; 3 of 3 too slow." in " ".join(said.split())
+    assert "But run from the same starts, 2 of 3 go round too small ('held_2', 'held_1'); 3 of 3 too slow." in " ".join(said.split())
 
 
 @pytest.mark.parametrize(("told", "mark"), [(0.75, "!"), (1.0, "✔")])
@@ -369,7 +369,7 @@ def test_strokes_that_are_too_large_are_not_outweighed_by_others_that_are_too_sm
     assert found.mark is Mark.DOUBTFUL
     assert found.said == "Good. But run from the same starts, 2 of 5 turn out too large and 2 too small."
     assert figures == (
-        "size 1.00 times (0.60 to 1.70) the demonstrated (in brackets, least to most of 5 runs), typically 3 mm "
+        "size 1.00 times (5 runs: 0.60 to 1.70) the demonstrated, typically 3 mm "
         "from the recorded path; beyond 0.83 to 1.20 times: size of 4 of 5"
     )
 
@@ -536,9 +536,7 @@ def test_a_fit_itself_says_how_its_policy_moves(folder, tmp_path):
     page = " ".join(unescape(re.sub(r"<[^>]*>", " ", (tmp_path / "p.html").read_text("utf-8"))).split())
     assert "on a plane of its own" in found["verdict"]["trust"]
     assert all(" ".join(found["verdict"][name].split()) in page for name in ("said", "trust", "doubt", "next"))
-    ran = (
-        r"size (\S+) times \(\S+ to \S+\), pace .*times.* the demonstrated \(in brackets, least to most of \d+ runs\), "
-    )
+    ran = r"size (\S+) times \(\d+ runs: \S+ to \S+\), pace .*times.* the demonstrated, "
     told = re.fullmatch(rf"{ran}typically \S+ mm from the recorded path.*", found["ran"])
     assert float(told[1]) == pytest.approx(found["replayed"]["extent"], abs=0.006)
     assert page.count(f"Run from the same starts: {found['ran']}.") == page.count(f"size {told[1]} times") == 1
@@ -792,10 +790,13 @@ def test_runs_that_are_held_where_a_stroke_lies_are_compared_free_too(tmp_path, 
     files, policy = to_a_goal(tmp_path, held), tmp_path / "p.npz"
     said = words(run("fit", *files, "--state", "x,y,z", "--model", "affine", "-o", policy))
     assert "un from the same starts, it keeps size" in said
-    for told in (said, words(run("info", policy)), words(run("export", policy, "-o", tmp_path / "p.c"))):
-        assert bool(re.search(r"each held to the plane \(\d\) or line \(\d\) that it lies in", told)) == held
+    assert bool(re.search(r"each held to the plane \(\d\) or line \(\d\) that it lies in", said)) == held
+    for told in (said, words(run("info", policy))):
         assert ("that it lies in: all that would go elsewhere if run free look held" in told) == held
         assert "if they were free strokes" not in told  # which diagnose does not doubt either
+    start = ("--start", "100,100,100", "-o", tmp_path / "r.csv")
+    for other in (("export", policy, "-o", tmp_path / "p.c"), ("rollout", policy, *start), ("certify", policy)):
+        assert "each held to" not in text(call(*other))  # fit said it, and they have their own news
     named = re.findall(r"'(s\d)'", said.partition("each held to the ")[2].partition("each held to the ")[2])
     assert (len(named) > 4 and named == [*dict.fromkeys(named)]) == held  # by name in the body, where they are many
     few = json.loads(run("score", policy, *files[:3], "--json"))["verdict"]["said"]
@@ -924,7 +925,7 @@ def test_rails_are_named_as_lines_and_free_strokes_are_not(tmp_path):
     table = re.findall(r" (s\d) 200 ([a-z ]+) [<>]?\d+% [<>]?\d+%", said)
     assert sorted(table) == sorted((name, short.get(one, one)) for name, one in looks.items())  # all, as JSON says
     others = {"line", "flat", "untold"} & {*looks.values()}
-    assert ("; on a plane, on a line and undecided it tells nothing:" in said) == bool(others)
+    assert ("; on a plane, on a line, winding and undecided it tells nothing:" in said) == bool(others)
     alone = "diagnose", *[tmp_path / f"s{k}.csv" for k in range(4)], *how[2:]
     assert "on a line that others leave (held to it, as by a rail" in words(run(*alone))
 
