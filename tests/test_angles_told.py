@@ -137,8 +137,10 @@ def test_other_columns_that_move_are_a_note_and_clocks_counts_flags_and_constant
     folder = recorded(tmp_path / "w", "t,x,y,frame,ticks,touch,status,force", made=made)
     said = run("inspect", folder)
     assert "angle-unused" not in said
-    assert "unused: 'w0': force left out; name with --state what makes the state." in said
-    assert "unused: 'w0': force left out" in text(call("fit", folder, *LINEAR, "-o", tmp_path / "p.npz"))
+    assert (
+        "unused: 'w0': force and 4 more, at rest or counts, left out; name with --state what makes the state." in said
+    )
+    assert "unused: 'w0': force and 4 more" in text(call("fit", folder, *LINEAR, "-o", tmp_path / "p.npz"))
     assert "unused" not in text(call("inspect", folder, "--state", "x,y", "--differentiate"))
     assert "unused" not in text(call("inspect", recorded(tmp_path / "v", "t,x,y", made=stroke)))
 

@@ -381,7 +381,7 @@ def test_fit_prints_the_shares_that_its_json_holds(folder, tmp_path):
 
 def test_what_turns_the_other_way_has_no_negative_pace():
     told = uc.evaluation.verdicts.size_and_pace(np.ones(3), np.array([-0.33, -0.5, 0.8]))
-    assert "pace 0.33 times the other way (0.50 the other way to 0.80) the demonstrated" in told
+    assert "pace 0.33 times the other way (3 runs: 0.50 the other way to 0.80) the demonstrated" in told
     assert "the other way" not in uc.evaluation.verdicts.size_and_pace(np.ones(2), np.array([0.33, 0.5]))
 
 

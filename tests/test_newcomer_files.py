@@ -1087,6 +1087,33 @@ def test_a_column_that_is_asked_for_without_its_unit_is_named_with_it(tmp_path):
         assert ("Did you mean 'x_mm' or 'y_mm' or 'z_mm'?" in str(caught.value)) == said
 
 
+@pytest.mark.parametrize(("moves", "named"), [(True, "x,y"), (False, "x,y"), (True, "x,y,z")])
+@pytest.mark.parametrize("command", ["fit", "diagnose", "constraint"])
+def test_a_position_that_stands_still_in_the_first_recording_alone_is_not_forgotten(tmp_path, command, moves, named):
+    for k in range(4):
+        rows = turns(k, 0.0)
+        rows[:, 3] += 0.5 * np.sin(rows[:, 0] + k) * (moves and k > 0)
+        write(tmp_path / f"w{k}.csv", "t,x,y,z", rows)
+    how = {"fit": (*LINEAR, "-o", tmp_path / "p.npz"), "diagnose": ("--model", "affine")}
+    how = how.get(command, ("-o", tmp_path / "c.npz"))
+    said = text(call(command, tmp_path / "w*.csv", "--state", named, *how))  # --differentiate goes without saying
+    forgotten = moves and named == "x,y"
+    assert ("unused: 'w1', column 'z': moves by" in said) == forgotten
+    assert ("is not taken: --state x,y,z if the task depends on it." in said) == forgotten
+    assert ("Note: unused: the same of 'w2', 'w3', 3 in all." in said) == forgotten
+
+
+def test_inspect_says_of_some_of_the_positions_what_fit_does_with_them(tmp_path):
+    for k in range(3):
+        write(tmp_path / f"w{k}.csv", "t,x,y,z,a", np.insert(turns(k, 0.1), 4, k, axis=1))
+    said = text(call("inspect", tmp_path, "--state", "x,y"))
+    assert "fit uses x, y as states and their velocity" in said
+    learnt = text(call("fit", tmp_path, "--state", "x,y", *LINEAR, "-o", tmp_path / "p.npz"))
+    assert "Learnt from x, y as states and their velocity" in learnt
+    for command in (("inspect", tmp_path / "w*.csv"), ("fit", tmp_path / "w*.csv", "-o", tmp_path / "q.npz")):
+        assert "cannot tell the actions" in text(call(*command, "--state", "x,a"))  # which is no position
+
+
 @pytest.mark.parametrize("unit", [1.0, 1000.0])
 def test_millimetres_among_metres_are_said_to_be_and_make_no_common_plane(tmp_path, unit):
     for number in range(4):

@@ -13,7 +13,7 @@ import unconstrain as uc
 from seen import opened
 from test_cli import call, refused, run, write
 from unconstrain.base.display import percent
-from unconstrain.cli import informing
+from unconstrain.cli import informing, rolling
 from unconstrain.cli.informing import TOLD
 from unconstrain.constraints.mechanisms.kinds import Cylinder
 from unconstrain.evaluation.verdicts import Mark, Verdict, moves, of_replays, size_and_pace
@@ -217,7 +217,9 @@ def test_a_look_at_a_policy_that_moves_otherwise_begins_with_that(folder, tmp_pa
     assert run("look", *held, "-o", tmp_path / "a.html").startswith("✔ 3 demonstrations, nothing odd")
     said = run("look", *held, folder / "slow.npz", "-o", tmp_path / "b.html")
     assert said.startswith("! 3 demonstrations, nothing odd")
-    assert "But run from the same starts, 2 of 3 go round too small; 3 of 3 too slow." in " ".join(said.split())
+    assert "But run from the same starts, 2 of 3 go round too small ('held_5', 'held_3'); 3 of 3 too slow." in " ".join(
+        said.split()
+    )
 
 
 @pytest.mark.parametrize(("told", "mark"), [(0.75, "!"), (1.0, "✔")])
@@ -370,7 +372,7 @@ def test_strokes_that_are_too_large_are_not_outweighed_by_others_that_are_too_sm
     assert found.mark is Mark.DOUBTFUL
     assert found.said == "Good. But run from the same starts, 2 of 5 turn out too large and 2 too small."
     assert figures == (
-        "size 1.00 times (0.60 to 1.70) the demonstrated (in brackets, least to most of 5 runs), typically 3 mm "
+        "size 1.00 times (5 runs: 0.60 to 1.70) the demonstrated, typically 3 mm "
         "from the recorded path; beyond 0.83 to 1.20 times: size of 4 of 5"
     )
 
@@ -381,6 +383,24 @@ def test_one_that_is_another_movement_is_said_whatever_the_others_do():
     assert "But run from the same starts, 1 of 5 turn out too large." in found.said
     assert "beyond 0.83 to 1.20 times: size of 1 of 5" in figures
     assert added([1.0, 1.0, 1.0, 1.0, 1.3])[0].mark is Mark.GOOD  # as people vary
+
+
+def test_runs_that_stray_are_named_the_worst_first_and_all_of_them_beside_the_figures():
+    names, sizes, paces = [f"s{k}" for k in range(8)], np.ones(8), np.full(8, np.nan)
+    paces[2], sizes[[1, 3, 4, 6]] = 0.6, [1.3, 1.4, 1.5, 1.6]
+    said, _ = moves(sizes, paces, (), names)
+    assert said == "4 of 8 go round too large ('s6', 's4', 's3' and 1 more); 1 of 8 too slow ('s2')"
+    told = size_and_pace(sizes, paces, apart="3 mm", names=names)
+    assert told.startswith(
+        "size 1.15 times (8 runs: 1.00 to 1.60), pace 0.60 times (1 run) the demonstrated, typically"
+    )
+    assert told.endswith("size of 4 of 8 ('s6', 's4', 's3', 's1'), pace of 1 of 8 ('s2')")
+    nearly = moves(np.r_[np.ones(7), 1.39], paces * np.nan, (), names)
+    assert nearly == ("it nearly keeps size (not the size of 's7')", [])
+    assert (
+        moves(np.full(8, 1.6), paces * np.nan, (), names)[0] == "8 of 8 turn out too large"
+    )  # nobody to be told apart
+    assert moves(np.ones(8), np.ones(8), (), names)[0] == "it keeps size and pace"
 
 
 def test_what_is_poor_anyway_is_not_excepted_by_but():
@@ -446,6 +466,49 @@ def test_a_roll_out_keeps_to_the_mechanism_that_was_named(door, tmp_path):
     assert np.ptp(np.arctan2(path[:, 1], path[:, 0])) > 0.5
     np.testing.assert_allclose(np.hypot(path[:, 0], path[:, 1]), np.hypot(*start[:2]), atol=1e-3)
     np.testing.assert_allclose(path[:, 2], start[2], atol=2e-3)
+
+
+def test_a_start_off_the_hinge_is_said_to_be_with_the_nearest_one_on_it_to_copy(door, tmp_path):
+    place, _ = door
+    how = (
+        "rollout",
+        place / "p.npz",
+        "--constraint",
+        place / "c.npz",
+        "--steps",
+        20,
+        "--force",
+        "-o",
+        tmp_path / "o.csv",
+    )
+    off = swing(0)[20, 1:] * [1.1, 1.1, 1.0] + [0.0, 0.0, 0.06]
+    said = run(*how, "--least-support", "0", "--start", ",".join(map(str, off)))
+    assert said.startswith("!")
+    assert f"the start is 0.1 m off the circle (hinge) of {place / 'c.npz'}, and the run stays so, parallel" in words(
+        said
+    )
+    assert "passes through the start" not in words(said)
+    [start] = re.findall(r"Next: Start on it, at the nearest place:\n +--start (\S+)\n", said)
+    np.testing.assert_allclose([float(one) for one in start.split(",")], swing(0)[20, 1:], atol=2e-3)
+    for on in (start, ",".join(map(str, swing(2)[-1, 1:]))):  # as said, and as recorded with noise
+        told = words(run(*how, "--start", on))
+        assert "A circle (hinge) passes through the start." in told
+        assert "the start is" not in told
+
+
+@pytest.mark.parametrize("kind", ["Plane", "Line", "Circle", "Sphere", "Cylinder", "Screw"])
+def test_the_nearest_start_is_on_the_mechanism_whatever_that_is(tmp_path, kind):
+    held = uc.constraints.mechanisms.STORED[f"mechanisms.{kind}"](
+        centre=np.ones(3), frame=np.eye(3), radius=45.0, pitch=3.0, unit="mm"
+    )
+    uc.save(held, tmp_path / "m.npz")
+    path = SimpleNamespace(states=np.outer(np.arange(9.0), [9.0, 0.0, 5.0]))
+    said, then = rolling._off_held(held, tmp_path / "m.npz", (30.0, 20.0, 70.0), path)
+    assert re.match(rf"the start is [\d.]+ mm off the {kind.lower()}", said)
+    on = tuple(map(float, then.partition("--start ")[2].split(",")))
+    assert rolling._off_held(held, tmp_path / "m.npz", on, path) == ()
+    assert rolling._off_held(held, tmp_path / "m.npz", on, path, near=1e-5) == ()
+    assert rolling._off_held(held, None, (30.0, 20.0, 70.0), path) == ()  # given by --plane: it is where the start is
 
 
 def test_one_swing_may_be_a_habit_and_its_hinge_is_followed_with_that_doubt(door, tmp_path):
@@ -537,9 +600,7 @@ def test_a_fit_itself_says_how_its_policy_moves(folder, tmp_path):
     page = " ".join(unescape(re.sub(r"<[^>]*>", " ", (tmp_path / "p.html").read_text("utf-8"))).split())
     assert "on a plane of its own" in found["verdict"]["trust"]
     assert all(" ".join(found["verdict"][name].split()) in page for name in ("said", "trust", "doubt", "next"))
-    ran = (
-        r"size (\S+) times \(\S+ to \S+\), pace .*times.* the demonstrated \(in brackets, least to most of \d+ runs\), "
-    )
+    ran = r"size (\S+) times \(\d+ runs: \S+ to \S+\), pace .*times.* the demonstrated, "
     told = re.fullmatch(rf"{ran}typically \S+ mm from the recorded path.*", found["ran"])
     assert float(told[1]) == pytest.approx(found["replayed"]["extent"], abs=0.006)
     assert page.count(f"Run from the same starts: {found['ran']}.") == page.count(f"size {told[1]} times") == 1
@@ -809,10 +870,14 @@ def test_runs_that_are_held_where_a_stroke_lies_are_compared_free_too(tmp_path, 
     files, policy = to_a_goal(tmp_path, held), tmp_path / "p.npz"
     said = words(run("fit", *files, "--state", "x,y,z", "--model", "affine", "-o", policy))
     assert "un from the same starts, it keeps size" in said
-    for told in (said, words(run("info", policy)), words(run("export", policy, "-o", tmp_path / "p.c"))):
-        assert bool(re.search(r"each held to the plane \(\d\) or line \(\d\) that it lies in", told)) == held
+    assert bool(re.search(r"each held to the plane \(\d\) or line \(\d\) that it lies in", said)) == held
+    for told in (said, words(run("info", policy))):
         assert ("that it lies in: all that would go elsewhere if run free look held" in told) == held
         assert "if they were free strokes" not in told  # which diagnose does not doubt either
+    start = ("--start", "100,100,100", "-o", tmp_path / "r.csv")
+    for other in (("export", policy, "-o", tmp_path / "p.c"), ("rollout", policy, *start), ("certify", policy)):
+        shown = call(*other)
+        assert "each held to" not in words(shown.out + shown.err)  # fit said it, and they have their own news
     named = re.findall(r"'(s\d)'", said.partition("each held to the ")[2].partition("each held to the ")[2])
     assert (len(named) > 4 and named == [*dict.fromkeys(named)]) == held  # by name in the body, where they are many
     few = json.loads(run("score", policy, *files[:3], "--json"))["verdict"]["said"]
@@ -941,7 +1006,7 @@ def test_rails_are_named_as_lines_and_free_strokes_are_not(tmp_path):
     table = re.findall(r" (s\d) 200 ([a-z ]+) [<>]?\d+% [<>]?\d+%", said)
     assert sorted(table) == sorted((name, short.get(one, one)) for name, one in looks.items())  # all, as JSON says
     others = {"line", "flat", "untold"} & {*looks.values()}
-    assert ("; on a plane, on a line and undecided it tells nothing:" in said) == bool(others)
+    assert ("; on a plane, on a line, winding and undecided it tells nothing:" in said) == bool(others)
     alone = "diagnose", *[tmp_path / f"s{k}.csv" for k in range(4)], *how[2:]
     assert "on a line that others leave (held to it, as by a rail" in words(run(*alone))
 

@@ -154,6 +154,26 @@ class TestSupport:
         assert (ended.trust, ended.next) == ("The first 1.00 s.", "Go on.")
         assert ended.said.startswith("It stops. No demonstration passes near for 33% of the time, first at 1.00 s")
 
+    @pytest.mark.parametrize(
+        ("rows", "least", "mark", "begins", "doubt"),
+        [
+            ([0, 1], 0.5, Mark.GOOD, "Near demonstrations for all 399.00 s but the first 2: supported.", ""),
+            ([0, 1], 0.0, Mark.DOUBTFUL, "No demonstration passes near for", "Where none passes (first at 0.00 s)."),
+            ([200], 0.5, Mark.DOUBTFUL, "No demonstration passes near for", "Where none passes (first at 200.00 s)."),
+            (range(20), 0.5, Mark.DOUBTFUL, "No demonst", "Where none passes (first at 0.00 s)."),
+            (range(99, 199), 0.5, Mark.DOUBTFUL, "No", "All from 99.00 s on: where none passes, and after it."),
+            ([399], 0.5, Mark.DOUBTFUL, "No", "All from 399.00 s on: where none passes, and after it."),
+        ],
+    )
+    def test_a_moment_far_from_demonstrations_does_not_spoil_all_that_comes_after(
+        self, rows, least, mark, begins, doubt
+    ):
+        support = np.ones(400)
+        support[list(rows)] = least
+        found = verdicts.of_support(support, np.arange(400.0))
+        assert (found.mark, found.doubt) == (mark, doubt)
+        assert found.said.startswith(begins)
+
     def test_how_far_a_movement_may_be_off_is_said_of_its_middle(self):
         for off, said in (([0.0, 0.3, 0.3, 30.0], "about 30% of"), ([9.0, 9.0, 9.0, 10.0], "as much as")):
             found = verdicts.of_support(np.ones(4), np.arange(4.0), np.array(off))

@@ -97,7 +97,7 @@ def _say(found: uc.evaluation.Diagnosis, states: Sequence[str], actions: Sequenc
     free = sorted(found.movements, key=lambda one: -(one.free or 0.0))
     said = f"Mean probability that a sample was free; above {percent(about.FREE)} a demonstration looks free, below "
     said += f"{percent(about.CONSTRAINED)} constrained, and a policy is learnt from both"
-    said += "; on a plane, on a line and undecided it tells nothing" * bool(others)
+    said += "; on a plane, on a line, winding and undecided it tells nothing" * bool(others)
     half = len(free) if all_ else MOST_LISTED // 2
     ends, left = [*free[:half], *free[half:][-half:]], max(len(free) - 2 * half, 0)
     rows = [[one.name, str(one.samples), about.LOOKS[str(one.looks)].partition(" that ")[0].partition(" (")[0],

@@ -7,7 +7,7 @@ import io
 import json
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -19,7 +19,7 @@ from ..base.display import counted, innermost, unit_of
 from ..base.errors import DivergedError, InvalidDataError, SettingError, SupportEndsWarning
 from ..base.files import write
 from .constraining import hand_of, held_of, options_for_held
-from .informing import TOLD, doubted
+from .informing import TOLD, WHERE, doubted
 from .printing import doubt_degrees, of_option, option_for_json, say_verdict, say_written, show_warning
 from .reading import fitted_policy, numbers, of_words, to_copy
 from .scoring import support_of
@@ -41,9 +41,7 @@ from .writing import check_outputs, option_for_force
     help="Centre of a ball to go round, and its radius; or of an ellipsoid, and its radii. More than once for several.",
 )
 @of_words(
-    "--method",
-    "euler rk4 adaptive",
-    "How a step is taken: Runge-Kutta by default, or by euler as the loop of a controller does.",
+    "--method", "euler rk4 adaptive", "How: Runge-Kutta by default, or by euler as the loop of a controller does."
 )
 @click.option(
     "--order",
@@ -92,7 +90,8 @@ def rollout(
     path, why, trouble = _as_far_as_it_goes(moving, list(start), constraint=held, task=task, obstacles=round_, **how)
     named = recipe if recipe.states else uc.Recipe(tuple(f"x{i + 1}" for i in range(len(start))))
     kept = f"the plane{' that its hand keeps to' * bool(arm)}" if plane is not None else getattr(held, "title", "")
-    verdict = to_copy(_supported(moving, path, why, round_, kept, notes), policy, notes)
+    by = (kept, *_off_held(held, constraint, start, path))
+    verdict = to_copy(_supported(moving, path, why, round_, by, notes), policy, notes)
     accelerations = named.actions or tuple(f"a{name}" for name in (named.states or ())[:places])
     columns = ["t", *sum(replace(named, actions=accelerations if how["order"] == 2 else None).labels({}), ())]
     if output != "-":
@@ -114,9 +113,8 @@ def _obstacle(given: tuple[float, ...], n: int) -> uc.motion.obstacles.Ellipsoid
     import numpy as np
 
     if len(given) not in {n + 1, 2 * n}:
-        raise SettingError(
-            f"--obstacle: got {len(given)} numbers, expected {n} of a centre, then a radius or {n} radii."
-        )
+        said = f"--obstacle: got {len(given)} numbers, expected {n} of a centre, then a radius or {n} radii."
+        raise SettingError(said)
     with of_option("--obstacle"):
         return uc.motion.obstacles.Ellipsoid(np.array(given[:n]), given[n:] if len(given) > n + 1 else given[n])
 
@@ -153,22 +151,43 @@ def _as_far_as_it_goes(policy: uc.Policy, start: list[float], **how: Any) -> tup
 
 
 def _supported(
-    moving: uc.Policy | uc.Guided, path: Any, why: str, obstacles: Sequence[Any], held: str, notes: Mapping[str, Any]
+    moving: uc.Policy | uc.Guided, path: Any, why: str, obstacles: Sequence[Any], by: Sequence[str], notes: Any
 ) -> uc.evaluation.verdicts.Verdict:
-    """How near data is along a movement, whether it tells the policy, what ``held`` it, and what ``fit`` doubted."""
-    verdicts, policy, told = uc.evaluation.verdicts, innermost(moving), notes.get(TOLD) or 0.0
+    """How near data is along a movement, whether it tells the policy, ``by`` what it was held, what ``fit`` doubted."""
+    verdicts, policy, told, (held, *off) = uc.evaluation.verdicts, innermost(moving), notes.get(TOLD) or 0.0, by
     untold = None if told >= verdicts.MOSTLY else uc.evaluation.diagnosis.untold(policy, path)
     found = verdicts.of_support(support_of(policy, path.states), path.times, untold)
     found = verdicts.of_early_end(found, why) if why else found
     unit = unit_of(uc.Recipe.from_dict(notes.get("recipe", {})).labels(notes.get("units", {}))[0])
-    passes = f" {held[:1].upper()}{held[1:]} passes through the start." * bool(held)
+    passes = f" {held[:1].upper()}{held[1:]} passes through the start." * bool(held and not off)
     passes += _off_goal(moving, path, held, unit or "(unit of the states)")
-    found = verdicts.of_fit(found._replace(said=f"{found.said}{passes}"), doubted(moving, notes))
+    found = found._replace(said=f"{found.said}{passes}")
+    found = verdicts.doubted(found, off[0])._replace(next=off[1]) if off else found
+    found = verdicts.of_fit(found, doubted(moving, notes))
     if not obstacles:
         return found
     nearest = min((float(one(path.states)[0].min()), number) for number, one in enumerate(obstacles, start=1))
     clear = f"It keeps clear of {counted(len(obstacles), 'obstacle')}, at the nearest of number {nearest[1]} by "
     return found._replace(said=f"{found.said} {clear}{nearest[0]:.0%} of its radius.")
+
+
+def _off_held(held: Any, file: Any, start: Sequence[float], path: Any, near: float = 0.01) -> Sequence[str]:
+    """That a start is off the mechanism that holds it, beyond ``near`` of how far that was recorded, and the cure."""
+    import numpy as np
+
+    if file is None or not isinstance(held, uc.constraints.mechanisms.Mechanism) or held.form.ties:
+        return ()
+    notes, places, group = uc.storage.load_notes(file), len(held.centre), np.zeros(1, dtype=np.intp)
+    at = first = np.array([start[:places]])
+    for _ in range(3):  # a thread bends on the way
+        rows, track = held.rows(at), uc.constraints.mechanisms.track.Track(at, group, np.empty((1, 0)))
+        at = at - np.einsum("nk,nkd->nd", held.residuals(track), rows)
+    far, wide = np.linalg.norm(at - first), np.ptp(notes.get(WHERE) or path.states[:, :places], axis=0)
+    if far <= near * np.linalg.norm(wide):
+        return ()
+    said = f"the start is {far:.3g} {held.unit or '(unit of the states)'} off the {held.title[2:]} of {file}"
+    onto = ",".join(f"{one:.6g}" for one in (*at[0], *start[places:]))
+    return f"{said}, and the run stays so, parallel to it", f"Start on it, at the nearest place:\n--start {onto}"
 
 
 def _off_goal(moving: Any, path: uc.Demonstration, held: str, unit: str, near: float = 0.02) -> str:

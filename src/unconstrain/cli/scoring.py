@@ -32,14 +32,7 @@ HERE = "the starts of these recordings"
 @options_for_reading
 @options_for_held("that held these recordings, to score under it, too")
 @option_for_json
-def score(
-    policy: str,
-    files: Sequence[str],
-    plane: tuple[float, ...] | None,
-    constraint: str | None,
-    as_json: bool,
-    **reading: Any,
-) -> None:
+def score(policy: str, files: Sequence[str], plane: Any, constraint: str | None, as_json: bool, **reading: Any) -> None:
     """Score how well POLICY explains recordings.
 
     The demonstrations in each FILE are read and prepared as the training data of the policy was, but for what options

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
-from ..base.display import counted, percent, percents
+from ..base.display import counted, listed, percent, percents
 from ..models import SUPPORTED
 from .marks import ENOUGH, FAIR, FAR_OFF, FEW, FORBIDDEN, MISFIT, OTHERWISE, PARTLY, UNITS, graded, no_better
 from .marks import GOOD as GOOD
@@ -37,7 +37,6 @@ MORE = (
 TOO_SLOW = Verdict(
     Mark.DOUBTFUL, "Too slow to be judged: all is below ten times its noise.", next="Score faster motion."
 )
-
 
 UNGUIDED = "Fit without --guided, which does better; or guide it to another goal or cycle, or show all of it."
 """What helps where guiding spoils a policy."""
@@ -394,16 +393,24 @@ def of_support(support: Array, times: Array | None, unknown: Array | None = None
     ``unknown`` is how much of each action no recording tells, as a standard deviation, as a share of a typical one.
     """
     seconds = np.arange(len(support), dtype=np.float64) if times is None else times
-    away = support < NEARBY
+    away, every = support < NEARBY, f"Near demonstrations for all {seconds[-1]:.2f} s"
+    first, brief, lasting = (
+        int(away.argmin()),
+        0.01,
+        0.1,
+    )  # shares of all: as at the edge of what was recorded, and more
+    if 0 < first == away.sum() < brief * len(away) and support.min() >= SUPPORTED:
+        away, every = np.zeros_like(away), f"{every} but the first {seconds[first]:.2g}"
     open_ = np.zeros_like(away) if unknown is None else (unknown > SMALL) & ~away
     if not (off := away | open_).any():
-        return Verdict(Mark.GOOD, f"Near demonstrations for all {seconds[-1]:.2f} s: supported.")
+        return Verdict(Mark.GOOD, f"{every}: supported.")
     begins = f"{seconds[int(off.argmax())]:.2f} s"
     trust = f"The first {begins}." if off.argmax() and unknown is not None else ""
     mark = Mark.BAD if (support < SUPPORTED).mean() > 0.5 else Mark.DOUBTFUL
     none = f"No demonstration passes near for {_part(away, seconds)}: extrapolated."
     if unknown is None or not open_.any():
         doubt = f"All from {begins} on: where none passes, and after it."
+        doubt = doubt if away[-1] or away.mean() >= lasting else f"Where none passes (first at {begins})."
         return Verdict(mark, none, trust, doubt, "Start nearer, or demonstrate there.")
     middle, worst = float(np.median(unknown[open_])), seconds[int(np.where(open_, unknown, 0.0).argmax())]
     said = f"{none} Near some" if away.any() else "Near demonstrations"
@@ -437,18 +444,18 @@ def of_replays(found: Verdict, said: str, strays: Sequence[str], starts: str = "
     )
 
 
-def moves(extents: Array, paces: Array, lasts: Any = ()) -> tuple[str, list[str]]:
+def moves(extents: Array, paces: Array, lasts: Any = (), names: Sequence[str] = ()) -> tuple[str, list[str]]:
     """How runs move, the rest of a sentence, empty without any; and in what they stray.
 
     ``extents`` and ``paces`` are size and turns of each run over those of its demonstration, NaN where there are none,
-    and ``lasts`` the size of the last round over that of the first, over the same.
+    and ``lasts`` the size of the last round over that of the first, over the same; ``names`` are those of runs.
     A quarter (of two, one) may be off by :data:`OTHERWISE` either way, which nearly keeps them, but none by
     :data:`FAR_OFF`.
     """
-    measured, many = _measured(extents, paces, lasts), len(extents)
+    measured, many = _measured(extents, paces, lasts, names=names), len(extents)
     goes = ("go round" if many > 1 else "goes round") if "pace" in measured else f"turn{'s' * (many == 1)} out"
     said, strays = list[str](), list[str]()
-    for name, (ratios, off) in measured.items():
+    for name, (ratios, off, beyond) in measured.items():
         if (off > _OFF).mean() > (FEW if many >= ENOUGH else 0.5) or off.max() > np.log(FAR_OFF):
             wrong = ratios[off > _OFF]
             ways = zip((wrong > 1, (wrong >= 0) & (wrong <= 1), wrong < 0), _WRONG[name], strict=True)
@@ -456,39 +463,47 @@ def moves(extents: Array, paces: Array, lasts: Any = ()) -> tuple[str, list[str]
             (first, way), *rest = given
             who = f"{first} of {many} " if many > 1 else "it " * (not said)
             those = " and ".join([f"{who}{f'{goes} ' * (not said)}{way}", *(f"{count} {way}" for count, way in rest)])
-            said.append("in the last round " * (name == LAST) + those)
+            said.append("in the last round " * (name == LAST) + those + _in_brackets(beyond, 3))
             strays.append(name.replace(LAST, "size"))
-    nearly = "nearly " * any((by > _OFF).any() for _, by in measured.values())
+    nearly = "nearly " * any((by > _OFF).any() for _, by, _ in measured.values())
     kept = " and ".join(name for name in measured if name != LAST)
-    return (("; " if many > 1 else " and ").join(said) if said else f"it {nearly}keeps {kept}" * bool(kept)), [
-        *dict.fromkeys(strays)
-    ]
+    kept += _in_brackets([f"not the {name} of {one}" for name, (*_, beyond) in measured.items() for one in beyond], 3)
+    told = ("; " if many > 1 else " and ").join(said) if said else f"it {nearly}keeps {kept}" * bool(kept)
+    return told, [*dict.fromkeys(strays)]
 
 
-def size_and_pace(extents: Array, paces: Array, lasts: Any = (), of: str = "", apart: str = "") -> str:
+def size_and_pace(*of_runs: Any, of: str = "", apart: str = "", names: Sequence[str] = ()) -> str:
     """Figures of :func:`moves`, ``of`` some, if not all, and how far ``apart`` from recorded states, with its unit."""
-    measured, many = _measured(extents, paces, lasts), len(extents)
-    told = ", ".join(f"{name} {_times(ratios)}" for name, (ratios, _) in measured.items())
-    runs = f" (in brackets, least to most of {many} runs)" if "(" in told else ""
-    counts = {name: int((by > _OFF).sum()) for name, (_, by) in measured.items()}
-    off = ", ".join(f"{name} of {count} of {many}" for name, count in counts.items() if count)
+    measured, many = _measured(*of_runs, names=names), len(of_runs[0])
+    told = ", ".join(f"{name} {_times(ratios, many)}" for name, (ratios, *_) in measured.items())
+    counts = {name: (int((by > _OFF).sum()), _in_brackets(who)) for name, (_, by, who) in measured.items()}
+    off = ", ".join(f"{name} of {count} of {many}{who}" for name, (count, who) in counts.items() if count)
     which = f"{'' if off else 'none '}beyond {1 / OTHERWISE:.2f} to {OTHERWISE:.2f} times{off and f': {off}'}"
     which = f"; {which}" * (many > 1)
-    return f"{of}{told} the demonstrated{runs}, typically {apart} from the recorded path{which}" if told else ""
+    return f"{of}{told} the demonstrated, typically {apart} from the recorded path{which}" if told else ""
 
 
-def _measured(*given: Sequence[float] | Array) -> dict[str, tuple[Array, Array]]:
-    """Finite ratios by name, and how far off one they are as they are printed, as logarithms."""
-    named = zip(("size", "pace", LAST), map(np.asarray, given), strict=True)
-    found = {name: ratios[np.isfinite(ratios)] for name, ratios in named}
-    return {name: (one, np.abs(np.log(np.maximum(one.round(2), 1e-9)))) for name, one in found.items() if len(one)}
+def _measured(*given: Any, names: Sequence[str] = ()) -> dict[str, tuple[Array, Array, list[str]]]:
+    """Finite ratios, how far off one they are as printed, as logarithms, and who is beyond, worst first, if not all."""
+    found = {}
+    for name, values in zip(("size", "pace", LAST), map(np.asarray, given), strict=False):
+        runs = np.flatnonzero(np.isfinite(values))
+        off = np.abs(np.log(np.maximum(values[runs].round(2), 1e-9)))
+        worst = runs[np.argsort(-off, kind="stable")[: (off > _OFF).sum()]]
+        found[name] = values[runs], off, [repr(names[run]) for run in worst if len(worst) < len(names)]
+    return {name: one for name, one in found.items() if len(one[0])}
 
 
-def _times(ratios: Array) -> str:
-    """The middle one, and the range of several that differ."""
+def _in_brackets(names: Sequence[str], most: int = 30) -> str:
+    return f" ({listed(names, most)})" * bool(names)
+
+
+def _times(ratios: Array, of: int) -> str:
+    """The middle one, and the range of several that differ; of how many, where that is not of all."""
     least, middle, most = (float(one) for one in (ratios.min(), np.median(ratios), ratios.max()))
     ends, said = (_either_way(least), _either_way(most)), _either_way(middle, " times")
-    return said if ends[0] == ends[1] else f"{said} ({ends[0]} to {ends[1]})"
+    runs, apart = counted(len(ratios), "run"), ends[0] != ends[1]
+    return f"{said} ({runs}{f': {ends[0]} to {ends[1]}' * apart})" if apart or len(ratios) < of else said
 
 
 def _either_way(ratio: float, times: str = "") -> str:

@@ -125,8 +125,14 @@ def replayed(
     measured = {"extent": extents, "pace": paces, "last_round": lasts, "apart": apart}
     finite = {name: values[np.isfinite(values)] for name, values in measured.items()}
     told = {name: float(np.median(values)) if len(values) else None for name, values in finite.items()}
+<<<<<<< HEAD
     alike = "" if held is not None else " that look flat (on a line, in a plane), round or free"
     (words, strays), of = verdicts.moves(extents, paces, lasts), "of those that stay, " * bool(gone)
+=======
+    alike = "" if held is not None else " that look flat (on a line, in a plane) or free"
+    ratios, names = (extents, paces, lasts), [one.done.name for one in known if one.away is None]
+    (words, strays), of = verdicts.moves(*ratios, names), "of those that stay, " * bool(gone)
+>>>>>>> words3
     if gone:
         named = listed([f"'{name}' (after {seconds:.2g} s)" for name, seconds in gone.items()], 4)
         away = f"it runs away, to more than {AWAY:g} times the extent of what was recorded, from {named}"
@@ -135,10 +141,10 @@ def replayed(
         some = f"{len(known)} of {len(demos)} demonstrations"
         why = "; what held the others, if anything, they do not tell well enough" * (held is None and len(runs) < MOST)
         words, of = f"{words}, as far as compared ({some}{why})", f"for {some}{alike}, {of}"
-    on = _held_on(policy, known, demos, recipe) if held is None else ("", "")
-    both = words, verdicts.size_and_pace(extents, paces, lasts, of, said)
-    words, figures = (one and one + more for one, more in zip(both, on, strict=True))
-    judged = _advised(verdicts.of_replays(found, words, strays, starts), found, policy, demos)
+    short, long = _held_on(policy, known, demos, recipe) if held is None else ("", "")
+    figures = verdicts.size_and_pace(*ratios, of=of, apart=said, names=names)
+    figures += long * bool(figures)
+    judged = _advised(verdicts.of_replays(found, words and words + short, strays, starts), found, policy, demos)
     return Replayed(judged, told | {"away": gone}, runs, figures, words)
 
 
@@ -157,11 +163,12 @@ def _held_on(policy: Any, runs: Sequence[Replay], demos: Sequence[Demonstration]
     few, looks = every if len(held) <= MOST_NAMED else few, dict[str, str | None]()
     with suppress(UnconstrainError):  # where recordings are others than it was learnt from nothing is known
         looks = {one.name: one.looks for one in diagnosis.diagnose(innermost(policy), demos).movements}
-    said = ": all that would go elsewhere if run free look held"
+    said = [": all that would go elsewhere if run free look held"] * 2
     if open_ := [repr(name) for _, name in off[::-1] if looks.get(name) != "constrained"]:
         if_free = f"{'they were free strokes' if open_[1:] else 'it was a free stroke'}, which recordings do not tell"
-        said = f"; {listed(open_, 4)} would go elsewhere if run free, so the policy is wrong there if {if_free}"
-    return f"; each held to the {few} that it lies in{said}", f"; each held to the {every} that it lies in{said}"
+        then = f" would go elsewhere if run free, so the policy is wrong there if {if_free}"
+        said = [f"; {listed(open_, most)}{then}" for most in (3, 30)]
+    return [f"; each held to the {kind} that it lies in{one}" for kind, one in zip((few, every), said, strict=True)]
 
 
 def _farthest(one: Replay) -> float:
@@ -195,10 +202,8 @@ def retraced(found: verdicts.Verdict, policy: Policy | Guided, *of: Any) -> Repl
 
 def _strays(guided: Any, plain: Any, demos: Any, recipe: Recipe, _: Any, units: Mapping[str, str], *__: Any) -> str:
     """How far guided runs go from recorded paths, the rest of a sentence; empty where unguided ones do nearly so."""
-    most, least = (
-        max((_farthest(one) for one in runs if one.held), default=none)
-        for runs, none in ((guided, 0.0), (plain, np.inf))
-    )
+    most = max((_farthest(one) for one in guided if one.held), default=0.0)
+    least = max((_farthest(one) for one in plain if one.held), default=np.inf)
     if most <= max(FARTHER * least, STRAYS * float(np.linalg.norm(np.ptp(stack(demos).states, axis=0)))):
         return ""
     unit = unit_of(recipe.labels(units)[0]) or "(unit of the states)"
@@ -271,10 +276,8 @@ def replays(
     moving, near = bounded(policy, stack(demos).states)
     runs = rollout(moving, starts, steps, dt, own, task=task, least_support=0.0)
     cut = [run[: round(seconds / dt) + 1] for run, seconds in zip(runs, lasted, strict=True)]
-    return [
-        _compared(one, run, along, how, near(run.states))
-        for one, run, (_, along), how in zip(chosen, cut, shapes, known, strict=True)
-    ]
+    every = zip(chosen, cut, shapes, known, strict=True)
+    return [_compared(one, run, along, how, near(run.states)) for one, run, (_, along), how in every]
 
 
 def _shape(policy: Any, demo: Demonstration) -> tuple[Array, Array]:

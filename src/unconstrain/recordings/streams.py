@@ -22,6 +22,7 @@ from ..base.foreign import Stamp, unchanged
 from ..models import spaces
 from .demonstration import Demonstration, Recording, noise_of, times_of
 from .preparation import Recipe, decide, prepare
+from .preparation.decisions import unused
 from .preparation.movements import prepare_one, warn
 from .preparation.plausibility.outlines import Outline
 from .preparation.plausibility.sets import compare, outline
@@ -234,6 +235,8 @@ class Stream:
         if before:
             said = f"has more than {WHOLE_ROWS:,} rows, so it is prepared in parts; rest after the first is kept."
             warn(recording.title, [Remark("in-parts", said)])
+        elif recording.title != self.first.title:  # what stands still in the first may move in another
+            warn(recording.title, unused(self.recipe, self.recipe, recording))
         prepared = prepare_one(subject)
         source = prepared.source
         return replace(prepared, source=None if source is None else source._replace(rows=source.rows + before))

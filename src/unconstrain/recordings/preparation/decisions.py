@@ -103,6 +103,8 @@ def unused(asked: Recipe, decided: Recipe, recording: Recording) -> tuple[Remark
     cure = f"angles={(*decided.angles, *angles)}" + f" and degrees={tuple(degrees)}" * bool(degrees)
     told = f"looks like an angle, and is left out; take it in with {cure}."
     others = listed([name for name in moving if name not in angles], 8)
+    more = len({*recording.columns} - {*used, *moving})
+    others += f" and {more} more, at rest or counts," * bool(others and more)
     note = Remark("unused", f"{others} left out; name with states= what makes the state.")
     return (*(Remark("angle-unused", told, one) for one in angles[:1]), *[note] * bool(others))
 

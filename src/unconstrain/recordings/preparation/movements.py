@@ -26,7 +26,7 @@ from ..signals.smoothing import LEAST, kalman_velocities, white_noise
 from ..signals.stillness import rest_at_ends, stands
 from .continuity import continuous
 from .cutting import between_stands
-from .decisions import decide
+from .decisions import decide, unused
 from .plausibility.checks import examine, is_irregular
 from .plausibility.sets import PUSHED, compare, outline
 from .plausibility.subject import GAP_INTERVALS, Subject
@@ -111,6 +111,8 @@ def prepare(recordings: Recording | Sequence[Recording], recipe: Recipe | None =
         raise InvalidDataError("got no recording, expected at least one.")
     whole, remarks = decide(recipe or Recipe(), every[0])
     warn(every[0].title, remarks, stacklevel=3)
+    for one in every[1:]:  # what stands still in the first may move in another
+        warn(one.title, unused(whole, whole, one), stacklevel=3)
     subjects = [Subject(one, whole) for recording in every for one in between_stands(Subject(recording, whole))]
     demonstrations = [prepare_one(subject, stacklevel=4) for subject in subjects]
     for subject, remarks in zip(subjects, compare([outline(subject) for subject in subjects]), strict=True):

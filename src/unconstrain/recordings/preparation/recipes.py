@@ -281,7 +281,7 @@ def _with_columns(recipe: Recipe, recording: Recording) -> Recipe:
     actions = states and guess_actions(columns, states)
     if actions:
         return replace(told, states=states, actions=actions)
-    if states and states == _with_turning(told, positions_in(columns)):
+    if states and {*states} <= {*(_with_turning(told, positions_in(columns)) or ())}:
         return replace(told, states=states, differentiate="savgol")
     raise UntoldError(
         f"'{recording.name}': cannot tell {'the actions' if states else 'states and actions'} from its columns "
