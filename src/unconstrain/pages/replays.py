@@ -125,14 +125,9 @@ def replayed(
     measured = {"extent": extents, "pace": paces, "last_round": lasts, "apart": apart}
     finite = {name: values[np.isfinite(values)] for name, values in measured.items()}
     told = {name: float(np.median(values)) if len(values) else None for name, values in finite.items()}
-<<<<<<< HEAD
     alike = "" if held is not None else " that look flat (on a line, in a plane), round or free"
-    (words, strays), of = verdicts.moves(extents, paces, lasts), "of those that stay, " * bool(gone)
-=======
-    alike = "" if held is not None else " that look flat (on a line, in a plane) or free"
     ratios, names = (extents, paces, lasts), [one.done.name for one in known if one.away is None]
     (words, strays), of = verdicts.moves(*ratios, names), "of those that stay, " * bool(gone)
->>>>>>> words3
     if gone:
         named = listed([f"'{name}' (after {seconds:.2g} s)" for name, seconds in gone.items()], 4)
         away = f"it runs away, to more than {AWAY:g} times the extent of what was recorded, from {named}"
