@@ -383,7 +383,7 @@ def of_files(found: Verdict, *held: LearntConstraint) -> Verdict:
     named, (first, *others) = [one.mechanism_ for one in held if one.mechanism_], held
     what = f"the mechanism, {named[0].title}" if named else f"what was learnt, by {first.choice_.name} features"
     said = f"The file holds to {what}: {first.rank_} of {first.choice_.actions} directions."
-    each = f"{len(named)} of the {len(held)} files hold to mechanisms, the others to what was learnt."
+    each = f"{len(named) or 'None'} of the {len(held)} files hold to mechanisms, the others to what was learnt."
     each = f"All {len(held)} files hold to mechanisms." if len(named) == len(held) else each
     return found._replace(said=f"{found.said} {each if others else said}")
 
