@@ -574,3 +574,7 @@ def test_what_is_flat_free_or_out_of_order_keeps_to_nothing_round():
     assert uc.constraints.kept(1.2 * np.random.default_rng(0).permutation(ring) + noise((300, 2), size=0.1)) is None
     assert uc.constraints.kept(np.ones((300, 2))) is None
     assert uc.constraints.kept(ring[:5]) is None
+    assert uc.constraints.kept(ring.astype(np.float32)).kind == "circle"
+    blinking = np.zeros((400, 3))
+    blinking[1::2] = 1.0  # what is looked at stands still
+    assert uc.constraints.kept(blinking) is None

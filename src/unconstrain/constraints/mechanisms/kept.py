@@ -13,6 +13,9 @@ from .identify import FEWEST, LIKELY, identify
 from .mechanism import Mechanism
 from .track import noise_by_differences, turns
 
+SMALLEST = 1e-9
+"""Share of their distance from their middle below which positions that are looked at do not move."""
+
 ROUND = ("circle", "sphere", "cylinder", "screw")
 
 WITHIN, EXACT, NEAR = 1.5, 1e-5, 0.05
@@ -49,18 +52,21 @@ def kept(positions: Array, wound: bool = False) -> Mechanism | None:
     >>> uc.constraints.kept(0.4 * np.column_stack([np.cos(turn), np.sin(turn)]) + noise).kind
     'circle'
     """
-    spread = float(np.sqrt(positions.var(axis=0).sum()))
-    if len(positions) < FEWEST or spread == 0.0:
+    if len(positions) < FEWEST:
+        return None
+    middle = positions.mean(axis=0, dtype=np.float64)
+    thinned = positions[:: -(-len(positions) // MOST_POSITIONS)] - middle
+    spread = float(np.sqrt(thinned.var(axis=0).sum()))
+    if spread <= SMALLEST * float(np.abs(thinned).max()):
         return None
     white = noise_by_differences(positions, np.zeros(len(positions), dtype=np.intp))
     most = max(min(WITHIN * white, NEAR * spread), EXACT * spread)
     if _off_quadric(positions) > most:
         return None
-    thinned = positions[:: -(-len(positions) // MOST_POSITIONS)]
-    likely = _likely((thinned - positions.mean(axis=0)).tobytes(), positions.shape[1])
+    likely = _likely(thinned.tobytes(), positions.shape[1])
     round_ = all(one.kind in ROUND and not one.vague for one, _ in likely)
     found, off = min(likely, key=lambda one: one[0].rank)
-    found = replace(found, centre=found.centre + positions.mean(axis=0))
+    found = replace(found, centre=found.centre + middle)
     turned = not wound or max(turns([normals]) for normals in found.rows(positions).swapaxes(0, 1)) >= WOUND
     return found if round_ and off <= most and turned else None
 
