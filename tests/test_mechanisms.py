@@ -578,3 +578,9 @@ def test_what_is_flat_free_or_out_of_order_keeps_to_nothing_round():
     blinking = np.zeros((400, 3))
     blinking[1::2] = 1.0  # what is looked at stands still
     assert uc.constraints.kept(blinking) is None
+    for count in (13, 50, 77, 100, 333):
+        assert uc.constraints.kept(np.tile([0.1, 0.2, 0.3], (count, 1))) is None  # the mean of which is rounded
+    for rounds in (3.0, 11.5, 12.0, 17.0, 24.0):  # as many as the parts that are compared, too
+        turn = 2 * np.pi * rounds * np.linspace(0.0, 1.0, 800)
+        pot = 0.1 * np.column_stack([np.cos(turn), np.sin(turn), 0.5 * np.sin(turn / 7)]) + noise((800, 3), size=3e-4)
+        assert uc.constraints.kept(pot, wound=True) is not None, rounds

@@ -750,7 +750,7 @@ def test_what_keeps_to_a_plane_that_others_cross_is_not_called_free(tmp_path):
     assert {one["looks"] for one in found["movements"]} == {"flat"}
     assert sum(one["free"] > 0.5 for one in found["movements"]) >= 5  # as estimated from what the plates leave
     assert "How 6 demonstrations look: 6 on a plane that others cross (held to it, or short free strokes)." in said
-    assert "No sample is said to be free: each demonstration looks held, by a plane, line or surface of its own" in said
+    assert "No sample is said to be free: each demonstration looks held, by a plane, a line or another surface" in said
     assert "Of the samples" not in said
     assert "Mean probability that a sample was free" not in said
     page = (tmp_path / "a.html").read_text("utf-8")

@@ -157,7 +157,7 @@ class TestSupport:
     @pytest.mark.parametrize(
         ("rows", "least", "mark", "begins", "doubt"),
         [
-            ([0, 1], 0.5, Mark.GOOD, "Near demonstrations for all 399.00 s but the first 2: supported.", ""),
+            ([0, 1], 0.5, Mark.GOOD, "Near demonstrations for all 399.00 s but the first 2 s: supported.", ""),
             ([0, 1], 0.0, Mark.DOUBTFUL, "No demonstration passes near for", "Where none passes (first at 0.00 s)."),
             ([200], 0.5, Mark.DOUBTFUL, "No demonstration passes near for", "Where none passes (first at 200.00 s)."),
             (range(20), 0.5, Mark.DOUBTFUL, "No demonst", "Where none passes (first at 0.00 s)."),

@@ -47,9 +47,7 @@ def _levelled(_: click.Context, __: click.Parameter, scale: Any) -> Any:
 LEVELS: dict[str, Any] = {"type": scale_of, "default": "none", "metavar": "AUTO|NONE|A,B,...", "callback": _levelled}
 
 options_for_model = with_options(
-    of_words(
-        "--model", " ".join(MODELS), "Model of the policy; auto takes what explains most where held out.", "local"
-    ),
+    of_words("--model", " ".join(MODELS), "Model of the policy; auto takes that of least estimated error.", "local"),
     click.option(
         "--variance",
         type=float,

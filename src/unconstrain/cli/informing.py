@@ -168,7 +168,9 @@ def verdict_of(held: Any, notes: Mapping[str, Any]) -> uc.evaluation.verdicts.Ve
         return uc.evaluation.verdicts.Verdict(uc.evaluation.verdicts.Mark.DOUBTFUL, said)
     if isinstance(held, uc.LearntConstraint):
         verdicts, shown = uc.evaluation.verdicts, notes.get(SHOWN)
-        found = verdicts.of_passing(verdicts.of_constraint(held, shown=shown), *notes.get(PASSING) or (0.0, ""))
+        passing = notes.get(PASSING) or (0.0, "")
+        passing = passing if isinstance(passing, list | tuple) else (passing, "a mechanism")  # as files once had it
+        found = verdicts.of_passing(verdicts.of_constraint(held, shown=shown), *passing)
         found = verdicts.of_mechanism(found, held.choice_.fields.rank, by, shown is True) if by else found
         return verdicts.of_files(found, held) if SHOWN in notes else found
     if not hasattr(innermost(held), "solution_"):

@@ -136,7 +136,7 @@ def _seen(paths: Sequence[str | Path], reading: dict[str, Any]) -> Seen:
     policies = [one for one in models.values() if not isinstance(one, constraints())]
     ordered = sorted(models, key=lambda path: models[path] in policies)  # a policy's notes last: they hold
     own = {path: uc.storage.load_notes(path) for path in ordered}
-    columns = {uc.Recipe.from_dict(one.get("recipe", {})).states for one in own.values()}
+    columns = {uc.Recipe.from_dict(one.get("recipe", {})).states for one in own.values()} - {None}
     if max(len(policies), len(held), len(columns)) > 1:
         raise SettingError(
             f"{', '.join(map(str, paths))}: a page draws one policy and one constraint, of the same columns. Look at "

@@ -238,8 +238,8 @@ def _least_known(policy: uc.Policy, demonstrations: Sequence[uc.Demonstration], 
     place = uc.evaluation.diagnosis.named(worst.state, recipe.states or ())
     passed = f"near {place}, where '{worst.demonstration}' passed"
     least = f"Record more where least is known, held in other ways: {passed}."
-    simplest = click.get_current_context().params.get("model") in ("local", "affine", "linear")
-    least += " Or fit a model of fewer weights, which needs less, as without --model." * (not simplest)
+    large = click.get_current_context().params.get("model") in ("rbf", "cubic")
+    least += " Or fit a model of fewer weights, which needs less, as without --model." * large
     return f"{least} All such places:\n{next_command('diagnose')}"
 
 

@@ -263,8 +263,9 @@ def forbidden(constraint: Constraint, demonstrations: Demonstrations) -> float:
     _, actions, groups = stack(demos)
     projections = np.concatenate([_projections(demo, constraint) for demo in demos])
     held = actions.size - float(np.trace(projections, axis1=1, axis2=2).sum())
-    taken = _squares(actions - project(projections, actions)) - held * robust.noise_by_differences(actions, groups)
-    return max(taken, 0.0) / (_squares(actions) or 1.0)
+    noise = robust.noise_by_differences(actions, groups)  # infinite where demonstrations are too short
+    explained = held * noise if np.isfinite(noise) else 0.0
+    return max(_squares(actions - project(projections, actions)) - explained, 0.0) / (_squares(actions) or 1.0)
 
 
 def nnpe(component: PolicyLike, demonstrations: Demonstrations) -> float:

@@ -158,8 +158,8 @@ def about_freedom(found: Diagnosis) -> str:
     look = ", ".join(f"{many[how]} {words}" for how, words in LOOKS.items() if many[how])
     look = f"How {counted(len(found.movements), 'demonstration')} look: {look}."
     if sum(many[how] for how in KEPT) == len(found.movements):
-        said = "No sample is said to be free: each demonstration looks held, by a plane, line or surface of its own"
-        return f"{said}; a short free stroke may, too. {look}"
+        said = "No sample is said to be free: each demonstration looks held, by a plane, a line or another surface"
+        return f"{said}; free strokes that are short, or circle, may, too. {look}"
     unsure = found.undecided_share * (found.undecided_share >= LITTLE)
     much, held, open_ = percents((found.free_share, 1.0 - found.free_share - unsure, unsure))
     said = f"Of the samples {much} look free (nothing that shows above the noise held them), {held} held"

@@ -71,7 +71,7 @@ def crossed(demonstrations: Sequence[Demonstration], noise: float) -> list[str]:
         across = ((others @ held.T) ** 2).sum() > FLAT**2 * (others**2).sum()
         if across and held[2].any() and _largest(own @ held.T) <= WITHIN * noise and _on_it(places, held):
             found[index] = "line" if held[1].any() else "flat"
-        elif kept(places, wound=True) is not None:
+        elif not held[2].any() and kept(places, wound=True) is not None:
             found[index] = "round"
     return found
 
@@ -79,7 +79,7 @@ def crossed(demonstrations: Sequence[Demonstration], noise: float) -> list[str]:
 def _on_it(places: Array, held: Array) -> bool:
     """Whether positions (T, n) leave no direction that was held (n, n) by more than their noise, or hardly."""
     noise = float(np.sqrt(robust.noise_by_differences(places, np.zeros(len(places), dtype=np.intp))))
-    most = max(WITHIN * noise, TIGHT * float(np.linalg.norm(np.ptp(places, axis=0))))
+    most = max(WITHIN * noise if np.isfinite(noise) else 0.0, TIGHT * float(np.linalg.norm(np.ptp(places, axis=0))))
     return _largest((places - places.mean(axis=0)) @ held.T) <= most
 
 

@@ -329,7 +329,8 @@ def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bo
     straight = sum(one.choice_.wound is False for one in every) > len(every) / 2
     if not shown and (one_way or followed or (alone and straight)):
         little = "free strokes that turn as little keep to a surface of their own, too"
-        why = "each state was passed one way only, as by a free policy" if one_way else little
+        why = little if straight else "a policy that keeps to this path by itself looks the same"
+        why = "each state was passed one way only, as by a free policy" if one_way else why
         then = "Record movements that cross each other, and learn it again; or name the --features."
         then = f"{FOLLOW if followed else then} '{'diagnose' if single else 'fit'}' compares several with one policy, "
         said = f"Whether anything was held cannot be told{' by one demonstration alone' * single}: {why}."
@@ -395,13 +396,9 @@ def of_support(support: Array, times: Array | None, unknown: Array | None = None
     """
     seconds = np.arange(len(support), dtype=np.float64) if times is None else times
     away, every = support < NEARBY, f"Near demonstrations for all {seconds[-1]:.2f} s"
-    first, brief, lasting = (
-        int(away.argmin()),
-        0.01,
-        0.1,
-    )  # shares of all: as at the edge of what was recorded, and more
+    first, brief, lasting = int(away.argmin()), 0.01, 0.1  # the last two are shares of all
     if 0 < first == away.sum() < brief * len(away) and support.min() >= SUPPORTED:
-        away, every = np.zeros_like(away), f"{every} but the first {seconds[first]:.2g}"
+        away, every = np.zeros_like(away), f"{every} but the first {seconds[first]:.2g} s"
     open_ = np.zeros_like(away) if unknown is None else (unknown > SMALL) & ~away
     if not (off := away | open_).any():
         return Verdict(Mark.GOOD, f"{every}: supported.")

@@ -81,16 +81,22 @@ def _numbers(parts: Sequence[Part]) -> html.Markup:
     return html.tiles(
         [
             (f"{held} of {learnt[0].choice_.actions}", "directions held"),
-            (learnt[0].choice_.name or "own", "features"),
+            _form(learnt[0]),
             (html.number(float(np.mean([one.noise_ for one in learnt]))), "noise and misfit along them"),
             (html.number(taken), "nPOE, the share of the observed motion that it would take"),
         ]
     )
 
 
+def _form(learnt: LearntConstraint) -> tuple[str, str]:
+    named = learnt.mechanism_
+    return (named.kind, "mechanism") if named else (learnt.choice_.name or "own", "features")
+
+
 def _chosen(learnt: LearntConstraint) -> html.Markup:
     rows = [[name or "own", html.number(share)] for name, share in learnt.choice_.candidates.items()]
-    note = "Mean square along the held directions, as a share of the mean square action, where held out."
+    of = "the directions that velocities show" if learnt.mechanism_ else "the held directions"
+    note = f"Mean square along {of}, as a share of the mean square action, where held out."
     return html.section("How its form was chosen", html.table(["features", "missed"], rows, note=note))
 
 

@@ -254,7 +254,7 @@ def replays(
     """Compare at most twenty demonstrations; none where :func:`unlike` says why not."""
     chosen = [] if unlike(demos, recipe) else _moving(demos)
     if not free and held is None:
-        chosen = [one for one in chosen if _told(policy, one)]
+        chosen = [one for one in chosen if _way(policy, one, _shape(policy, one))[1]]
     if not chosen:
         return []
     chosen = [chosen[k] for k in np.linspace(0, len(chosen) - 1, min(len(chosen), MOST)).astype(int)]
@@ -266,7 +266,7 @@ def replays(
     starts, steps = np.array([one.states[0] for one in chosen]), round(max(lasted) / dt) + 1
     own, known = held, [True] * len(chosen)
     if held is None:
-        ways = [_way(policy, *each, free) for each in zip(chosen, shapes, strict=True)]
+        ways = [_way(policy, *each) for each in zip(chosen, shapes, strict=True)]
         own, known = [way for way, _ in ways], [how for _, how in ways]
     moving, near = bounded(policy, stack(demos).states)
     runs = rollout(moving, starts, steps, dt, own, task=task, least_support=0.0)
@@ -281,7 +281,7 @@ def _shape(policy: Any, demo: Demonstration) -> tuple[Array, Array]:
     return diagnosis.flat(demo.states, 0.1 * diagnosis.FLAT if freely else diagnosis.FLAT)
 
 
-def _way(policy: Any, demo: Demonstration, shape: tuple[Array, Array], free: bool) -> tuple[Any, bool]:
+def _way(policy: Any, demo: Demonstration, shape: tuple[Array, Array]) -> tuple[Any, bool]:
     """What its run is held to, a surface about which it winds, plane or line, and whether it tells that it was."""
     surface = kept(demo.states, wound=True) if demo.states.shape[1] == 3 else None
     if surface is not None:
@@ -289,7 +289,7 @@ def _way(policy: Any, demo: Demonstration, shape: tuple[Array, Array], free: boo
         along = project(null_space_projection(surface.rows(demo.states)), freely)
         if _missed(demo, along) < BETTER * _missed(demo, freely):
             return partial(_on, surface), True
-    known = not free or _told(policy, demo)  # others were not chosen
+    known = _told(policy, demo)
     return partial(_same, shape[0] * known), known
 
 

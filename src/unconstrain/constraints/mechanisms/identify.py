@@ -295,7 +295,7 @@ def _track(
     """What was recorded, in its own units; the order of its rows, the unit, the origin."""
     table = as_matrix(positions, "positions")
     if table.shape[1] not in (2, 3):
-        raise InvalidDataError(f"positions: got {table.shape[1]} columns, expected two or three, in m.")
+        raise InvalidDataError(f"positions: got {table.shape[1]} columns, expected two or three.")
     names = as_groups(np.zeros(len(table)) if groups is None else groups, len(table))
     _, codes, counts = np.unique(names, return_inverse=True, return_counts=True)
     if counts.min() < FEWEST:

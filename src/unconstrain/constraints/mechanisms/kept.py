@@ -7,14 +7,15 @@ from functools import lru_cache
 from math import log
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ...base.arrays import Array
+from ...base.arrays import Array, as_matrix
 from .identify import FEWEST, LIKELY, identify
 from .mechanism import Mechanism
-from .track import noise_by_differences, turns
+from .track import noise_by_differences, turned_by
 
 SMALLEST = 1e-9
-"""Share of their distance from their middle below which positions that are looked at do not move."""
+"""Share of the numbers themselves below which positions that are looked at do not move."""
 
 ROUND = ("circle", "sphere", "cylinder", "screw")
 
@@ -33,7 +34,7 @@ MOST_POSITIONS = 200
 """Positions, at most, by which a mechanism is named; more are thinned evenly."""
 
 
-def kept(positions: Array, wound: bool = False) -> Mechanism | None:
+def kept(positions: ArrayLike, wound: bool = False) -> Mechanism | None:
     """Return the round mechanism that one demonstration keeps to, by its positions; None if to none.
 
     That is so where each kind that is likely is round, and noise that is white explains how far positions leave it. Of
@@ -41,7 +42,7 @@ def kept(positions: Array, wound: bool = False) -> Mechanism | None:
 
     Parameters
     ----------
-    positions : ndarray, shape (T, 2) or (T, 3)
+    positions : array_like, shape (T, 2) or (T, 3)
         In the order of time.
     wound : bool
         Only if what is held turns on their way as it seems to on no free stroke: these may turn within a bowl.
@@ -52,26 +53,26 @@ def kept(positions: Array, wound: bool = False) -> Mechanism | None:
     >>> uc.constraints.kept(0.4 * np.column_stack([np.cos(turn), np.sin(turn)]) + noise).kind
     'circle'
     """
-    if len(positions) < FEWEST:
+    table = as_matrix(positions, "positions")
+    if len(table) < FEWEST:
         return None
-    middle = positions.mean(axis=0, dtype=np.float64)
-    thinned = positions[:: -(-len(positions) // MOST_POSITIONS)] - middle
+    middle, thinned = table.mean(axis=0), table[:: -(-len(table) // MOST_POSITIONS)]
     spread = float(np.sqrt(thinned.var(axis=0).sum()))
     if spread <= SMALLEST * float(np.abs(thinned).max()):
         return None
-    white = noise_by_differences(positions, np.zeros(len(positions), dtype=np.intp))
+    white = noise_by_differences(table, np.zeros(len(table), dtype=np.intp))
     most = max(min(WITHIN * white, NEAR * spread), EXACT * spread)
-    if _off_quadric(positions) > most:
+    if _off_quadric(table) > most:
         return None
-    likely = _likely(thinned.tobytes(), positions.shape[1])
+    likely = _likely((thinned - middle).tobytes(), table.shape[1])
     round_ = all(one.kind in ROUND and not one.vague for one, _ in likely)
     found, off = min(likely, key=lambda one: one[0].rank)
     found = replace(found, centre=found.centre + middle)
-    turned = not wound or max(turns([normals]) for normals in found.rows(positions).swapaxes(0, 1)) >= WOUND
+    turned = not wound or max(turned_by(normals) for normals in found.rows(table).swapaxes(0, 1)) >= WOUND
     return found if round_ and off <= most and turned else None
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=2048)
 def _likely(positions: bytes, columns: int) -> list[tuple[Mechanism, float]]:
     """Mechanisms that may be it, the likeliest first, and how far it leaves each; once for all learners that ask."""
     found = identify(np.frombuffer(positions).reshape(-1, columns)).candidates

@@ -13,8 +13,9 @@ from ...base.arrays import Array
 from ...risks import autocorrelations, unit_actions
 from .quaternions import mean_orientation, turns_from
 
-PARTS, LEAST_STEP = 12, 0.05
-"""Mean steps of so many parts tell how a stroke turns, if longer than this share of the longest."""
+PARTS, LEAST_STEP = (12, 17), 0.05
+"""Mean steps of so many parts, or of so many, tell how a stroke turns, if longer than this share of the longest: as many
+parts as rounds seem to turn nowhere."""
 
 ROUND = 1.5
 """Free strokes turn less than so often: thirty shapes drawn by hand turn 0.1 to 1.4 times, and wiping 3 times."""
@@ -78,18 +79,18 @@ class Track:
 
 def winding(steps: Iterable[Array]) -> bool:
     """Whether demonstrations turn more on their way, to either side, than free ones, by their steps (T, D) in order."""
-    return turns(steps) >= ROUND
+    return bool(np.median([turned_by(each) for each in steps]) >= ROUND)
 
 
-def turns(steps: Iterable[Array]) -> float:
-    """How often vectors (T, D) in order turn, to either side; the median of several demonstrations."""
+def turned_by(vectors: Array) -> float:
+    """How often vectors (T, D) in order turn, to either side."""
     found = []
-    for each in steps:
-        means = np.array([part.mean(axis=0) for part in np.array_split(each, min(PARTS, len(each)))])
+    for parts in PARTS:
+        means = np.array([part.mean(axis=0) for part in np.array_split(vectors, min(parts, len(vectors)))])
         ways, lengths = unit_actions(means)
         ways = ways[lengths > LEAST_STEP * lengths.max()]
         found.append(np.arccos(np.clip(np.vecdot(ways[1:], ways[:-1]), -1.0, 1.0)).sum() / (2 * np.pi))
-    return float(np.median(found))
+    return float(max(found))
 
 
 def principal(positions: Array) -> tuple[Array, Array]:

@@ -14,7 +14,8 @@ demonstration ``b(x)ᵀu = 0``, so that vec B is an eigenvector of
 smooth movements have such eigenvectors by chance: those count that, learnt
 without a stretch of the demonstration, hold there too. And actions that are
 themselves affine in the state have them free or held, ``b = S u`` with any
-skew-symmetric S: they show nothing.
+skew-symmetric S: they show nothing. Where states are the positions whose
+velocities the actions are, what is round that these keep to is held.
 """
 
 from typing import Any
@@ -124,6 +125,9 @@ def projections_of(actions: Array, labels: NDArray[np.intp], noise: Array) -> Ar
 
 def curved_projections(states: Array, actions: Array, labels: NDArray[np.intp], flat: Array, noise: Array) -> Array:
     """N̂ of each sample (N, d, d), where segments also held directions that turn with the state; else the flat one.
+
+    By their actions, or by their states where these are positions in the order of time, in the actions' frame and unit
+    of length.
 
     Parameters
     ----------
