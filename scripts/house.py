@@ -342,7 +342,7 @@ def _figures_of_code(house: House) -> list[Figure]:
     return [
         Figure("checks of learners", len(checks_of_learners(house)), 2, 0, "isinstance of a class in learners"),
         Figure("lines of policies", lines(house.files("policies")), 680, 420, "all lines, blank ones too"),
-        Figure("lines in all", lines(outside), 34664, 16000, "the same, of the package without paper"),
+        Figure("lines in all", lines(outside), 34667, 16000, "the same, of the package without paper"),
         Figure("names at doors", sum(map(offered.get, doors)), 259, 150, "in __all__ of rooms and folders"),
         Figure("names in all", sum(offered.values()), None, None, "in __all__ of every file"),
         Figure("longest function", max(bare), 41, 40, "its lines without the docstring"),

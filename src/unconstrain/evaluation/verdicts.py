@@ -307,6 +307,10 @@ FOLLOW = "Use it with --constraint of 'rollout' or 'score', which follow the mec
 """What to do where files hold to mechanisms: nothing is missing of their form."""
 
 
+LITTLE = "free strokes that turn as little keep to a surface of their own, too"
+"""Why one stroke may have been free for all that its positions show."""
+
+
 def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bool | str | None = None) -> Verdict:
     """Judge a constraint, or one for each demonstration, by what it missed.
 
@@ -328,8 +332,7 @@ def of_constraint(learnt: LearntConstraint, *others: LearntConstraint, shown: bo
     one_way, alone = all(one.choice_.one_way for one in every), others or not choice.several
     straight = sum(one.choice_.wound is False for one in every) > len(every) / 2
     if not shown and (one_way or followed or (alone and straight)):
-        little = "free strokes that turn as little keep to a surface of their own, too"
-        why = little if straight else "a policy that keeps to this path by itself looks the same"
+        why = LITTLE if straight else "a policy that keeps to this path by itself looks the same"
         why = "each state was passed one way only, as by a free policy" if one_way else why
         then = "Record movements that cross each other, and learn it again; or name the --features."
         then = f"{FOLLOW if followed else then} '{'diagnose' if single else 'fit'}' compares several with one policy, "

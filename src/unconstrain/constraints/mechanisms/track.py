@@ -14,8 +14,8 @@ from ...risks import autocorrelations, unit_actions
 from .quaternions import mean_orientation, turns_from
 
 PARTS, LEAST_STEP = (12, 17), 0.05
-"""Mean steps of so many parts, or of so many, tell how a stroke turns, if longer than this share of the longest: as many
-parts as rounds seem to turn nowhere."""
+"""Mean steps of so many parts, or of so many, tell how a stroke turns, if longer than this share of the longest; as
+many parts as rounds seem to turn nowhere."""
 
 ROUND = 1.5
 """Free strokes turn less than so often: thirty shapes drawn by hand turn 0.1 to 1.4 times, and wiping 3 times."""
