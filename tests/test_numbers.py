@@ -39,7 +39,7 @@ LEFT = {
     ),
     "a constant of the robust learners": (
         r"more than 5 % of a demonstration|for 70 % of the|then over 2 % less|from 0\.02 to 0\.4|above 35 %"
-        r"|fewer than 10 %|by differences in time, and 0\.5 %"
+        r"|by differences in time, and 0\.5 %"
     ),
     "a bound in the code": (
         r"than\s+1100 times|to 32 MB is kept|about 8 MB: larger|at most 1 MB|least 0\.7 in one|than\s+30 % of a mean"
