@@ -62,7 +62,7 @@ def kept(positions: ArrayLike, wound: bool = False) -> Mechanism | None:
         return None
     white = noise_by_differences(table, np.zeros(len(table), dtype=np.intp))
     most = max(min(WITHIN * white, NEAR * spread), EXACT * spread)
-    if _off_quadric(table) > most:
+    if _off_quadric(table) > most or (wound and turned_by(np.diff(table, axis=0)) < WOUND):
         return None
     likely = _likely((thinned - middle).tobytes(), table.shape[1])
     round_ = all(one.kind in ROUND and not one.vague for one, _ in likely)
